@@ -648,7 +648,7 @@ def main() -> None:
     wrong = [row["case"] for row in rows if row["verdict"] == "WRONG"]
     if wrong:
         raise UserError(
-            f"{len(wrong)} of {len(rows)} cases are wrong without a word: {', '.join(wrong)}"
+            f"{len(wrong)} of {len(rows)} cases are wrong without a warning: {', '.join(wrong)}"
         )
 
 

@@ -51,7 +51,7 @@ reprojections:
 """
 DATASET = Path("results/soak/LFSoak")
 WORK = Path("work/soak/LFSoak")
-# No file may exceed so many bytes: from what Snakemake itself needs to less than the scene.
+# No file may exceed this many bytes: from what Snakemake itself needs to less than the scene.
 LIMITS = (32_000, 64_000, 128_000)
 
 

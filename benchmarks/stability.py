@@ -43,7 +43,7 @@ from lightfield.imaging.plots import BLUE, VERMILION, plot
 
 # Roundings, each of one eps, in the longest chain of operations of one step.
 ROUNDINGS = 16
-# A point within so many eps of the rim may count as inside or outside.
+# A point within this many eps of the rim may count as inside or outside.
 RIM = 32
 # If its bound is larger, in pixels, a case passes as ill-conditioned only.
 VAGUE = 0.5
@@ -672,7 +672,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder for the results")
     folder = parser.parse_args().output
     cases = list(measure(extreme_lenses()))
-    write_csv(folder / "stability.csv", map(printable, cases))
+    write_csv(folder / "stability.csv", [printable(case) for case in cases])
     write_text(folder / "stability.md", summary(cases))
     draw(folder / "stability", cases)
     failed = [each for each in cases if each["verdict"] == "FAIL"]

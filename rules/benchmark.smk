@@ -1,4 +1,4 @@
-# Measurements that anybody can repeat; asked for by name, no part of a dataset.
+# Measurements that anybody can repeat. They are not part of a dataset: name the target.
 
 
 include: "helpers/benchmark.smk"
@@ -103,7 +103,7 @@ rule check_gpu:
         " --cache {params.cache} --output {params.stem} > {log} 2>&1"
 
 
-# Without a GPU it says so before the first job.
+# Without a GPU the run ends before its first job.
 rule gpu_check:
     input:
         [f"{MEASURED}/gpu_check/{name}.json" for name in RENDERED_SCENES],

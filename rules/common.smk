@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
-# From the folder that Snakemake works in, which may be a user's own; as commands have them.
+# Relative to Snakemake's folder, which may be a user's own, and quoted for commands.
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
@@ -33,7 +33,8 @@ from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
-from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
+from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
+from lightfield.dataset.names import VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,
     FiguresSettings,
@@ -51,28 +52,28 @@ from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
 
-# The rules call `python`: that is the one that runs Snakemake, or a container's own.
+# The rules call `python`: the one that runs Snakemake, or a container's own.
 OWN_PYTHON = (
     ""
     if USES_CONTAINERS
     else f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
 )
-# A prefix replaces Snakemake's own, strict mode and all. Ours also has the log of a job name the
-# signal that ended its program.
+# This replaces Snakemake's own prefix, including its strict mode. It also writes the signal that
+# ended a program into the job's log.
 shell.prefix(
     f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};{OWN_PYTHON}"
-    # A signal that ends the whole group shall not end the shell first.
+    # A signal to the whole group must not end the shell first.
     " trap : TERM;"
     ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
 
-# The rigs that a config.yaml names are those of the scene that it names.
+# The rigs in a config.yaml belong to the scenes in it. For other scenes, all rigs are chosen.
 NAMING = GIVEN if "scenes" in GIVEN else OWN
 if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
     config["rigs"] = "all"
 
-# On a cluster no job waits long for the last shard.
+# On a cluster, shards are small, so that no job waits long for the last one.
 CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
 
 try:
@@ -87,16 +88,16 @@ except UserError as error:
     sys.exit(f"error: {error}")
 
 CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
-# Of the others there are views alone.
+# Imported scenes have only views.
 RENDERED_SCENES = list(dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported))
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
-# Those that are not chosen may test what is trained on the chosen ones.
+# Also datasets that are not chosen: they may test what is trained on the chosen ones.
 DATASETS = {dataset.name: dataset for dataset in [*SMOKE, *WHOLE]}
 # Any dataset of each scene YAML: all of them have the same .blend.
 SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
-# The scenes that are somebody else's views, as a wildcard's constraint; "(?!)" matches nothing.
+# The imported scenes, as a wildcard's constraint. "(?!)" matches nothing.
 IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
 
 # `folder` and `work` of a Dataset, with wildcards.
@@ -104,18 +105,18 @@ DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
 MADE = f"{WORK}/{{scene}}/{{rig}}"
 PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
-# Of a cube map each face has one, with _f, _b, … before the suffix.
+# Each face of a cube map has one, with _f, _b, … before the suffix.
 LENS_MAP = f"{MADE}/{{reprojection}}/lens_map.npy"
 LEDGER = f"{WORK}/{ledger.NAME}"
-# Where damaged files are moved to, so that nobody loses anything.
+# Damaged files are moved here, so that nobody loses anything.
 REMOVED = f"{WORK}/removed"
 SHARDS = f"{WORK}/{shard_counts.NAME}"
 MEMORY = available()
-# One for each render, and as many renders at once as this machine has GPUs; nodes count their own.
+# Each render takes a GPU, so as many renders run at once as there are GPUs. Nodes count their own.
 LOCAL_GPUS = visible() if RUNS_HERE and SETTINGS.device != "cpu" else []
 if RUNS_HERE:
     limit_resource("gpu", max(1, len(LOCAL_GPUS)))
-# Left out where it is none, unless a submit command needs the number.
+# Without GPUs the resource is left out, unless a submit command needs the number.
 DEFAULT_GPUS = 0 if ASKS_FOR_GPUS else None
 GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else DEFAULT_GPUS
 
@@ -134,7 +135,7 @@ wildcard_constraints:
     end=r"\d+",
 
 
-# Where these rules are a module of another workflow, that may have given them other names.
+# As a module of another workflow, these rules may have other names there.
 RENDER = rule_name("render")
 RENDER_PANORAMA = rule_name("render_panorama")
 CALIBRATE = rule_name("calibrate")
@@ -146,37 +147,37 @@ MEASURE_LEARNING = rule_name("measure_learning")
 
 
 def log_of(job):
-    """Return the log of a job; ``job`` is its path, with wildcards."""
+    """Return the log of a job. ``job`` is its path, with wildcards."""
     return f"{WORK}/logs/{job}.log"
 
 
 def times_of(job):
-    """Return where Snakemake notes what a job has taken."""
+    """Return the TSV in which Snakemake writes a job's time and memory."""
     return f"{WORK}/benchmarks/{job}.tsv"
 
 
-def one_of(known, name, folder, kind):
-    """Return what has a name, which is in a file's path; ends the run where nothing has."""
-    if name not in known:
-        near = " or ".join(difflib.get_close_matches(name, known))
+def one_of(by_name, name, folder, kind):
+    """Return the entry with a name from a file's path. Ends the run if there is none."""
+    if name not in by_name:
+        near = " or ".join(difflib.get_close_matches(name, by_name))
         hint = f"; is {near} meant?" if near else ""
         sys.exit(f"error: {folder}/{name}: no {kind}{hint}")
-    return known[name]
+    return by_name[name]
 
 
 def dataset_of(wildcards):
-    """Return the dataset that a job's wildcards mean."""
+    """Return the dataset of a job's wildcards."""
     name = f"{wildcards.scene}/{wildcards.rig}"
     return one_of(DATASETS, name, RESULTS, "dataset of the chosen scenes")
 
 
 def scene_of(wildcards):
-    """Return any dataset of the scene that a job's wildcard means."""
+    """Return any dataset of the scene of a job's wildcard."""
     return one_of(SCENES, wildcards.name, WORK, "chosen scene")
 
 
 def reprojection_of(wildcards):
-    """Return the reprojection that a job's wildcards mean; None of the views themselves."""
+    """Return the reprojection of a job's wildcards. None for the views themselves."""
     dataset, name = dataset_of(wildcards), stage_of(wildcards)
     if name == "render":
         return None
@@ -184,12 +185,12 @@ def reprojection_of(wildcards):
 
 
 def of_dataset(attribute):
-    """Return the function by which a rule asks for an attribute of its dataset."""
+    """Return an input function: it returns an attribute of the job's dataset."""
     return of_each_shard(lambda wildcards: getattr(dataset_of(wildcards), attribute))
 
 
 def stage_of(wildcards):
-    """Return the stage at which a job makes or reads views."""
+    """Return the stage whose views a job makes or reads."""
     source = wildcards.get("source", "").rstrip("/")
     return wildcards.get("reprojection", source or "render")
 
@@ -200,16 +201,16 @@ def records(wildcards):
 
 
 def optional(*names, **flags):
-    """Return the function by which a rule names to its program inputs that there may be.
+    """Return a params function: it returns the flags of the optional inputs that exist.
 
-    Each has a flag of its own name, or the one that is given.
+    An input's flag has the input's name, unless ``flags`` gives another.
     """
     flags |= dict(zip(names, names))
 
-    def words(wildcards, input):
+    def arguments(wildcards, input):
         given = [(flag, input[name]) for flag, name in flags.items() if input[name]]
         return shlex.join(
             word for flag, path in given for word in (f"--{flag}", str(path))
         )
 
-    return words
+    return arguments

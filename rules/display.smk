@@ -1,9 +1,13 @@
 # The terminal's display: the progress of a run, and the forecast of a dry run.
 import logging
+import resource
 
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
-from lightfield.dataset.estimate import START_UP_SECONDS
+from lightfield.dataset.unit_costs import (
+    JOB_SECONDS,
+    START_UP_SECONDS,
+)
 from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
 # For more datasets than this, only the page of all datasets is named.
@@ -22,35 +26,97 @@ PHASES = {
 }
 
 
-def rendering(job):
-    """Return how many views of a dataset a job renders, and its estimated seconds of one core."""
-    if job.rule.name == RENDER:
-        views = int(job.wildcards.end) - int(job.wildcards.first)
-        seconds = dataset_of(job.wildcards).estimate.view_seconds
-        return views, START_UP_SECONDS + views * seconds
-    if job.rule.name == RENDER_PANORAMA:
-        return 0, dataset_of(job.wildcards).estimate.panorama_seconds
-    if job.rule.name == CALIBRATE:
-        dataset = first_dataset(job.wildcards.scene)
+# The phases of a dataset, in the order of the work. Other phases follow.
+PHASE_ORDER = {
+    phase: place
+    for place, phase in enumerate(
+        [
+            "scene",
+            "cameras",
+            "calibration",
+            "views",
+            "flow",
+            "reprojections",
+            "exports",
+            "validation",
+            "report",
+        ]
+    )
+}
+# Jobs of these phases have no estimate. Their logs say how long they take.
+UNKNOWN_PHASES = ("measurement", "benchmark", "learn", "plan", "synthesis")
+# Rules that start Blender, beside those that render.
+BLENDER_RULES = (
+    "build_scene",
+    "check_blend",
+    "check_cameras",
+    "free_places",
+    "inventory",
+    "probe_cameras",
+)
+
+
+def views_of(job):
+    """Return the number of views that a shard's job makes. Other jobs make none."""
+    wildcards = job.wildcards
+    if "first" in wildcards.keys():
+        return int(wildcards.end) - int(wildcards.first)
+    return 0
+
+
+def rendered_views(job):
+    """Return the number of the dataset's views that a job renders."""
+    return views_of(job) if job.rule.name == RENDER else 0
+
+
+def phase_of(job):
+    """Return the phase of a job."""
+    stem = Path(job.rule.snakefile).stem
+    return PHASES.get(job.rule.name, PHASES.get(stem, stem))
+
+
+def estimated_seconds(job):
+    """Return the estimated seconds of a job on one core. None if they are unknown."""
+    name = job.rule.name
+    wildcards = job.wildcards
+    if name == CALIBRATE:
+        dataset = first_dataset(wildcards.scene)
         target, most = map(dataset.render.get, ("target_error", "most_samples"))
         if target is None:
-            return 0, 0.0
-        size = min(dataset.rig.camera.resolution)
-        return 0, calibration_seconds(target, size, most)
-    return 0, 0.0
+            return 0.0
+        return calibration_seconds(target, min(dataset.rig.camera.resolution), most)
+    if phase_of(job) in UNKNOWN_PHASES:
+        return None
+    if name in BLENDER_RULES:
+        return START_UP_SECONDS
+    if "rig" not in wildcards.keys():
+        return JOB_SECONDS
+    estimate = dataset_of(wildcards).estimate
+    if name == RENDER:
+        return START_UP_SECONDS + views_of(job) * estimate.view_seconds
+    if name == RENDER_PANORAMA:
+        return estimate.panorama_seconds
+    if name == "import_views":
+        return JOB_SECONDS + views_of(job) * estimate.import_seconds
+    if name == "reproject":
+        seconds = estimate.reprojection_seconds(wildcards.reprojection)
+        return JOB_SECONDS + views_of(job) * seconds
+    if name in ("export", "export_to_instant_ngp", "validate"):
+        return JOB_SECONDS + estimate.check_seconds
+    if name in ("figures", "page"):
+        return JOB_SECONDS + estimate.report_seconds
+    return JOB_SECONDS
 
 
 def task_of(job):
     """Return the display's task for a job."""
-    stem = Path(job.rule.snakefile).stem
-    views, seconds = rendering(job)
     return Task(
         job.rule.name,
         str(Path(job.log[0]).relative_to(stored(f"{WORK}/logs")).with_suffix("")),
-        PHASES.get(job.rule.name, PHASES.get(stem, stem)),
+        phase_of(job),
         Path(job.log[0]),
-        views=views,
-        seconds=seconds,
+        views=rendered_views(job),
+        seconds=estimated_seconds(job),
     )
 
 
@@ -88,24 +154,32 @@ def is_quiet_about(kind):
 def passes(record):
     """Return whether to print a record of Snakemake's log. If so, clear the line of progress.
 
-    With --quiet progress, it prints only warnings. It skips Snakemake's message on a failed job,
-    which is the whole command, because the display says why the job failed.
+    With --quiet progress, it prints only warnings, and that there is nothing to be done. It skips
+    Snakemake's message on a failed job, which is the whole command, because the display says why
+    the job failed.
     """
     if is_quiet_about("PROGRESS"):
-        failed_job = record.getMessage().startswith("RuleException")
-        if record.levelno < logging.WARNING or failed_job:
+        message = record.getMessage()
+        if message.startswith("RuleException"):
+            return False
+        if record.levelno < logging.WARNING and not message.startswith("Nothing to be"):
             return False
     DISPLAY.clear()
     return True
 
 
+def quiet_snakemake():
+    """Let Snakemake print only what `passes`. Its log file and logger plugins get all records."""
+    for handler in logging.getLogger("snakemake.logging").handlers:
+        is_stream = isinstance(handler, logging.StreamHandler)
+        if is_stream and not isinstance(handler, logging.FileHandler):
+            handler.addFilter(passes)
+
+
 def begin_display():
     """Show the progress of the run from now on."""
     note_failures()
-    for handler in logging.getLogger("snakemake.logging").handlers:
-        # Snakemake's own log file gets all records.
-        if not isinstance(handler, logging.FileHandler):
-            handler.addFilter(passes)
+    quiet_snakemake()
     # A job without output takes seconds, and its log is printed at the end.
     jobs = [job for job in needed_jobs() if job.log and job.output]
     if jobs and not is_quiet_about("ALL"):
@@ -124,20 +198,30 @@ def announce_calibrations(jobs):
             scene = job.wildcards.scene
             renders = [each for each in jobs if each.rule.name == RENDER]
             render_seconds = sum(
-                rendering(render)[1]
+                estimated_seconds(render)
                 for render in renders
                 if render.wildcards.scene == scene
             )
             print(
-                f"calibrating {scene} takes some {duration(rendering(job)[1])} of a core,"
+                f"calibrating {scene} takes some {duration(estimated_seconds(job))} of a core,"
                 f" and rendering it then some {duration(render_seconds)}",
                 file=sys.stderr,
             )
 
 
+def cpu_seconds():
+    """Return the CPU seconds of all jobs. None on a cluster, or on a graphics card."""
+    if not RUNS_HERE or GPUS:
+        return None
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def end_display():
-    """Stop the display, and print the logs of jobs without output."""
+    """Stop the display, print its summary, and print the logs of jobs without output."""
     DISPLAY.stop()
+    if TASKS:
+        print(DISPLAY.summary(cpu_seconds()), file=sys.stderr)
     for job in needed_jobs():
         if job.log and not job.output and Path(job.log[0]).exists():
             print(Path(job.log[0]).read_text(), end="", flush=True)
@@ -157,31 +241,33 @@ def print_pages():
         print(f"valid: {page}", file=sys.stderr)
 
 
+def work_of(job, name):
+    """Return a job's part of the forecast, under a name."""
+    views = rendered_views(job)
+    size = views * dataset_of(job.wildcards).estimate.all_view_bytes if views else 0.0
+    return Work(name, 1, views, estimated_seconds(job) or 0.0, size)
+
+
+def dataset_name_of(job):
+    """Return the name of a job's dataset, as in its path. None if it belongs to no dataset."""
+    if "rig" not in job.wildcards.keys():
+        return None
+    dataset = dataset_of(job.wildcards)
+    return f"{dataset.scene_folder}/{dataset.rig_name}"
+
+
 def print_forecast():
-    """Print the number of jobs and the estimated rendering time at the end of a dry run."""
+    """Print the jobs, views, CPU time and size of a dry run's phases and datasets at its end."""
     if not is_planned_dry_run():
         return
     announce_damage()
     announce_refusals()
-    works = {}
-    for job in needed_jobs():
-        views, seconds = rendering(job)
-        if seconds:
-            if job.rule.name == CALIBRATE:
-                name = f"calibration of {job.wildcards.scene}"
-                size = 0.0
-            else:
-                dataset = dataset_of(job.wildcards)
-                name = f"{dataset.scene_folder}/{dataset.rig_name}"
-                size = views * dataset.estimate.all_view_bytes
-            work = works.get(name, Work(name, 0, 0.0))
-            works[name] = Work(
-                name, work.views + views, work.seconds + seconds, work.size + size
-            )
-    if is_quiet_about("PROGRESS"):
-        print(job_table())
-    if works:
-        print(forecast([works[name] for name in sorted(works)]))
+    # Targets such as `all` have no program, and so no log.
+    jobs = [job for job in needed_jobs() if job.log]
+    jobs.sort(key=lambda job: PHASE_ORDER.get(phase_of(job), len(PHASE_ORDER)))
+    phases = [work_of(job, phase_of(job)) for job in jobs]
+    datasets = [work_of(job, name) for job in jobs if (name := dataset_name_of(job))]
+    print(forecast(phases, sorted(datasets, key=lambda work: work.name)))
 
 
 atexit.register(print_forecast)

@@ -25,7 +25,7 @@ rule probe_cameras:
         " --settings {input.settings} {params.places} {params.inventory} --output {output} > {log} 2>&1"
 
 
-# Only scenes with a target error ask for it. Its output is the same each time but for --seconds.
+# Only scenes with a target error need this. Its output is reproducible, except for --seconds.
 rule calibrate:
     input:
         check=of_first("blend_check"),
@@ -129,7 +129,7 @@ rule try_changes:
         " --cores {threads} --cache {params.cache} --output {output} > {log} 2>&1"
 
 
-# Without output: it is asked for to be read.
+# It has no output: its log is printed.
 rule advise:
     input:
         [f"{RESULTS}/benchmarks/advise/{name}.json" for name in RENDERED_SCENES],

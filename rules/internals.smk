@@ -134,10 +134,11 @@ def take_as_missing(is_damaged):
     _IOFile.exists_local = exists_and_is_sound
 
 
-def before_lock(take_folder):
+def before_lock(take_folder, begin_dry_run):
     """Call ``take_folder`` when a real run is planned, before Snakemake locks its files.
 
     Snakemake's hooks come later. If a killed run has left locks, Snakemake ends before `onstart`.
+    A dry run has no hooks: call ``begin_dry_run`` instead.
     """
     build_dag = workflow._build_dag
 
@@ -148,6 +149,7 @@ def before_lock(take_folder):
         if workflow.dryrun:
             # A dry run locks nothing, but it would warn of another run, even of a killed one.
             workflow.persistence.lock = workflow.persistence.noop
+            begin_dry_run()
         else:
             take_folder()
 
@@ -245,11 +247,6 @@ def failed_entries():
 def is_planned_dry_run():
     """Return whether this is a dry run that got as far as a plan with jobs."""
     return workflow.dryrun and workflow.scheduler and len(workflow.dag)
-
-
-def job_table():
-    """Return Snakemake's table of how many jobs of each rule there are."""
-    return workflow.dag.stats()[0]
 
 
 def start_of_run():

@@ -1,4 +1,4 @@
-# Radiance fields that learn from exported files. They are no part of a dataset: name the target.
+# Radiance fields that learn from exported files. They are not part of a dataset: name the target.
 
 
 include: "helpers/learn.smk"

@@ -1,4 +1,4 @@
-# What a dataset looks like.
+# Pictures and pages of datasets.
 
 
 include: "helpers/report.smk"

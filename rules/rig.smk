@@ -1,10 +1,10 @@
-# Where the cameras are and through which lens they look.
+# The places of the cameras, and their lens.
 
 
 include: "helpers/rig.smk"
 
 
-# Only a random rig's cameras have to know the scene.
+# Only a random rig's places depend on the scene.
 rule free_places:
     input:
         settings=settings_of("free_places", free_places_settings),

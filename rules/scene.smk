@@ -28,9 +28,9 @@ rule check_blend:
         settings=scene_settings_of(
             "check_blend",
             lambda dataset: {
-                # What the scene YAML says; without it the job itself records what it finds.
+                # The scene YAML's checksum. Without it the job itself records the file's.
                 "sha256": load_scene(dataset.scene_name).scene.sha256,
-                # With another bpy all that is made of the file is made anew.
+                # Another bpy makes everything of the file again.
                 "bpy": version("bpy"),
             },
         ),
@@ -73,11 +73,12 @@ rule inventory:
         " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
-# Several scenes may have one.
+# Several scenes may share a .blend.
 BLENDS = {d.source.blend: name for name, d in SCENES.items() if d.source.blend}
 
-# Only where a scene YAML says from where, and the user has not brought the file: Snakemake removes
-# what a rule makes before it makes it again, as with --forceall, and it may be a work of weeks.
+# A .blend has a download rule only if the scene YAML has a URL and the user has not brought the
+# file. Snakemake removes a rule's output before it makes it again, as with --forceall, and the
+# user's file may be the work of weeks.
 for blend, name in BLENDS.items():
     if not SCENES[name].source.url or Path(blend).exists():
         continue
@@ -89,7 +90,7 @@ for blend, name in BLENDS.items():
             local(blend),
         log:
             log_of(f"{name}/fetch_blend"),
-        # Where Snakemake runs: a cluster's nodes may not reach the Internet.
+        # Run beside Snakemake, because a cluster's nodes may not reach the Internet.
         localrule: True
         params:
             name=name,
@@ -101,14 +102,14 @@ for blend, name in BLENDS.items():
             " > {log} 2>&1"
 
 
-# Only where jobs see no common folder: Snakemake brings them the copy in its storage.
+# If jobs share no folder, Snakemake fetches the copy in its storage for them.
 for blend, name in BLENDS.items() if STORE else ():
 
     rule:
         name:
             f"store_{name}"
         input:
-            # Another file may be older than the copy of the one before.
+            # The checked file may have changed, although it is older than the copy.
             check=SCENES[name].blend_check,
             blend=local(blend),
         output:

@@ -76,7 +76,7 @@ def take_folder():
 
 
 if IS_MAIN_PROCESS:
-    before_lock(take_folder)
+    before_lock(take_folder, lambda: quiet_snakemake())
 
 
 def explain_full_disk():

@@ -60,8 +60,8 @@ def use_copies(folder):
         link.symlink_to(copies)
     if link.resolve() != copies.resolve():
         raise UserError(
-            f"{folder}: is no link to {copies}; each run and job with a storage needs a folder of "
-            "its own: move what is there away"
+            f"{folder}: is not a link to {copies}; each run and job with a storage needs a folder of "
+            "its own: move the present content away"
         )
 
 

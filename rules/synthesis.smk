@@ -1,4 +1,4 @@
-# What a light field is worth to whoever walks inside it; asked for by name, no part of a dataset.
+# The quality of views synthesised inside a light field. It is not part of a dataset: name the target.
 
 
 include: "helpers/synthesis.smk"

@@ -1,4 +1,4 @@
-# What the pixels must satisfy, and checksums of all that is published.
+# Validation of datasets, and the checksums of all published files.
 
 
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
@@ -62,8 +62,8 @@ rule checksums:
         " --sums {input.sums} --output {output} > {log} 2>&1"
 
 
-# What its jobs are is not known before: it reads what is there, also of an unfinished build. From a
-# view store it takes all that the dataset has there, which compares it with its checksums.
+# The jobs that made the files are unknown when this is planned. It reads all files, also those of an
+# unfinished build. From a view store it fetches the dataset's files, and compares their checksums.
 rule verify:
     input:
         stored_lists,

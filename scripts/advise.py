@@ -9,7 +9,6 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
-from lightfield.measurement import advice
 
 
 def main() -> None:
@@ -18,6 +17,10 @@ def main() -> None:
         "measured", nargs="*", type=Path, help="JSON of a scene, with the scene's name"
     )
     paths = parser.parse_args().measured
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.measurement import advice
+
     if not paths:
         raise UserError("the views of all chosen scenes exist already: nothing is rendered")
     for path in paths:

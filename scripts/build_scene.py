@@ -10,13 +10,7 @@ from pathlib import Path
 from lightfield.core.cli import refuse_beside_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
-from lightfield.core.settings import checked, read_settings
-from lightfield.dataset import config
-from lightfield.dataset.job_settings import BuildSettings
-from lightfield.rendering import blend_file
-
-# isort: split
-from pydantic import TypeAdapter
+from lightfield.dataset.names import builders
 
 
 def main() -> None:
@@ -27,8 +21,24 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+    elif arguments.builder is None:
+        raise UserError("--builder: is missing; or give --settings")
 
-    settings = settings_from(arguments)
+    # Only now, so that --help need not wait for these.
+    from pydantic import TypeAdapter
+
+    from lightfield.core.settings import checked, read_settings
+    from lightfield.dataset.job_settings import BuildSettings
+    from lightfield.rendering import blend_file
+
+    if arguments.settings:
+        settings = read_settings(BuildSettings, arguments.settings)
+    else:
+        parameters = {"seed": arguments.seed, "detail": arguments.detail}
+        content = {"builder": arguments.builder, "parameters": parameters}
+        settings = checked(TypeAdapter(BuildSettings), content, "flags")
     builder = importlib.import_module(f"scenes.{settings.builder}")
     blend_file.new_scene()
     builder.build(settings.parameters.model_dump())
@@ -39,21 +49,9 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--builder", choices=config.builders(), help="builder of the scene")
+    flags.add_argument("--builder", choices=builders(), help="builder of the scene")
     flags.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
     flags.add_argument("--detail", type=float, default=1.0, help="up to 1, which is full (default)")
-
-
-def settings_from(arguments: argparse.Namespace) -> BuildSettings:
-    """Return the settings of --settings, or those of the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(BuildSettings, arguments.settings)
-    if arguments.builder is None:
-        raise UserError("--builder: is missing; or give --settings")
-    parameters = {"seed": arguments.seed, "detail": arguments.detail}
-    content = {"builder": arguments.builder, "parameters": parameters}
-    return checked(TypeAdapter(BuildSettings), content, "flags")
 
 
 if __name__ == "__main__":

@@ -14,22 +14,26 @@ from typing import Any
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.measurement import calibration, sampling, trials
+from lightfield.measurement import trial_flags
+from lightfield.measurement.sampling import PROBES
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
-    trials.add_arguments(parser, "lightfield.json with render.target_error")
+    trial_flags.add_arguments(parser, "lightfield.json with render.target_error")
     parser.add_argument(
         "--probes",
         type=positive,
-        default=sampling.PROBES,
+        default=PROBES,
         help="windows of views; as many others are held out (default: %(default)s)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON of choice and evidence")
     parser.add_argument("--seconds", type=Path, help="JSON of each method's seconds to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.measurement import calibration, trials
 
     lightfield = LightField.read(arguments.lightfield)
     if "target_error" not in lightfield.render:

@@ -11,7 +11,6 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset import config
 
 
 def main() -> None:
@@ -22,6 +21,10 @@ def main() -> None:
     parser.add_argument("--blend", required=True, type=Path, help="file to check")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write on success")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset import config
+
     source = config.load_scene(arguments.scene).scene
     if source.blend is None:
         raise UserError(f"--scene {arguments.scene}: does not use a .blend")

@@ -10,15 +10,6 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file, clearance, drawings
-from lightfield.rendering.clearance import REACH, TOUCHING
-from lightfield.rendering.limits import warnings
-
-# isort: split
-import bpy
-import numpy as np
 
 
 def main() -> None:
@@ -28,6 +19,16 @@ def main() -> None:
     parser.add_argument("--inventory", type=Path, help="JSON of the scene's contents")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    import bpy
+    import numpy as np
+
+    from lightfield.dataset.inventory import read_inventory
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.rendering import blend_file, clearance, drawings
+    from lightfield.rendering.clearance import REACH, TOUCHING
+    from lightfield.rendering.limits import warnings
 
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]

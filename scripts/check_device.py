@@ -3,7 +3,6 @@
 import argparse
 
 from lightfield.core.cli import run
-from lightfield.rendering.cycles import gpu
 
 
 def main() -> None:
@@ -13,7 +12,12 @@ def main() -> None:
         choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"],
         help="device to look for",
     )
-    gpu(parser.parse_args().device)
+    device = parser.parse_args().device
+
+    # Only now, so that --help need not wait for it.
+    from lightfield.rendering.cycles import gpu
+
+    gpu(device)
 
 
 if __name__ == "__main__":

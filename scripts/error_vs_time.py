@@ -5,13 +5,13 @@ from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.measurement import error_vs_time, trials
+from lightfield.measurement import trial_flags
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    trials.add_arguments(parser, "lightfield.json")
-    trials.add_calibration(parser)
+    trial_flags.add_arguments(parser, "lightfield.json")
+    trial_flags.add_calibration(parser)
     parser.add_argument(
         "--probes",
         type=positive,
@@ -37,6 +37,10 @@ def main() -> None:
         "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"
     )
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.measurement import error_vs_time, trials
+
     if arguments.seeds < 2:
         raise UserError(f"--seeds {arguments.seeds}: must be at least 2")
 

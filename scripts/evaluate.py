@@ -11,14 +11,7 @@ from pathlib import Path
 
 from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
-from lightfield.dataset.exports import VIEWS
-from lightfield.export.source import SourceDataset
-from lightfield.export.trainer_splits import splits
-from lightfield.report import evaluation_page
-
-# isort: split
-import numpy as np
-from numpy.typing import NDArray
+from lightfield.dataset.names import VIEWS
 
 NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 
@@ -55,6 +48,13 @@ def main() -> None:
     add("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()
 
+    # Only now, so that --help need not wait for these.
+    import numpy as np
+
+    from lightfield.export.source import SourceDataset
+    from lightfield.export.trainer_splits import splits
+    from lightfield.report import evaluation_page
+
     name = "" if arguments.source == VIEWS else arguments.source
     development = {"exposure": arguments.exposure, "reinhard": arguments.reinhard}
     source = SourceDataset(arguments.dataset, name, arguments.suffix, **development)
@@ -64,7 +64,12 @@ def main() -> None:
     # If the evaluation fails, the output stays as it was.
     with temporary_folder(arguments.output.parent) as temporary:
         overall = evaluation_page.write(
-            temporary, source, tests, arguments.renders, arguments.masks, arguments.background
+            temporary,
+            source,
+            tests,
+            arguments.renders,
+            arguments.masks,
+            np.array(arguments.background),
         )
         for path in list(temporary.rglob("*")):
             if path.is_file():
@@ -77,14 +82,14 @@ def main() -> None:
     )
 
 
-def colour(text: str) -> NDArray[np.float64]:
-    """Return a colour (3,) in sRGB, 0 to 1."""
+def colour(text: str) -> list[float]:
+    """Return a colour's three values in sRGB, 0 to 1."""
     code = NAMED_COLOURS.get(text, text.removeprefix("#"))
     if not re.fullmatch("[0-9a-fA-F]{6}", code):
         raise argparse.ArgumentTypeError(
             f"is {text}; must be black, white or rrggbb, two hexadecimal digits for each channel"
         )
-    return np.array([*bytes.fromhex(code)]) / 255
+    return [value / 255 for value in bytes.fromhex(code)]
 
 
 if __name__ == "__main__":

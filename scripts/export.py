@@ -9,29 +9,37 @@ whose views test what is trained on these. An earlier export in the same folder 
 import argparse
 from pathlib import Path
 
-from lightfield import export
 from lightfield.core.cli import refuse_beside_settings, run
-from lightfield.core.settings import checked, read_settings
-from lightfield.dataset.exports import VIEWS, Export, Exports, ExportSettings, export_settings_of
-from lightfield.export.source import SourceDataset
-
-# isort: split
-from pydantic import TypeAdapter
+from lightfield.dataset.names import EXPORTS, VIEWS
 
 
 def main() -> None:
-    formats = [name for name in Exports.model_fields if name != "instant_ngp"]
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("format", choices=formats, help="format to write")
+    parser.add_argument("format", choices=EXPORTS, help="format to write")
     parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
 
-    settings = settings_from(arguments)
+    # Only now, so that --help need not wait for these.
+    from pydantic import TypeAdapter
+
+    from lightfield import export
+    from lightfield.core.settings import checked, read_settings
+    from lightfield.dataset.exports import export_settings_of
+    from lightfield.export.source import SourceDataset
+
+    model = export_settings_of(arguments.format)
+    if arguments.settings:
+        settings = read_settings(model, arguments.settings)
+    else:
+        content = {"options": {"sources": [arguments.source]}, "suffix": arguments.suffix}
+        settings = checked(TypeAdapter(model), content, "flags")
     options = settings.options
     development = {
         key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
@@ -54,16 +62,6 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
         default=".exr",
         help="suffix of the views (default: .exr)",
     )
-
-
-def settings_from(arguments: argparse.Namespace) -> ExportSettings[Export]:
-    """Return the settings from --settings or from the flags."""
-    model = export_settings_of(arguments.format)
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(model, arguments.settings)
-    content = {"options": {"sources": [arguments.source]}, "suffix": arguments.suffix}
-    return checked(TypeAdapter(model), content, "flags")
 
 
 if __name__ == "__main__":

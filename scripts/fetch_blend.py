@@ -9,7 +9,6 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.dataset import config, download
 
 
 def main() -> None:
@@ -17,6 +16,10 @@ def main() -> None:
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset import config, download
+
     source = config.load_scene(arguments.scene).scene
     if source.url is None:
         raise UserError(f"configs/scenes/{arguments.scene}.yaml: scene: is missing the key url")

@@ -12,16 +12,6 @@ from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset import keys
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import FLOW
-from lightfield.dataset.records import ShardRecord
-from lightfield.export.source import SourceDataset
-from lightfield.geometry.flow import flow
-from lightfield.imaging import images
-
-# isort: split
-import numpy as np
 
 
 def main() -> None:
@@ -38,6 +28,17 @@ def main() -> None:
     )
     parser.add_argument("--record", type=Path, help="JSON of the files' sizes and checksums")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    import numpy as np
+
+    from lightfield.dataset import keys
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.dataset.passes import FLOW
+    from lightfield.dataset.records import ShardRecord
+    from lightfield.export.source import SourceDataset
+    from lightfield.geometry.flow import flow
+    from lightfield.imaging import images
 
     lightfield = LightField.read(arguments.lightfield)
     source = SourceDataset(lightfield.folder, "", ".exr")

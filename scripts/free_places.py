@@ -10,14 +10,6 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.files import write_json
-from lightfield.core.settings import read_settings
-from lightfield.dataset.config import FILE
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.job_settings import FreePlacesSettings
-from lightfield.rendering import blend_file, clearance
-
-# isort: split
-import bpy
 
 
 def main() -> None:
@@ -31,6 +23,15 @@ def main() -> None:
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend reads")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    import bpy
+
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.config import FILE
+    from lightfield.dataset.inventory import read_inventory
+    from lightfield.dataset.job_settings import FreePlacesSettings
+    from lightfield.rendering import blend_file, clearance
 
     settings = read_settings(FreePlacesSettings, arguments.settings)
     rig = settings.rig

@@ -7,23 +7,26 @@ has the size of each dataset whose hours are estimated. Without the file none ar
 import argparse
 from pathlib import Path
 
-from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.core.settings import read_settings
-from lightfield.measurement import gpu_check, trials
+from lightfield.measurement import trial_flags
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    trials.add_arguments(parser, "lightfield.json")
-    trials.add_calibration(parser)
+    trial_flags.add_arguments(parser, "lightfield.json")
+    trial_flags.add_calibration(parser)
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core import processors
+    from lightfield.core.settings import read_settings
+    from lightfield.measurement import gpu_check, trials
 
     settings = gpu_check.GpuCheckSettings()
     if arguments.settings:
@@ -43,16 +46,16 @@ def main() -> None:
     print(text)
     if not content["same"]:
         raise UserError(
-            f"{name}: the GPU renders another picture than the processor: colours differ by "
-            f"{content['colour']:.2f} of what noise makes, all light by {content['light']:.1f} "
-            f"standard errors, and {content['depth']:.2%} of the depths; try another driver, or "
-            "render with device=cpu"
+            f"{name}: the GPU renders another picture than the processor: colours differ "
+            f"{content['colour']:.2f} times as much as noise explains, all light by "
+            f"{content['light']:.1f} standard errors, and {content['depth']:.2%} of the depths "
+            "differ; try another driver, or render with device=cpu"
         )
     write_text(arguments.output.with_suffix(".md"), text)
     write_json(arguments.output.with_suffix(".json"), content)
     print(
-        f"note: {name}: the GPU renders the same picture; all datasets at full size take "
-        f"{sum(content['hours'].values()):.3g} hours of it"
+        f"note: {name}: the GPU renders the same picture; it takes "
+        f"{sum(content['hours'].values()):.3g} hours for all datasets at full size"
     )
 
 

@@ -7,8 +7,6 @@ from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy
 from lightfield.core.progress import Progress
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.records import ShardRecord
 
 
 def main() -> None:
@@ -19,6 +17,10 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder of the views")
     parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.dataset.records import ShardRecord
 
     views = LightField.read(arguments.lightfield).views
     names = [f"{view.name}.exr" for view in views[view_slice(arguments.views, len(views))]]

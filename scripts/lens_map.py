@@ -8,8 +8,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core import cli
-from lightfield.reprojection import flags, lens_map
-from lightfield.reprojection.geometry import Geometry
+from lightfield.reprojection import flags
 
 
 def main() -> None:
@@ -21,8 +20,13 @@ def main() -> None:
     flags.add_configuration_flags(parser)
     flags.add_lens_map_flags(parser)
     arguments = parser.parse_args()
-    _, source = flags.read_source(arguments)
-    geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.reprojection import flag_settings, lens_map
+    from lightfield.reprojection.geometry import Geometry
+
+    _, source = flag_settings.read_source(arguments)
+    geometry = Geometry.of(flag_settings.lens_map_settings(arguments, source), source)
     path: Path = arguments.file
     maps = [geometry.compute(target) for target in geometry.targets]
     lens_map.report(maps)

@@ -8,21 +8,28 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightfield.core import machine
 from lightfield.core.cli import refuse_beside_settings, run
 from lightfield.core.errors import UserError
-from lightfield.core.settings import read_settings
-from lightfield.dataset import passes
-from lightfield.dataset.capture import LightfieldSettings, panorama_rig
-from lightfield.dataset.lightfield import MACHINE, LightField
-from lightfield.dataset.loading import scene_datasets
-from lightfield.geometry import rigs
-from lightfield.measurement.sampling import calibrated
 
 
 def main() -> None:
     arguments = parse()
-    settings = settings_from(arguments)
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core import machine
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset import passes
+    from lightfield.dataset.capture import LightfieldSettings, panorama_rig
+    from lightfield.dataset.lightfield import MACHINE, LightField
+    from lightfield.dataset.loading import rig_dataset
+    from lightfield.geometry import rigs
+    from lightfield.measurement.sampling import calibrated
+
+    if arguments.settings:
+        settings = read_settings(LightfieldSettings, arguments.settings)
+    else:
+        dataset = rig_dataset(arguments.scene, arguments.rig)
+        settings = LightfieldSettings.of_capture(dataset, flow=bool(dataset.flow))
     capture = settings.capture
     if arguments.inventory:
         capture = capture.resolved(arguments.inventory)
@@ -66,7 +73,12 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     add_settings_flags(parser)
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+    elif arguments.scene is None:
+        raise UserError("--scene: is missing; or give --settings")
+    return arguments
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
@@ -78,24 +90,6 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
         help="name of a rig in the scene YAML; for a frame of a sequence with /f00001 behind it "
         "(default: the first)",
     )
-
-
-def settings_from(arguments: argparse.Namespace) -> LightfieldSettings:
-    """Return the settings of --settings, or those of the dataset that the flags name.
-
-    Raises `UserError` for a rig that the scene lacks.
-    """
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(LightfieldSettings, arguments.settings)
-    if arguments.scene is None:
-        raise UserError("--scene: is missing; or give --settings")
-    datasets = scene_datasets(arguments.scene)
-    dataset = next((d for d in datasets if arguments.rig in (None, d.rig_folder)), None)
-    if dataset is None:
-        rig_names = ", ".join(d.rig_folder for d in datasets)
-        raise UserError(f"--rig: is {arguments.rig!r}; must be one of {rig_names}")
-    return LightfieldSettings.of_capture(dataset, flow=bool(dataset.flow))
 
 
 if __name__ == "__main__":

@@ -10,10 +10,6 @@ from pathlib import Path
 from lightfield.core.cli import above_zero, refuse_beside_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.core.settings import read_settings
-from lightfield.dataset.config import load_scene
-from lightfield.dataset.job_settings import PackSettings
-from lightfield.report import package
 
 
 def main() -> None:
@@ -29,7 +25,21 @@ def main() -> None:
         raise UserError(f"--output {arguments.output}: must end in .tar; .json lies beside it")
     if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
         raise UserError(f"--output {arguments.output}: must not be in what it packs")
-    settings = settings_from(arguments)
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+    elif arguments.scene is None:
+        raise UserError("--scene: is missing; or give --settings")
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.config import load_scene
+    from lightfield.dataset.job_settings import PackSettings
+    from lightfield.report import package
+
+    if arguments.settings:
+        settings = read_settings(PackSettings, arguments.settings)
+    else:
+        settings = PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
     card = package.card(arguments.folder, arguments.output.stem, settings.scene)
     most = settings.gigabytes and settings.gigabytes * 1e9
     parts = package.listed(package.pack(arguments.folder, card, arguments.output, most))
@@ -44,16 +54,6 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--gigabytes", type=above_zero, help="size of a part, at most (default: one)"
     )
-
-
-def settings_from(arguments: argparse.Namespace) -> PackSettings:
-    """Return the settings of --settings, or those of the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(PackSettings, arguments.settings)
-    if arguments.scene is None:
-        raise UserError("--scene: is missing; or give --settings")
-    return PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ from pathlib import Path
 from lightfield.core.cli import counted, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
-from lightfield.measurement import plan
 
 
 def main() -> None:
@@ -33,6 +32,10 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.measurement import plan
+
     if not arguments.dataset:
         raise UserError("the views of all chosen datasets exist already: nothing is rendered")
     probes = [

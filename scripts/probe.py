@@ -5,8 +5,6 @@ from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import probe
 
 
 def main() -> None:
@@ -23,6 +21,11 @@ def main() -> None:
     parser.add_argument("--device", default="auto", help="device of Cycles (default: auto)")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.rendering import probe
+
     measured = probe.measure(
         LightField.read(arguments.lightfield),
         arguments.views,

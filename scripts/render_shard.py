@@ -4,8 +4,6 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
-from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import shard
 
 
 def main() -> None:
@@ -41,6 +39,11 @@ def main() -> None:
         help="seconds after which a view counts as hung, and the process ends (default: 0, never)",
     )
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.rendering import shard
+
     shard.render(
         LightField.read(arguments.lightfield),
         arguments.views,

@@ -8,9 +8,6 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.settings import read_settings
-from lightfield.dataset.job_settings import FiguresSettings
-from lightfield.report import figures
 
 
 def main() -> None:
@@ -27,6 +24,12 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="folder to write to")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.job_settings import FiguresSettings
+    from lightfield.report import figures
+
     settings = read_settings(FiguresSettings, arguments.settings)
     figures.draw(arguments.dataset, settings.rig, arguments.panorama, arguments.output)
 

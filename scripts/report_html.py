@@ -1,7 +1,7 @@
 """Make a dataset's page: one file that shows what it looks like, how good it is, what it cost.
 
 Everything is in the file, pictures too, so that it can be read without a network, kept and sent.
-What is not there (measurements that were not asked for, depth, costs) is left out, and is no error.
+Missing parts (measurements, depth, costs) are left out without an error.
 A settings file is JSON with these keys: `rig`, as in the scene YAML; `yaml`, that file's text;
 `command`, what makes the dataset again; `panorama`, whether the overview is one; `measurements`, a
 list of {"file": …}, the .csv, .json, .svg and .png that measurements wrote.
@@ -11,10 +11,6 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.settings import read_settings
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.job_settings import PageSettings
-from lightfield.report import dataset_page
 
 
 def main() -> None:
@@ -29,6 +25,13 @@ def main() -> None:
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.inventory import read_inventory
+    from lightfield.dataset.job_settings import PageSettings
+    from lightfield.report import dataset_page
+
     settings = read_settings(PageSettings, arguments.settings)
     origin = dataset_page.Origin(
         rig=settings.rig,

@@ -25,7 +25,7 @@ Examples, with views in garden/exr and garden/lightfield.json:
 import argparse
 
 from lightfield.core import cli
-from lightfield.reprojection import flags, job, pipeline
+from lightfield.reprojection import flags
 
 
 def main() -> None:
@@ -33,12 +33,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    job.add_flags(parser)
+    flags.add_file_flags(parser)
     flags.add_configuration_flags(parser)
     flags.add_reproject_flags(parser)
     arguments = parser.parse_args()
-    lightfield, source = flags.read_source(arguments)
-    settings = flags.reproject_settings(arguments, source)
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.reprojection import flag_settings, job, pipeline
+
+    lightfield, source = flag_settings.read_source(arguments)
+    settings = flag_settings.reproject_settings(arguments, source)
     pipeline.run(job.Job(arguments, settings, lightfield, source))
 
 

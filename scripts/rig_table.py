@@ -10,7 +10,6 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.files import write_csv, write_text
-from lightfield.report import rig_table
 
 
 def main() -> None:
@@ -21,6 +20,10 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path, required=True, help="table to write")
     parser.add_argument("--csv", type=Path, required=True, help="the same figures, unrounded")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.report import rig_table
+
     setups = rig_table.read_setups(arguments.scenes)
     text = rig_table.markdown(setups)
     print(text, end="")

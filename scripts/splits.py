@@ -6,8 +6,6 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits_file import splits_content
 
 
 def main() -> None:
@@ -15,6 +13,10 @@ def main() -> None:
     parser.add_argument("lightfields", type=Path, nargs="+", help="the rigs' lightfield.json files")
     parser.add_argument("--output", type=Path, required=True, help="splits.json to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.dataset.lightfield import LightField
+    from lightfield.dataset.splits_file import splits_content
 
     scene = absolute_path(arguments.output).parent
     lightfields: dict[str, LightField] = {}

@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 from lightfield.core.cli import counted, run
-from lightfield.report import status
 
 
 def main() -> None:
@@ -25,6 +24,10 @@ def main() -> None:
         help="scene/rig, its number of views, and its reprojections, separated by commas",
     )
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.report import status
+
     now = time.time()
     renderings = []
     total = 0

@@ -1,9 +1,9 @@
-"""Measure how well views that were held out are synthesised from a dataset: CSV and a plot.
+"""Measure how well held-out views are synthesised from a dataset: a CSV and a plot.
 
-The truth are other datasets of the scene, whose cameras are between those of the first, or the
-first one's own views to test with. OUTPUT.csv has a row for each variant, view and region of it,
-which are told apart if the truth has all parts of its light as passes; OUTPUT.svg and OUTPUT.png
-have the quality against number and bytes of the views that it is made of.
+The truth is other datasets of the scene, with cameras between those of the dataset. Without them it
+is the test views of the dataset's own split. OUTPUT.csv has a row for each variant, view and
+region. There are regions of each kind of light if the truth has all parts of its light as passes.
+OUTPUT.svg and OUTPUT.png show the quality over the number and the bytes of the views used.
 """
 
 import argparse
@@ -12,15 +12,6 @@ from pathlib import Path
 from lightfield.core.cli import positive, refuse_beside_settings, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
-from lightfield.core.settings import read_settings
-from lightfield.dataset.job_settings import SynthesisSettings
-from lightfield.export.source import SourceDataset
-from lightfield.export.trainer_splits import splits
-from lightfield.imaging import images, pictures
-from lightfield.measurement import summaries, synthesis_quality
-
-# isort: split
-import numpy as np
 
 
 def main() -> None:
@@ -31,8 +22,23 @@ def main() -> None:
     add("--output", type=Path, required=True, metavar="STEM", help="stem of the files to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
 
-    settings = settings_from(arguments)
+    # Only now, so that --help need not wait for these.
+    import numpy as np
+
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.job_settings import SynthesisSettings
+    from lightfield.export.source import SourceDataset
+    from lightfield.export.trainer_splits import splits
+    from lightfield.imaging import images, pictures
+    from lightfield.measurement import summaries, synthesis_quality
+
+    if arguments.settings:
+        settings = read_settings(SynthesisSettings, arguments.settings)
+    else:
+        settings = SynthesisSettings(truth=arguments.truth, views=arguments.views)
     source = SourceDataset(arguments.dataset, "", ".exr")
     truths = [
         SourceDataset(Path(folder), "", ".exr") for folder in settings.truth or [arguments.dataset]
@@ -42,16 +48,20 @@ def main() -> None:
     if not settings.truth:
         views, _, tests = splits(source.lightfield)
         held_out = [tests]
-    held_out = [some[:: -(-len(some) // settings.views)] for some in held_out]
+    held_out = [all_views[:: -(-len(all_views) // settings.views)] for all_views in held_out]
     pairs = list(zip(truths, held_out, strict=True))
-    colours = [images.read_image(t.path(view), "RGB").colour for t, some in pairs for view in some]
+    colours = [
+        images.read_image(truth.path(view), "RGB").colour
+        for truth, true_views in pairs
+        for view in true_views
+    ]
     exposure = pictures.exposure_for(np.concatenate([colour.reshape(-1, 3) for colour in colours]))
     variants = list(synthesis_quality.variants(source, views))
     progress = Progress(len(variants), "synthesis", "variants")
     rows = []
     for variant in variants:
-        for truth, some in pairs:
-            rows += synthesis_quality.compare(variant, views, some, truth, exposure)
+        for truth, true_views in pairs:
+            rows += synthesis_quality.compare(variant, views, true_views, truth, exposure)
         progress.done()
     write_csv(arguments.output.with_name(f"{arguments.output.name}.csv"), rows)
     means = summaries.means(rows)
@@ -68,20 +78,10 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--truth", nargs="+", default=[], help="folders of the held-out datasets")
     flags.add_argument(
-        "--truth", nargs="+", default=[], help="folders of the datasets that were held out"
+        "--views", type=positive, default=12, help="compared views of each truth (default: 12)"
     )
-    flags.add_argument(
-        "--views", type=positive, default=12, help="of each that are compared (default: 12)"
-    )
-
-
-def settings_from(arguments: argparse.Namespace) -> SynthesisSettings:
-    """Return the settings of --settings, or those of the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(SynthesisSettings, arguments.settings)
-    return SynthesisSettings(truth=arguments.truth, views=arguments.views)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
-from lightfield.validation.files import REPORT, SUMS, read_sums
 
 
 def main() -> None:
@@ -27,6 +26,9 @@ def main() -> None:
 
 def take(store: ViewStore, dataset: Path) -> None:
     """Copy all files of a dataset. Raises `UserError` if one is not in the storage."""
+    # Only now, so that --help need not wait for it.
+    from lightfield.validation.files import REPORT, SUMS, read_sums
+
     for name in store.names(f"{dataset}/{REPORT}"):
         store.bring(f"{dataset}/{REPORT}/{name}")
     sums = dataset / SUMS

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
-from lightfield.measurement import advice, threads, trials
+from lightfield.measurement import trial_flags
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    trials.add_arguments(parser, "lightfield.json")
-    trials.add_calibration(parser)
+    trial_flags.add_arguments(parser, "lightfield.json")
+    trial_flags.add_calibration(parser)
     parser.add_argument(
         "--probes", type=positive, default=1, help="windows of each stratum (default: %(default)s)"
     )
@@ -29,6 +29,9 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.measurement import advice, threads, trials
 
     lightfield, maker = trials.read_arguments(arguments)
     name = arguments.output.stem

@@ -21,13 +21,7 @@ from lightfield.core import leftovers
 from lightfield.core.cli import positive, refuse_beside_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.core.settings import read_settings
 from lightfield.dataset import ledger
-from lightfield.dataset.job_settings import ValidationSettings
-from lightfield.dataset.lightfield import NAME
-from lightfield.export import MANIFESTS
-from lightfield.validation.files import REPORT, SUMS, remove_strays, write_sums
-from lightfield.validation.validate import validate
 
 
 def main() -> None:
@@ -52,7 +46,29 @@ def main() -> None:
     if not arguments.dataset.is_dir():
         raise UserError(f"{arguments.dataset}: no such folder")
 
-    settings = settings_from(arguments)
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+    check(arguments)
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Check the dataset. Raises `UserError` if it is not valid and no --output says so."""
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.job_settings import ValidationSettings
+    from lightfield.dataset.lightfield import NAME
+    from lightfield.export import MANIFESTS
+    from lightfield.validation.files import REPORT, SUMS, remove_strays, write_sums
+    from lightfield.validation.validate import validate
+
+    if arguments.settings:
+        settings = read_settings(ValidationSettings, arguments.settings)
+    else:
+        settings = ValidationSettings.of(
+            reprojections=arguments.reprojection,
+            exports=arguments.exports,
+            records=arguments.records,
+        )
     reprojections = [normpath(name) for name in settings.reprojections]
     if arguments.output:
         (arguments.dataset / SUMS).unlink(missing_ok=True)
@@ -103,18 +119,6 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     add("--reprojection", action="extend", nargs="+", default=[], help=folders)
     lists = "export.json or transforms.json of each export that it shall have (default: any)"
     add("--exports", nargs="*", help=lists)
-
-
-def settings_from(arguments: argparse.Namespace) -> ValidationSettings:
-    """Return the settings of --settings, or those of the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(ValidationSettings, arguments.settings)
-    return ValidationSettings.of(
-        reprojections=arguments.reprojection,
-        exports=arguments.exports,
-        records=arguments.records,
-    )
 
 
 def noted_sums(path: Path, dataset: Path) -> dict[str, str]:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.validation.integrity import Integrity
 
 
 def main() -> None:
@@ -22,6 +21,10 @@ def main() -> None:
         help="move damaged files to WORK/removed, so that the next run makes them again",
     )
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.validation.integrity import Integrity
+
     if arguments.mend and not arguments.work:
         raise UserError("--mend: needs --work: a dataset can only be mended where it is built")
 

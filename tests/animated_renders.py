@@ -1,4 +1,4 @@
-"""Make scenes that change from frame 1 to frame 5, and render each whole and pruned at both.
+"""Makes scenes that change from frame 1 to frame 5, and renders each unpruned and pruned at both.
 
 Run by test_frames.py in a process of its own, because bpy has one scene at a time:
 animated_renders.py FOLDER writes FOLDER/results.json. Each file is saved at frame 1.
@@ -22,7 +22,7 @@ RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow
 
 
 def switched(owner, path, first, then, index=-1):
-    """Give a property one value at frame 1, and another one from frame 5 on."""
+    """Give a property one value at frame 1, and another from frame 5 on."""
     changing(owner, path, first, then, index)
     data = owner.id_data.animation_data
     for curve in data.action.layers[0].strips[0].channelbags[0].fcurves:
@@ -31,7 +31,7 @@ def switched(owner, path, first, then, index=-1):
 
 
 def changing(owner, path, first, then, index=-1):
-    """Let a property go from one value at frame 1 to another one at frame 5, and beyond."""
+    """Change a property linearly from one value at frame 1 to another at frame 5."""
     for frame, value in zip(FRAMES, (first, then), strict=True):
         if index < 0:
             setattr(owner, path, value)
@@ -41,7 +41,7 @@ def changing(owner, path, first, then, index=-1):
 
 
 def driven(owner, path, expression, *variables, index=-1):
-    """Drive a property by an expression of variables, each (name, block, path from there)."""
+    """Drive a property by an expression of variables: (name, block, path within the block)."""
     driver = owner.driver_add(path, index).driver
     driver.expression = expression
     for name, block, source in variables:
@@ -57,40 +57,40 @@ def new_cube(name="late", **settings):
 
 
 def empty(name, location=(0, 0, 0)):
-    thing = bpy.data.objects.new(name, None)
-    thing.location = location
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(name, None)
+    obj.location = location
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
-def moved_to_collection(name, *things, exclude=False):
-    """Put objects into a collection of the scene, and nowhere else."""
+def moved_to_collection(name, *objs, exclude=False):
+    """Move objects into a new collection of the scene."""
     scene = bpy.context.scene
     collection = bpy.data.collections.new(name)
     scene.collection.children.link(collection)
-    for thing in things:
-        collection.objects.link(thing)
-        scene.collection.objects.unlink(thing)
+    for obj in objs:
+        collection.objects.link(obj)
+        scene.collection.objects.unlink(obj)
     bpy.context.view_layer.layer_collection.children[name].exclude = exclude
     return collection
 
 
-def only_in_scene(name, thing):
-    """Move an object to another scene of the file, which is returned."""
+def only_in_scene(name, obj):
+    """Move an object to another scene of the file. Return that scene."""
     other = bpy.data.scenes.new(name)
-    other.collection.objects.link(thing)
-    bpy.context.scene.collection.objects.unlink(thing)
+    other.collection.objects.link(obj)
+    bpy.context.scene.collection.objects.unlink(obj)
     return other
 
 
-def with_nodes(thing, make):
-    """Give an object geometry nodes, whose result ``make`` links to the output node."""
+def with_nodes(obj, make):
+    """Give an object geometry nodes. ``make`` returns the socket for the output node."""
     tree = bpy.data.node_groups.new("nodes", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("G", in_out=direction, socket_type="NodeSocketGeometry")
     start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     tree.links.new(make(tree, start.outputs[0]), end.inputs[0])
-    thing.modifiers.new("nodes", "NODES").node_group = tree
+    obj.modifiers.new("nodes", "NODES").node_group = tree
 
 
 def blurred(position="CENTER"):
@@ -98,7 +98,7 @@ def blurred(position="CENTER"):
     render.use_motion_blur, render.motion_blur_position = True, position
 
 
-def thing(name):
+def object_named(name):
     return bpy.data.objects[name]
 
 
@@ -133,8 +133,13 @@ def visibility_driven_by_an_object():
 
 
 def visibility_driven_by_the_viewport():
-    driven(thing("torus"), "hide_render", "hidden", ("hidden", thing("cone"), "hide_viewport"))
-    changing(thing("box"), "location", 0.35, 1, index=2)
+    driven(
+        object_named("torus"),
+        "hide_render",
+        "hidden",
+        ("hidden", object_named("cone"), "hide_viewport"),
+    )
+    changing(object_named("box"), "location", 0.35, 1, index=2)
 
 
 def visibility_in_an_nla_track():
@@ -180,7 +185,7 @@ def keyed_part_of_a_collection_that_nodes_place():
         node.inputs["Collection"].default_value = parts
         return node.outputs[0]
 
-    with_nodes(thing("box"), place)
+    with_nodes(object_named("box"), place)
 
 
 def keyed_switch_of_nodes():
@@ -196,7 +201,7 @@ def keyed_switch_of_nodes():
         switched(node.inputs["Switch"], "default_value", False, True)
         return node.outputs[0]
 
-    with_nodes(thing("cone"), switch)
+    with_nodes(object_named("cone"), switch)
 
 
 def particles_from_a_keyed_emitter():
@@ -227,7 +232,7 @@ def keyed_object_of_a_linked_collection():
     bpy.context.scene.collection.children.link(wanted.collections[0])
 
 
-# What else can be keyed.
+# Other properties with keyframes.
 
 
 def keyed_material():
@@ -242,7 +247,7 @@ def keyed_material():
 def keyed_modifier():
     cutter = new_cube("cutter", location=(2, 0.8, 0.6))
     cutter.hide_render = True
-    modifier = thing("sphere").modifiers.new("cut", "BOOLEAN")
+    modifier = object_named("sphere").modifiers.new("cut", "BOOLEAN")
     modifier.object = cutter
     switched(modifier, "show_render", False, True)
 
@@ -250,7 +255,7 @@ def keyed_modifier():
 def keyed_constraint():
     target = new_cube("target", size=0.1)
     target.hide_render = True
-    constraint = thing("cone").constraints.new("COPY_LOCATION")
+    constraint = object_named("cone").constraints.new("COPY_LOCATION")
     constraint.target = target
     switched(constraint, "influence", 0, 1)
 
@@ -264,14 +269,14 @@ def keyed_bone():
     bpy.ops.object.mode_set(mode="EDIT")
     skeleton.edit_bones.new("bone").tail = (0, 0, 1)
     bpy.ops.object.mode_set(mode="OBJECT")
-    cone = thing("cone")
+    cone = object_named("cone")
     cone.vertex_groups.new(name="bone").add(range(len(cone.data.vertices)), 1, "REPLACE")
     cone.modifiers.new("skin", "ARMATURE").object = rig
     changing(rig.pose.bones["bone"], "location", 0, 1, index=1)
 
 
 def keyed_world():
-    bpy.data.objects.remove(thing("room"))
+    bpy.data.objects.remove(object_named("room"))
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
     tree = world.node_tree
@@ -283,31 +288,31 @@ def keyed_world():
 
 
 def keyed_light():
-    switched(thing("lamp").data, "energy", 300, 100)
+    switched(object_named("lamp").data, "energy", 300, 100)
 
 
 def keyed_samples():
     scene = bpy.context.scene
     switched(scene.cycles, "samples", 1, 9)
-    switched(thing("lamp").data, "energy", 300, 100)
+    switched(object_named("lamp").data, "energy", 300, 100)
 
 
 def keyed_simplification():
     scene = bpy.context.scene
     scene.render.use_simplify = True
-    levels = thing("cone").modifiers.new("levels", "SUBSURF")
+    levels = object_named("cone").modifiers.new("levels", "SUBSURF")
     levels.levels, levels.render_levels = 0, 3
     switched(scene.render, "simplify_subdivision_render", 0, 3)
 
 
 def keyed_number():
-    switched(thing("torus"), "pass_index", 0, 99)
-    switched(thing("lamp").data, "energy", 300, 100)
+    switched(object_named("torus"), "pass_index", 0, 99)
+    switched(object_named("lamp").data, "energy", 300, 100)
 
 
 def keyed_view_layer():
     switched(bpy.context.view_layer, "use", True, False)
-    switched(thing("lamp").data, "energy", 300, 100)
+    switched(object_named("lamp").data, "energy", 300, 100)
 
 
 # Motion blur.
@@ -317,19 +322,19 @@ def blur_across_a_change_of_visibility():
     blurred()
     bpy.context.scene.render.motion_blur_shutter = 2
     keyed_visibility()
-    changing(thing("cone"), "location", 0, 1, index=2)
+    changing(object_named("cone"), "location", 0, 1, index=2)
 
 
 def blur_of_a_light_that_changes():
     blurred("START")
-    changing(thing("lamp").data, "energy", 0, 600)
+    changing(object_named("lamp").data, "energy", 0, 600)
 
 
 def blur_by_a_target_in_another_scene():
     blurred()
     target = new_cube("target", size=0.1)
     only_in_scene("rig", target)
-    thing("cone").constraints.new("COPY_LOCATION").target = target
+    object_named("cone").constraints.new("COPY_LOCATION").target = target
     changing(target, "location", 0, 2, index=2)
 
 
@@ -346,12 +351,12 @@ def blur_by_a_sequence_of_images():
     texture.image = bpy.data.images.load(str(FOLDER / "height_0001.png"))
     texture.image.source = "SEQUENCE"
     texture.image_user.frame_duration, texture.image_user.use_auto_refresh = 8, True
-    thing("cone").modifiers.new("height", "DISPLACE").texture = texture
+    object_named("cone").modifiers.new("height", "DISPLACE").texture = texture
 
 
 def blur_by_velocities():
     blurred()
-    velocities = thing("cone").data.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
+    velocities = object_named("cone").data.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
     for entry in velocities.data:
         entry.vector = (10, 0, 0)
 
@@ -367,10 +372,10 @@ def blur_by_velocities_from_nodes():
         tree.links.new(geometry, node.inputs[0])
         return node.outputs[0]
 
-    with_nodes(thing("cone"), store)
+    with_nodes(object_named("cone"), store)
 
 
-# What scenes and drivers reach.
+# What drivers and background scenes refer to.
 
 
 def background_that_shows_what_the_scene_excludes():
@@ -379,13 +384,13 @@ def background_that_shows_what_the_scene_excludes():
     background.collection.objects.link(cube)
     moved_to_collection("off", cube, exclude=True)
     bpy.context.scene.background_set = background
-    switched(thing("lamp").data, "energy", 300, 100)
+    switched(object_named("lamp").data, "energy", 300, 100)
 
 
 def driver_that_finds_a_hidden_object_by_the_scene():
     new_cube().hide_render = True
     place = ("place", bpy.context.scene, 'objects["late"].location[1]')
-    driven(thing("cone"), "location", "place * frame / 3", place, index=1)
+    driven(object_named("cone"), "location", "place * frame / 3", place, index=1)
 
 
 def driver_that_follows_the_camera():
@@ -393,7 +398,7 @@ def driver_that_follows_the_camera():
     bpy.context.scene.collection.objects.link(camera)
     bpy.context.scene.camera = camera
     place = ("place", bpy.context.scene, "camera.location[0]")
-    driven(thing("cone"), "location", "place * frame", place, index=2)
+    driven(object_named("cone"), "location", "place * frame", place, index=2)
 
 
 def driver_of_what_a_render_has_in_more_detail():
@@ -402,7 +407,7 @@ def driver_of_what_a_render_has_in_more_detail():
     levels.levels, levels.render_levels = 0, 3
     probe = empty("probe", (0.3, 0, 1.4))
     probe.constraints.new("SHRINKWRAP").target = ball
-    driver = thing("cone").driver_add("location", 0).driver
+    driver = object_named("cone").driver_add("location", 0).driver
     driver.expression = "place * frame"
     variable = driver.variables.new()
     variable.name, variable.type = "place", "TRANSFORMS"
@@ -437,18 +442,18 @@ def main():
         bpy.context.scene.frame_set(1)
         blend_file.save_scene(path)
         blend_file.open_scene(path)
-        found = inventory.inventory(FRAMES)
-        whole = [rendered(path, frame=frame) for frame in FRAMES]
-        pruned = [rendered(path, found, frame) for frame in FRAMES]
+        scene_inventory = inventory.inventory(FRAMES)
+        unpruned = [rendered(path, frame=frame) for frame in FRAMES]
+        pruned = [rendered(path, scene_inventory, frame) for frame in FRAMES]
         results[make.__name__] = {
             "same": [
                 bool(np.array_equal(*pair, equal_nan=True))
-                for pair in zip(whole, pruned, strict=True)
+                for pair in zip(unpruned, pruned, strict=True)
             ],
-            "changes": not np.array_equal(*whole, equal_nan=True),
-            "pixels": [sha256(view.tobytes()).hexdigest() for view in whole],
-            "left_out": pruning.left_out(found),
-            "inventory": found,
+            "changes": not np.array_equal(*unpruned, equal_nan=True),
+            "pixels": [sha256(view.tobytes()).hexdigest() for view in unpruned],
+            "left_out": pruning.left_out(scene_inventory),
+            "inventory": scene_inventory,
         }
     (FOLDER / "results.json").write_text(json.dumps(results))
 

@@ -1,4 +1,6 @@
-"""Three .blend files as artists leave them: `artists.py FOLDER` writes them and what they read.
+"""Writes three .blend files as artists leave them, and the files that they read.
+
+Run as `artists.py FOLDER`.
 
 - interior.blend: a room with a chair from a linked library, a poster whose texture is missing, a
   compositor, and the file's own view exposure.
@@ -17,7 +19,7 @@ FOLDER = Path(sys.argv[1]).resolve()
 
 
 def new(samples):
-    """Start a file: return its scene, set up for Cycles."""
+    """Start a new file. Return its scene, set up for Cycles."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -38,11 +40,11 @@ def new(samples):
 
 
 def put(name, data, collection, location=(0, 0, 0), rotation=(0, 0, 0)):
-    """Place data as an object."""
-    thing = bpy.data.objects.new(name, data)
-    thing.location, thing.rotation_euler = location, rotation
-    collection.objects.link(thing)
-    return thing
+    """Place data in the scene as an object."""
+    obj = bpy.data.objects.new(name, data)
+    obj.location, obj.rotation_euler = location, rotation
+    collection.objects.link(obj)
+    return obj
 
 
 def box(name, size, colour=(0.8, 0.8, 0.8, 1), texture=None):
@@ -80,7 +82,7 @@ def camera(name, collection, location, rotation, lens):
 
 
 def image(name, colour):
-    """Save a picture beside the .blend files, and return it as a texture."""
+    """Save a picture beside the .blend files. Return it as a texture."""
     picture = bpy.data.images.new(name, 8, 8)
     picture.pixels = list(colour) * 64
     picture.filepath_raw, picture.file_format = str(FOLDER / f"{name}.png"), "PNG"

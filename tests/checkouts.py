@@ -1,4 +1,4 @@
-"""Copies of the repository, in which a test runs Snakemake on scene YAMLs of its own."""
+"""Makes copies of the repository, in which tests run Snakemake on scene YAMLs of their own."""
 
 import filecmp
 import json
@@ -16,16 +16,16 @@ PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", 
 
 
 def checkout(folder, **scenes):
-    """Copy what Snakemake needs to ``folder``, with ``scenes``' YAML texts in configs/scenes/.
+    """Copy what Snakemake needs to ``folder``. ``scenes`` are YAML texts for configs/scenes/.
 
-    What is compiled goes with it, but not what another process is about to write.
+    Also copies compiled files, but not those that another process is writing.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    on_the_way = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
+    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=on_the_way)
+            shutil.copytree(source, folder / name, ignore=unfinished)
         else:
             shutil.copy(source, folder / name)
     for name, text in scenes.items():
@@ -34,21 +34,21 @@ def checkout(folder, **scenes):
 
 
 def with_consumers(folder):
-    """Put an environment of the consumers into a checkout whose programs are stand-ins."""
+    """Put a stand-in for the consumers' environment into a checkout."""
     environment = folder / ".venv-consumers"
     (environment / "bin").mkdir(parents=True)
     (environment / "bin/python").symlink_to(sys.executable)
     (environment / "complete").touch()
 
 
-def _words(arguments):
+def _command(arguments):
     return [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments]
 
 
 def start_snakemake(folder, *arguments, **options):
-    """Start Snakemake in a checkout, in a session of its own; return the process."""
+    """Start Snakemake in a checkout, in a session of its own. Return the process."""
     return subprocess.Popen(
-        _words(arguments),
+        _command(arguments),
         cwd=folder,
         start_new_session=True,
         **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options,
@@ -56,11 +56,11 @@ def start_snakemake(folder, *arguments, **options):
 
 
 def snakemake(folder, *arguments):
-    """Run Snakemake in a checkout; return its CompletedProcess."""
-    # The logger plugin of tests/ comes after what a test itself has set.
+    """Run Snakemake in a checkout. Return its CompletedProcess."""
+    # The folder of the logger plugin follows the test's own folders.
     folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
     return subprocess.run(
-        _words(arguments),
+        _command(arguments),
         cwd=folder,
         capture_output=True,
         text=True,
@@ -70,7 +70,7 @@ def snakemake(folder, *arguments):
 
 
 def wait_until(condition, process, seconds=600, log=None):
-    """Wait until a condition holds while a process runs, whose ``log`` says why it does not."""
+    """Wait until a condition holds. Fails, with the ``log``, if the process ends before that."""
     end = time.monotonic() + seconds
     while not condition():
         assert process.poll() is None, log.read_text() if log else f"{process.args} has ended"
@@ -88,40 +88,40 @@ def planned(folder, *arguments):
 
 
 def jobs_on(stderr):
-    """Return the jobs that a plan with ``--logger jobs`` has written."""
+    """Return the jobs that Snakemake printed with ``--logger jobs``."""
     jobs = [json.loads(line) for line in stderr.splitlines() if line.startswith("{")]
     for job in jobs:
-        # Whether a page is there is all that `checksums` asks of it.
+        # `checksums` only asks whether a page exists.
         if job["rule"] == "checksums":
             job["input"] = [name for name in job["input"] if not name.endswith(".html")]
     return jobs
 
 
 def published(folder, dataset=""):
-    """Return the files of all datasets, or of one, but for their reports, by relative path."""
+    """Return the files of all datasets, or of one, by relative path. Leaves out reports."""
     results = folder / "results"
     return {
         path.relative_to(results): path
         for path in sorted((results / dataset).rglob("*"))
         if path.is_file()
         and "report" not in path.relative_to(results).parts
-        # The index of all reports.
+        # Leave out the index of all reports.
         and path.parent != results
     }
 
 
-def assert_same_bytes(one, other, dataset=""):
-    first, second = published(one, dataset), published(other, dataset)
+def assert_same_bytes(folder, other_folder, dataset=""):
+    first, second = published(folder, dataset), published(other_folder, dataset)
     assert list(first) == list(second)
     different = [n for n in first if not filecmp.cmp(first[n], second[n], shallow=False)]
     assert not different
 
 
 def rendered(folder):
-    """Return how often each view has been rendered, by journal and name."""
+    """Return how often each view has been rendered, by its journal's folder and its name."""
     counts = Counter()
     for journal in folder.glob("work/**/*.journal.jsonl"):
         lines = [json.loads(line) for line in journal.read_text().splitlines()]
-        # Shards of other sizes have journals of their own for the same views.
+        # Shards of another size have journals of their own for the same views.
         counts.update((journal.parent, line["view"]) for line in lines if "view" in line)
     return counts

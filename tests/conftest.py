@@ -1,4 +1,4 @@
-"""What several tests share: the programs in scripts/, run as a user runs them."""
+"""Fixtures and helpers that several tests share. They run the programs as a user runs them."""
 
 import compileall
 import fcntl
@@ -18,26 +18,26 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
 
 
-# Fixtures that start programs, a browser, Blender or Snakemake, or compute for long.
+# Fixtures that start programs, a browser, Blender or Snakemake, or that compute for long.
 SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
 
 
 def pytest_sessionstart(session):
-    """Compile the programs once, before there are workers: each checkout takes that with it."""
+    """Compile the programs once, before workers start. Each checkout copies the compiled files."""
     if not hasattr(session.config, "workerinput"):
         compileall.compile_dir(SCRIPTS, quiet=2)
 
 
-# Each of these takes more than a minute.
+# Each of these files takes more than a minute.
 LONG = ("slurm", "every_rule", "workflow", "damage", "failures", "storage", "soak", "provenance")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark as slow what uses these fixtures; other tests say it themselves.
+    """Mark tests with these fixtures as slow, and sort the files. Other slow tests mark themselves.
 
-    The longest files come first, then those of few tests, which take long, and those without a
-    slow one last, so that the workers end together.
+    The longest files come first. Then come files with few tests, because these take long. Files
+    without slow tests come last. So all workers end at about the same time.
     """
     tests = {item.path: [] for item in items}
     for item in items:
@@ -53,7 +53,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def run_program():
-    """Run one of the programs in scripts/ (or a path); return its CompletedProcess."""
+    """Run a program of scripts/, or at a path. Return its CompletedProcess."""
 
     def run(name, *arguments, check=True, **options):
         program = name if isinstance(name, Path) else SCRIPTS / name
@@ -73,14 +73,14 @@ def run_program():
 
 
 def mount_disk(folder, options):
-    """Mount a small file system at a folder; return False where that is not allowed."""
-    words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
-    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+    """Mount a small file system at a folder. Return False if that is not allowed."""
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A small file system of its own where that may be mounted, else a plain folder."""
+    """A small file system of its own if one can be mounted, else a plain folder."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mounted = mount_disk(folder, "size=1m")
@@ -91,7 +91,7 @@ def small_disk(tmp_path):
 
 @pytest.fixture
 def nobody():
-    """A folder of its own for a test that has not the rights of root."""
+    """A folder for a test that runs without the rights of root."""
     with tempfile.TemporaryDirectory() as name:
         if os.geteuid():
             yield Path(name)
@@ -111,9 +111,9 @@ def room(tmp_path_factory, run_program):
 
 
 def built_once(build, name, config, tmp_path_factory):
-    """Return a worker's own copy of a folder that ``build(folder)`` makes once for all workers.
+    """Return a worker's own copy of a folder that ``build(folder)`` builds once for all workers.
 
-    The first worker that asks builds it, and the others wait. Where it fails the next one tries.
+    The first worker builds it, and the others wait. If a build fails, the next worker tries.
     """
     is_worker = hasattr(config, "workerinput")
     shared = tmp_path_factory.getbasetemp()
@@ -125,14 +125,14 @@ def built_once(build, name, config, tmp_path_factory):
             folder = tmp_path_factory.mktemp(name) / "built"
             build(folder)
             finished.symlink_to(folder)
-    own = tmp_path_factory.mktemp(name) / "plenoforge"
-    # With its times: what was built stays up to date.
-    shutil.copytree(finished.resolve(), own, symlinks=True)
-    return own
+    copy = tmp_path_factory.mktemp(name) / "plenoforge"
+    # copytree keeps the files' times, so the copy stays up to date.
+    shutil.copytree(finished.resolve(), copy, symlinks=True)
+    return copy
 
 
 def build_smoke(folder):
-    """Build the smoke dataset in a checkout; what numba compiles there the next ones need not."""
+    """Build the smoke dataset in a checkout. Keep what numba compiles, for the next checkouts."""
     checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
@@ -155,18 +155,18 @@ def browser():
     path = shutil.which("chromium")
     if not path:
         pytest.fail("these tests need Chromium: sudo apt-get install chromium")
-    words = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
-    words += ["--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
+    arguments = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
+    arguments += ["--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=words)
+        browser = playwright.chromium.launch(executable_path=path, args=arguments)
         yield browser
         browser.close()
 
 
 @pytest.fixture
 def show(browser):
-    """Open a page; when the test is over, nothing may have gone wrong on any."""
-    seen = SimpleNamespace(errors=[], requests=[])
+    """Open pages. At the end of the test no page may have had an error."""
+    log = SimpleNamespace(errors=[], requests=[])
     contexts = []
 
     def show(path, width=1280, **options):
@@ -174,15 +174,15 @@ def show(browser):
         context = browser.new_context(viewport=size, **options)
         contexts.append(context)
         tab = context.new_page()
-        tab.on("console", lambda message: seen.errors.append(message.text))
-        tab.on("pageerror", lambda error: seen.errors.append(str(error)))
-        tab.on("request", lambda request: seen.requests.append(request.url))
+        tab.on("console", lambda message: log.errors.append(message.text))
+        tab.on("pageerror", lambda error: log.errors.append(str(error)))
+        tab.on("request", lambda request: log.requests.append(request.url))
         tab.goto(path.as_uri())
         return tab
 
     yield show
     for context in contexts:
         context.close()
-    assert not seen.errors
-    assert seen.requests
-    assert all(url.startswith(("file:", "data:")) for url in seen.requests)
+    assert not log.errors
+    assert log.requests
+    assert all(url.startswith(("file:", "data:")) for url in log.requests)

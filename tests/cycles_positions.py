@@ -1,9 +1,9 @@
-"""Program that renders Cycles' Position pass for cameras given as JSON on standard input.
+"""Renders Cycles' Position pass for cameras given as JSON on standard input.
 
 Runs in a process of its own, because bpy keeps one global state. Input: a list of
-{"name", "resolution", "camera": attributes of Blender's camera}; output: an .npz file with, for
-each name, the unit rays in camera coordinates of the points that Cycles hit (NaN without a hit),
-their distance from the camera, the Depth pass, and Blender's own projection matrix.
+{"name", "resolution", "camera": attributes of Blender's camera}. Output: an .npz file. For each
+name it has the unit rays, in camera coordinates, to the points that Cycles hit (NaN without a hit),
+the points' distance from the camera, the Depth pass, and Blender's own projection matrix.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Program that renders the views of a lightfield.json (Z-depth, fisheye) with Cycles.
+"""Renders the views of a lightfield.json (Z-depth, fisheye) with Cycles.
 
 Runs in a process of its own, because bpy keeps one global state. The scene is hard to look through:
 hundreds of thin stalks and leaves, a fence, spheres, and a wall, on a ground under open sky.
@@ -81,7 +81,7 @@ def main(dataset: Path) -> None:
     scene.collection.objects.link(camera)
     scene.camera = camera
 
-    # An equidistant fisheye of 180 degrees: θ grows to 90 degrees at the image's edge.
+    # In an equidistant fisheye of 180 degrees, θ grows to 90 degrees at the image's edge.
     y, x = np.mgrid[:height, :width] + 0.5
     angle = np.hypot(x - width / 2, y - height / 2) / (width / 2) * np.pi / 2
     cosine = np.where(angle <= np.pi / 2, np.cos(angle), np.nan)

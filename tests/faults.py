@@ -1,4 +1,4 @@
-"""One table of faults: each kind of file that a build has, and what can happen to a file.
+"""One table of faults: the kinds of files in a build, and what can happen to a file.
 
 test_damage.py does every fault to every kind of file.
 """
@@ -16,7 +16,7 @@ CUBOID, PLANE, LATTICE = (
 )
 HDR = f"results/{CUBOID}/perspective_hdr"
 
-# By kind of file: one of the build, and another that it may be swapped with.
+# For each kind: a file of the build, and another file that it may be swapped with.
 KINDS = {
     "scene": ("work/smoke/scene.blend", f"results/{LATTICE}/report/noise.png"),
     "inventory": ("work/smoke/inventory.json", f"results/{LATTICE}/report/costs.json"),
@@ -111,7 +111,7 @@ def flip(path, _):
 
 
 def digit(path, _):
-    """Change the first digit of the second half; a file may have none."""
+    """Change the first digit in the second half. Without one, change the middle byte."""
     content = bytearray(path.read_bytes())
     middle = len(content) // 2
     places = [place for place in range(middle, len(content)) if chr(content[place]).isdecimal()]
@@ -124,7 +124,7 @@ def truncate(path, _):
 
 
 def replace(path, _):
-    """Put another file there that is as valid."""
+    """Replace the file with another valid one."""
     pixels = np.full((4, 4), 100, np.uint8)
     match path.suffix:
         case ".exr":
@@ -155,7 +155,7 @@ def unreadable(path, _):
     path.chmod(0)
 
 
-# By fault: how it is done, and whether it also sets the time back.
+# For each fault: its function, and whether it keeps the file's old time.
 FAULTS = {
     "a bit": (flip, False),
     "a bit, at the old time": (flip, True),
@@ -172,7 +172,7 @@ FAULTS = {
 
 
 def spoil(root, kind, fault, number=0):
-    """Do a fault to a kind's file of a number; return the files that are damaged now."""
+    """Apply a fault to file ``number`` of a kind. Return the files that are damaged now."""
     names = KINDS[kind][number:] + KINDS[kind][:number]
     path, sibling = (root / name for name in names)
     apply, sets_time_back = FAULTS[fault]

@@ -1,6 +1,6 @@
-"""Run render_shard.py on a GPU without room: the first argument is what Cycles reports then.
+"""Runs render_shard.py on a simulated GPU without memory. The first argument is Cycles' message.
 
-Cycles' own engine reports so through the call that is made here, and ends the render.
+Cycles' own engine reports an error through the call that is made here, and ends the render.
 """
 
 import runpy
@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 MESSAGE = sys.argv.pop(1)
-# Name, type, number, and what it can.
+# Name, type, identifier, and flags of its features.
 GPU = ("Simulated", "CUDA", "CUDA_0", *[True] * 6)
 
 
@@ -21,7 +21,7 @@ def render(render_engine, depsgraph):
 
 
 assert bpy.app.version
-# bpy brings these two.
+# bpy brings both modules.
 import_module("_cycles").available_devices = lambda kind: [GPU] if kind == "CUDA" else []
 import_module("cycles.engine").render = render
 sys.argv[0] = "render_shard.py"

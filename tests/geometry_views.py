@@ -1,10 +1,10 @@
-"""Program that renders the geometry of scenes of which every surface is known, and of fogs.
+"""Renders the geometry of scenes whose surfaces are known exactly, and of fog.
 
 Runs in a process of its own, because bpy keeps one global state. Arguments: a folder, and a JSON
-file that maps names to [scene, content of a lightfield.json]. Output, FOLDER/views.npz, of each
-case's first view: "<name>.z" as the dataset would hold it, "<name>.normal" in world space,
-"<name>.objects" and "<name>.materials", "<name>.colour" rendered after it, and "<name>.alone", the
-same colour rendered without any geometry before it.
+file that maps names to [scene, content of a lightfield.json]. FOLDER/views.npz holds of each case's
+first view: "<name>.z" as in the dataset, "<name>.normal" in world space, "<name>.objects" and
+"<name>.materials", "<name>.colour" rendered after these, and "<name>.alone", the same colour
+rendered without any geometry before it.
 """
 
 import json
@@ -22,24 +22,24 @@ from lightfield.rendering.geometry_pass import render_geometry
 
 
 def material(name, alpha=1.0):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    shader = made.node_tree.nodes["Principled BSDF"]
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
+    shader = created.node_tree.nodes["Principled BSDF"]
     shader.inputs["Emission Strength"].default_value = 0.5
     shader.inputs["Alpha"].default_value = alpha
-    made.pass_index = 20 + len(bpy.data.materials)
-    return made
+    created.pass_index = 20 + len(bpy.data.materials)
+    return created
 
 
 def volume(name, surface=None, shader="ShaderNodeVolumeScatter"):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    add_volume(made.node_tree, shader)
-    links, nodes = made.node_tree.links, made.node_tree.nodes
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
+    add_volume(created.node_tree, shader)
+    links, nodes = created.node_tree.links, created.node_tree.nodes
     nodes.remove(nodes["Principled BSDF"])
     if surface:
         links.new(nodes.new(surface).outputs[0], nodes["Material Output"].inputs["Surface"])
-    return made
+    return created
 
 
 def add_volume(tree, shader="ShaderNodeVolumeScatter"):
@@ -51,14 +51,14 @@ def add_volume(tree, shader="ShaderNodeVolumeScatter"):
 
 def add(kind, index, surface, **settings):
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
-    thing = bpy.context.object
-    thing.data.materials.append(surface)
-    thing.pass_index = index
-    return thing
+    obj = bpy.context.object
+    obj.data.materials.append(surface)
+    obj.pass_index = index
+    return obj
 
 
-def known():
-    """A floor z = 0, a wall y = 3, and a sphere of radius 1 about (−1, 1.5, 1.25), a true one."""
+def known_surfaces():
+    """Add a floor z = 0, a wall y = 3, and an exact sphere of radius 1 about (−1, 1.5, 1.25)."""
     add("plane", 1, material("floor"), size=20)
     add("plane", 2, material("wall"), size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0))
     points = add("plane", 3, material("sphere"))
@@ -66,21 +66,21 @@ def known():
     by_nodes(points, points.data.materials[0], "GeometryNodePoints", inputs)
 
 
-def by_nodes(thing, surface, kind, inputs=MappingProxyType({})):
-    """Let geometry nodes replace what an object is by what a node of a ``kind`` makes."""
+def by_nodes(obj, surface, kind, inputs=MappingProxyType({})):
+    """Let geometry nodes replace an object by the output of a node of a ``kind``."""
     group = bpy.data.node_groups.new("made", "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    made, painted = group.nodes.new(kind), group.nodes.new("GeometryNodeSetMaterial")
+    maker, painted = group.nodes.new(kind), group.nodes.new("GeometryNodeSetMaterial")
     for name, value in inputs.items():
-        made.inputs[name].default_value = value
+        maker.inputs[name].default_value = value
     painted.inputs["Material"].default_value = surface
-    group.links.new(made.outputs[0], painted.inputs["Geometry"])
+    group.links.new(maker.outputs[0], painted.inputs["Geometry"])
     group.links.new(painted.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
-    thing.modifiers.new("made", "NODES").node_group = group
+    obj.modifiers.new("made", "NODES").node_group = group
 
 
 def curtains():
-    """Before a wall y = 3, at y = 2, squares of opacity 0, 0.3, 0.6 and 1, and one of glass."""
+    """Squares of opacity 0, 0.3, 0.6 and 1, and one of glass, at y = 2 before a wall at y = 3."""
     wall = material("wall")
     add("plane", 1, wall, size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0.3))
     kinds = [material(f"curtain {alpha}", alpha) for alpha in (0.0, 0.3, 0.6, 1.0)]
@@ -92,33 +92,33 @@ def curtains():
 
 
 def mesh_fog():
-    known()
+    known_surfaces()
     add("cube", 9, volume("fog"), size=8)
 
 
 def clear_surface_fog():
-    known()
+    known_surfaces()
     add("cube", 9, volume("fog", "ShaderNodeBsdfTransparent"), size=8)
 
 
 def volume_object():
-    known()
+    known_surfaces()
     shape = add("cube", 9, material("shape"), size=8)
     shape.hide_render = True
     cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
     bpy.context.scene.collection.objects.link(cloud)
     modifier = cloud.modifiers.new("from mesh", "MESH_TO_VOLUME")
     modifier.object, modifier.interior_band_width, modifier.voxel_amount = shape, 10, 8
-    # A volume object is where a grid is that its material asks for.
+    # A volume object shows where its material reads a grid.
     cloud.data.materials.append(volume("cloud", shader="ShaderNodeVolumePrincipled"))
-    # Its colour need not be right, but be there soon.
+    # Its colour need not be exact. Render it quickly.
     bpy.context.scene.cycles.volume_biased = True
     bpy.context.scene.cycles.volume_step_rate = 20
 
 
 def nodes_fog():
-    """What geometry nodes make of a cube that no viewport shows: a mesh of fog, and a grid."""
-    known()
+    """Let geometry nodes make fog of cubes that no viewport shows: from a mesh, and from a grid."""
+    known_surfaces()
     for kind in ("GeometryNodeMeshCube", "GeometryNodeVolumeCube"):
         host = add("cube", 9, material("replaced"))
         host.hide_viewport = True
@@ -126,7 +126,7 @@ def nodes_fog():
 
 
 def world_fog():
-    known()
+    known_surfaces()
     world = bpy.data.worlds.new("world")
     world.use_nodes = True
     add_volume(world.node_tree)
@@ -134,8 +134,8 @@ def world_fog():
 
 
 def moving():
-    """The wall comes nearer while the shutter is open; at frame 2 it is at y = 3."""
-    known()
+    """The wall comes nearer while the shutter is open. At frame 2 it is at y = 3."""
+    known_surfaces()
     wall = bpy.data.objects["Plane.001"]
     for frame in (1, 2, 3):
         wall.location.y = 5 - frame
@@ -144,8 +144,8 @@ def moving():
 
 
 def unfocused():
-    """The artist's camera has a wide aperture, and focuses on what is near."""
-    known()
+    """The artist's camera has a wide aperture, and focuses on something near."""
+    known_surfaces()
     camera = bpy.data.cameras.new("wide open")
     camera.dof.use_dof = True
     camera.dof.aperture_fstop = 0.1
@@ -166,7 +166,7 @@ def main(folder: Path, cases: Path) -> None:
         pose = lightfield.views[0].matrix
         cycles.set_up(path, None, lightfield, "cpu", 1)
         results[f"{name}.alone"] = render_colour(pose, 1).pixels
-        # The first of a new session sees what the second finds as the colour has left it.
+        # The first geometry follows a new session, the second a colour render. Both must be equal.
         cycles.set_up(path, None, lightfield, "cpu", 1)
         for _ in range(2):
             geometry = render_geometry(pose)

@@ -1,4 +1,4 @@
-"""Make scenes with light and without, and render a panorama of each.
+"""Makes scenes with and without light, and renders a panorama of each.
 
 Run by test_light.py in a process of its own, because bpy has one scene at a time:
 light_renders.py FOLDER writes a .blend of each scene, saved at frame 1, and FOLDER/results.json.
@@ -24,23 +24,23 @@ RENDER = {"samples": 16, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 def lamp(energy=100.0, colour=(1, 1, 1)):
     data = bpy.data.lights.new("lamp", "POINT")
     data.energy, data.color = energy, colour
-    thing = bpy.data.objects.new("lamp", data)
-    thing.location = (0, 0, 2)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new("lamp", data)
+    obj.location = (0, 0, 2)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
 def world(colour=(0.2, 0.3, 0.5, 1), strength=1.0):
-    made = bpy.data.worlds.new("sky")
-    bpy.context.scene.world = made
-    background = made.node_tree.nodes["Background"]
+    sky = bpy.data.worlds.new("sky")
+    bpy.context.scene.world = sky
+    background = sky.node_tree.nodes["Background"]
     background.inputs["Color"].default_value = colour
     background.inputs["Strength"].default_value = strength
-    return made
+    return sky
 
 
 def painted(kind, output="Surface", **inputs):
-    """Paint the cube with one shader node, and return its node tree and the node."""
+    """Paint the cube with one shader node. Return its node tree and the node."""
     material = bpy.data.materials.new("paint")
     tree = material.node_tree
     tree.nodes.remove(tree.nodes["Principled BSDF"])
@@ -81,11 +81,11 @@ def hidden_lamp():
 
 
 def lamp_in_an_excluded_collection():
-    thing = lamp()
+    obj = lamp()
     collection = bpy.data.collections.new("off")
     bpy.context.scene.collection.children.link(collection)
-    collection.objects.link(thing)
-    bpy.context.scene.collection.objects.unlink(thing)
+    collection.objects.link(obj)
+    bpy.context.scene.collection.objects.unlink(obj)
     bpy.context.view_layer.layer_collection.children["off"].exclude = True
 
 
@@ -119,10 +119,10 @@ def lamp_that_keyframes_turn_on():
 
 
 def lamp_that_keyframes_show():
-    thing = lamp()
+    obj = lamp()
     for frame, hidden in ((1, True), (FRAME, False)):
-        thing.hide_render = hidden
-        thing.keyframe_insert("hide_render", frame=frame)
+        obj.hide_render = hidden
+        obj.keyframe_insert("hide_render", frame=frame)
 
 
 def blue_world():
@@ -199,7 +199,7 @@ def emission_that_keyframes_turn_on():
 
 
 def emission_that_a_modifier_gives():
-    """Let geometry nodes take the cube's material from an input of their modifier."""
+    """Let a geometry nodes modifier set the cube's material from its input."""
     painted("ShaderNodeEmission")
     cube = bpy.data.objects["cube"]
     cube.data.materials.clear()
@@ -216,7 +216,7 @@ def emission_that_a_modifier_gives():
     tree.links.new(give.outputs[0], last.inputs[0])
     modifier = cube.modifiers.new("paints", "NODES")
     modifier.node_group = tree
-    # Blender 5.2 has the inputs in a place of their own.
+    # Blender 5.2 keeps the inputs of modifiers elsewhere.
     inputs = getattr(modifier, "properties", None)
     if inputs:
         getattr(inputs.inputs, paint.identifier).value = bpy.data.materials["paint"]
@@ -230,13 +230,13 @@ def lamp_of_a_light_group():
 
 
 def lamp_of_a_library():
-    """Link the only lamp from another .blend, within an instance of a collection."""
+    """Link the only lamp from another .blend, as an instance of a collection."""
     library = FOLDER / "library.blend"
     collection = bpy.data.collections.new("lamps")
-    thing = lamp()
-    collection.objects.link(thing)
+    obj = lamp()
+    collection.objects.link(obj)
     bpy.data.libraries.write(str(library), {collection})
-    for block in (thing, thing.data, collection):
+    for block in (obj, obj.data, collection):
         bpy.data.batch_remove([block])
     with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
         wanted.collections = ["lamps"]

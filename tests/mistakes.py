@@ -1,6 +1,6 @@
-"""One table of mistakes that a user can make: in which file, under which key, and what is right.
+"""One table of mistakes that users make: in which file, under which key, and what is allowed.
 
-test_mistakes.py reads each file with its mistake. A mistake that is not refused yet is a row here.
+test_mistakes.py reads each file with its mistake. To report an unrefused mistake, add a row.
 """
 
 import copy
@@ -35,7 +35,7 @@ RIGHT = {
     "exports": {"instant_ngp": {"sources": ["perspective"]}},
 }
 
-# In place of a value: the key is left out. Its text is the same in each process of the tests.
+# Instead of a value: removes the key. Its text is the same in all processes of the tests.
 REMOVE = ...
 
 
@@ -54,9 +54,9 @@ def changed(path, value):
 
 
 class Mistake(NamedTuple):
-    """A value under a key of a file, or a whole text; and how the message goes on after the file.
+    """A wrong value under a key of a file, or a wrong text for the file, and its message.
 
-    ``said`` is how it begins, with the key; ``allowed`` is what it holds beside that.
+    The message goes on after the file's name with ``said``. It contains ``allowed``.
     """
 
     file: str
@@ -146,8 +146,8 @@ PERSPECTIVE = RIGHT["reprojections"]["perspective"]
 NOT_A_NUMBER = [float("nan"), float("inf"), -float("inf"), 1e31, -1e31, "1e31", True, None, [], {}]
 NOT_A_NAME = ["a\n", LONG, "..", ".hidden", "-rf", "a b", "a/b", "a;b", "$(id)", "ä", "", "a\0"]
 
-# Settings of a scene YAML: the key, its value, and the key that the message begins with, where that
-# is another one.
+# Wrong settings of a scene YAML: the key, the value, and the key that the message begins with if
+# that is another key.
 REFUSED = [
     *(("render.samples", value) for value in [*NOT_A_NUMBER[:-3], HUGE, -1, 0.5, b"1"]),
     *(("render.seed", value) for value in (HUGE, -1, 1.5, datetime.date(2024, 1, 1))),
@@ -367,7 +367,7 @@ REFUSED = [
     ("scene.scene_name", "a"),
 ]
 
-# Mistakes of a scene YAML, with what the message says beside its file.
+# Wrong settings of a scene YAML, and the message after the file's name.
 EXPLAINED = [
     ("render.samples", REMOVE, "render: is missing the key samples"),
     ("exports.nerfstudio", None, "exports.nerfstudio: is null; must have a value, or be left out"),
@@ -473,7 +473,7 @@ EXPLAINED = [
     ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be a number at least 0"),
     ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
     ("rigs", {}, "rigs: is {}; must have at least 1 item"),
-    ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
+    ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is not a name"),
     (
         "reprojections.perspective.camera",
         {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},
@@ -507,7 +507,7 @@ EXPLAINED = [
     ),
 ]
 
-# Settings of config.yaml; the message begins with the first key.
+# Wrong settings of config.yaml. The message begins with the first key.
 SETTINGS = [
     *({"results": value} for value in ("a b", "a;b", "a\n", "$(id)", "a'b", 'a"b', "{a}", "-a")),
     *({"results": value} for value in ("", "a|b", "a>b", "a&b", "a`b", "~", "*", LONG * 10, 7)),
@@ -624,7 +624,7 @@ POSES_TEXTS = {
 }
 
 FULL_SIZE = {"views": 6, "resolution": [64, 64], "samples": "file"}
-# Settings files of programs: the file, its content, and the message.
+# Wrong settings files of programs: the file, its content, and the message.
 CAMERA_OF_90 = {"lens": "rectilinear", "fov": 90, "resolution": [24, 16]}
 PROGRAMS = [
     *(
@@ -669,7 +669,7 @@ PROGRAMS = [
     ),
 ]
 
-# Config.yaml's mistakes that name more than the key.
+# Wrong settings of config.yaml whose message names more than the key.
 CHOICES = [
     ({"preset": "best"}, "preset: is 'best'; must be one of full"),
     ({"scenes": ["gardn"]}, "scenes: there is no scene 'gardn'; is garden meant?"),

@@ -1,11 +1,11 @@
-"""Program that renders a scene with a bit of everything, through several lenses, with all passes.
+"""Renders a scene with a bit of everything, through several lenses, with all passes.
 
-Runs in a process of its own, because bpy keeps one global state. Argument: a folder. Output in it,
-for each lens: a dataset <lens>/, its record <lens>.json and journal <lens>.jsonl, and in
-objects.npz as <lens> the name of the object that Blender's own ray casts find behind each pixel of
-its first view. "plain" is the first of the lenses without passes, "denoised" the same with some,
-"transparent" the fisheye, and matte.exr what Blender's compositor reads in the perspective's
-Cryptomatte of the wall.
+Runs in a process of its own, because bpy keeps one global state. The argument is a folder. For each
+lens it writes there a dataset <lens>/, its record <lens>.json and its journal <lens>.jsonl. In
+objects.npz, <lens> holds the name of the object that Blender's own ray casts hit behind each pixel
+of the first view. "plain" is the perspective without passes, "denoised" the same with some
+passes, "transparent" the fisheye. matte.exr is the wall's matte, which Blender's compositor reads
+from the perspective's Cryptomatte.
 """
 
 import json
@@ -21,7 +21,7 @@ from lightfield.dataset.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, shard
 
-# Where the wall is at the frames 1, 2 and 3, of which 2 is rendered.
+# The wall's places at the frames 1, 2 and 3. Frame 2 is rendered.
 WALL = [(-0.1, 2.8, 0), (0, 3, 0), (0.25, 3.1, 0.05)]
 SIZE = 32
 LENSES = {
@@ -48,19 +48,21 @@ def lightfield(camera, pair=None, **render):
 
 
 def material(name, **inputs):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
     for key, value in inputs.items():
-        made.node_tree.nodes["Principled BSDF"].inputs[key.replace("_", " ")].default_value = value
-    return made
+        created.node_tree.nodes["Principled BSDF"].inputs[
+            key.replace("_", " ")
+        ].default_value = value
+    return created
 
 
 def add(name, kind, surface, **settings):
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
-    thing = bpy.context.object
-    thing.name = name
-    thing.data.materials.append(surface)
-    return thing
+    obj = bpy.context.object
+    obj.name = name
+    obj.data.materials.append(surface)
+    return obj
 
 
 def build():
@@ -98,7 +100,7 @@ def build():
 def cast(content, number=0, aside=0.0):
     """Return the name of the object behind each pixel (h, w) of a view.
 
-    Rays start ``aside`` of the camera, to the right as they look along the horizon.
+    Rays start ``aside`` metres beside the camera, to the right of their own direction.
     """
     view, scene = content.views[number], bpy.context.scene
     rays = content.lens.pixel_rays()
@@ -111,26 +113,26 @@ def cast(content, number=0, aside=0.0):
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
         origin, direction, name = Vector(starts[pixel]), Vector(rays[pixel]), "fog"
         while name == "fog":
-            hit, origin, _, _, thing, _ = scene.ray_cast(depsgraph, origin, direction)
+            hit, origin, _, _, obj, _ = scene.ray_cast(depsgraph, origin, direction)
             origin = origin + 1e-4 * direction
-            name = thing.name if hit else ""
+            name = obj.name if hit else ""
         names[pixel] = name
     return names
 
 
 def build_instances():
-    """Balls that collections and geometry nodes repeat, each behind a card that is cut away."""
+    """Add balls that collections and geometry nodes repeat, each behind a transparent card."""
     paint = material("paint")
     invisible = material("invisible", Alpha=0.0)
     ball = add("ball", "uv_sphere", paint, radius=0.3, location=(0, 3, 0.6))
-    # Cycles' own surface is of no material.
+    # This surface has no material.
     bare = add("bare", "uv_sphere", paint, radius=0.3, location=(-1, 3, 1.6))
     bare.data.materials.clear()
     card = add("card", "plane", invisible, size=1.2, location=(0, 2, 0.6), rotation=(1.5, 0, 0))
     group = bpy.data.collections.new("group")
-    for thing in (ball, card):
-        group.objects.link(thing)
-        bpy.context.scene.collection.objects.unlink(thing)
+    for obj in (ball, card):
+        group.objects.link(obj)
+        bpy.context.scene.collection.objects.unlink(obj)
     for number, place in enumerate([(-1.2, 0, 0), (0, 0.5, 0.2), (1.2, 0, 0)]):
         empty = bpy.data.objects.new(f"place {number}", None)
         empty.instance_type, empty.instance_collection = "COLLECTION", group
@@ -140,12 +142,15 @@ def build_instances():
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     line = tree.nodes.new("GeometryNodeMeshLine")
     line.inputs["Count"].default_value, line.inputs["Offset"].default_value = 3, (0.7, 0, 0)
-    what = tree.nodes.new("GeometryNodeObjectInfo")
-    what.inputs["Object"].default_value, what.inputs["As Instance"].default_value = ball, True
-    there = tree.nodes.new("GeometryNodeInstanceOnPoints")
-    tree.links.new(line.outputs[0], there.inputs["Points"])
-    tree.links.new(what.outputs["Geometry"], there.inputs["Instance"])
-    tree.links.new(there.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    object_info = tree.nodes.new("GeometryNodeObjectInfo")
+    object_info.inputs["Object"].default_value, object_info.inputs["As Instance"].default_value = (
+        ball,
+        True,
+    )
+    instances = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(line.outputs[0], instances.inputs["Points"])
+    tree.links.new(object_info.outputs["Geometry"], instances.inputs["Instance"])
+    tree.links.new(instances.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
     row = bpy.data.objects.new("row", bpy.data.meshes.new("row"))
     row.location = (-0.5, 3.5, 1.8)
     row.modifiers.new("row", "NODES").node_group = tree
@@ -159,7 +164,10 @@ def build_instances():
 
 
 def cast_instances(content):
-    """Return the name of the instance behind each pixel (h, w) of the first view, by its place."""
+    """Return the name of the instance behind each pixel (h, w) of the first view.
+
+    Instances are told apart by their places.
+    """
     view, depsgraph = content.views[0], bpy.context.evaluated_depsgraph_get()
     names = {}
     for entry in depsgraph.object_instances:
@@ -169,24 +177,24 @@ def cast_instances(content):
             name = f"{entry.parent.name} > {name} {places}"
         names[entry.object.name, tuple(np.round(entry.matrix_world.translation, 3).tolist())] = name
     rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
-    found = np.full(rays.shape[:2], "", dtype="U24")
+    names_of_pixels = np.full(rays.shape[:2], "", dtype="U24")
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
-        origin, direction, thing = Vector(view.position), Vector(rays[pixel]), None
-        while thing is None or thing.name == "card":
-            hit, origin, _, _, thing, matrix = bpy.context.scene.ray_cast(
+        origin, direction, obj = Vector(view.position), Vector(rays[pixel]), None
+        while obj is None or obj.name == "card":
+            hit, origin, _, _, obj, matrix = bpy.context.scene.ray_cast(
                 depsgraph, origin, direction
             )
             if not hit:
-                found[pixel] = ""
+                names_of_pixels[pixel] = ""
                 break
             origin = origin + 1e-4 * direction
             place = tuple(np.round(matrix.translation, 3).tolist())
-            found[pixel] = names[thing.name, place]
-    return found
+            names_of_pixels[pixel] = names[obj.name, place]
+    return names_of_pixels
 
 
 def read_matte(path, name, target):
-    """Let Blender's own Cryptomatte node read a file, and write the matte of an object."""
+    """Read a file with Blender's own Cryptomatte node, and write the matte of an object."""
     blend_file.new_scene()
     scene = bpy.context.scene
     scene.render.engine, scene.cycles.samples = "CYCLES", 1
@@ -240,13 +248,15 @@ def main(folder: Path) -> None:
     bare = lightfield("perspective")
     settings = {key: value for key, value in RENDER.items() if key != "passes"}
     render("plain", bare.changed(render=settings), "0:1")
-    # A view without one of its files, and the names, are made once more.
+    # Rendering again must replace a missing file of a view, and a missing list of names.
     files = ["normal/view_0001f.exr", "object/names.json"]
-    made = {file: (folder / "perspective" / file).read_bytes() for file in files}
+    first_bytes = {file: (folder / "perspective" / file).read_bytes() for file in files}
     for file in files:
         (folder / "perspective" / file).unlink()
     render("perspective", lightfield("perspective"))
-    same = {file: (folder / "perspective" / file).read_bytes() == made[file] for file in files}
+    same = {
+        file: (folder / "perspective" / file).read_bytes() == first_bytes[file] for file in files
+    }
     (folder / "again.json").write_text(json.dumps(same))
     blend_file.new_scene()
     build_instances()

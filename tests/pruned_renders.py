@@ -1,4 +1,4 @@
-"""Make scenes with and without what pruning decides by, and render each whole and pruned.
+"""Makes scenes with and without features that matter to pruning, and renders each both ways.
 
 Run by test_inventory.py in a process of its own, because bpy has one scene at a time:
 pruned_renders.py FOLDER writes FOLDER/results.json.
@@ -42,10 +42,10 @@ def shader(name, material_name="Principled BSDF"):
     return bpy.data.materials[name].node_tree.nodes[material_name]
 
 
-def meet_only(thing, *kinds):
-    """Let an object be met by these kinds of rays alone."""
+def meet_only(obj, *kinds):
+    """Make an object visible to these kinds of rays only."""
     for kind in RAYS:
-        setattr(thing, f"visible_{kind}", kind in kinds)
+        setattr(obj, f"visible_{kind}", kind in kinds)
 
 
 def plain():
@@ -53,7 +53,7 @@ def plain():
 
 
 def left_behind():
-    """What artists leave in a file: hidden objects, motion blur, passes, materials of no object."""
+    """Leftovers of artists: hidden objects, motion blur, passes, materials of no object."""
     scene = bpy.context.scene
     scene.render.use_motion_blur = True
     layer = scene.view_layers[0]
@@ -65,21 +65,21 @@ def left_behind():
     for name, hide in (("excluded", False), ("off", True)):
         collection = bpy.data.collections.new(name)
         scene.collection.children.link(collection)
-        thing = add("cube", location=(1, 2, 1))
-        thing.name = f"in {name}"
-        collection.objects.link(thing)
-        scene.collection.objects.unlink(thing)
+        obj = add("cube", location=(1, 2, 1))
+        obj.name = f"in {name}"
+        collection.objects.link(obj)
+        scene.collection.objects.unlink(obj)
         collection.hide_render = hide
     layer.layer_collection.children["excluded"].exclude = True
     unseen = add("cube", location=(0, -2, 1), size=0.5)
     unseen.name = "unseen"
     meet_only(unseen)
-    # Of these the picture shows a shadow, or a reflection, or light that they throw back.
+    # Only the shadow, the reflection or the scattered light of these shows in the picture.
     for number, kind in enumerate(RAYS):
-        thing = add("cube", location=(number - 2, -1, 1), size=0.3)
-        thing.name = f"only {kind}"
-        meet_only(thing, kind)
-    # These are hidden and needed all the same.
+        obj = add("cube", location=(number - 2, -1, 1), size=0.3)
+        obj.name = f"only {kind}"
+        meet_only(obj, kind)
+    # These are hidden, but needed all the same.
     cutter = add("cube", size=0.8, location=(2, 0.8, 0.6))
     cutter.name = "cutter"
     cutter.hide_render = True
@@ -87,10 +87,10 @@ def left_behind():
     modifier.object = cutter
     instanced = bpy.data.collections.new("instanced")
     scene.collection.children.link(instanced)
-    thing = add("cube", size=0.3, location=(0, 1, 0))
-    thing.name = "instanced"
-    instanced.objects.link(thing)
-    scene.collection.objects.unlink(thing)
+    obj = add("cube", size=0.3, location=(0, 1, 0))
+    obj.name = "instanced"
+    instanced.objects.link(obj)
+    scene.collection.objects.unlink(obj)
     layer.layer_collection.children["instanced"].exclude = True
     empty = bpy.data.objects.new("instancer", None)
     empty.instance_type, empty.instance_collection = "COLLECTION", instanced
@@ -99,7 +99,7 @@ def left_behind():
 
 
 def animated():
-    """An object, a material and a shape that change with time, and one that a driver moves."""
+    """An object, a material and a shape change with time. A driver moves another object."""
     keyed(bpy.data.objects["cone"], "location", (0.0, 1.5), 2)
     keyed(shader("sphere").inputs["Roughness"], "default_value", (0.1, 0.9))
     box = bpy.data.objects["box"]
@@ -110,7 +110,7 @@ def animated():
     keyed(key, "value", (0.0, 1.0))
     driver = bpy.data.objects["pillar"].driver_add("location", 0).driver
     driver.expression = "-2 + frame / 10"
-    # Rendered, though the artist has hidden it in the viewport.
+    # This is rendered, although the artist has hidden it in the viewport.
     torus = bpy.data.objects["torus"]
     keyed(torus, "location", (1.0, 2.5), 2)
     torus.hide_viewport = True
@@ -145,15 +145,15 @@ def features():
     walls.links.new(mix.outputs[0], walls.nodes["Material Output"].inputs["Surface"])
 
 
-def rendered(path, found=None, frame=FRAME):
-    """Return the colours and depths of views of a scene, pruned if its inventory is given."""
+def rendered(path, scene_inventory=None, frame=FRAME):
+    """Return colours and depths of a scene's views. Prunes the scene if its inventory is given."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.4, "center": [0.2, 0.1, 1.4]}
     lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=RENDER)
-    if found:
-        found = found | {"left_out": pruning.left_out(found)}
-    cycles.set_up(path, found, lightfield, "cpu", 1)
-    # The last view shows what those before it may have changed.
+    if scene_inventory:
+        scene_inventory = scene_inventory | {"left_out": pruning.left_out(scene_inventory)}
+    cycles.set_up(path, scene_inventory, lightfield, "cpu", 1)
+    # The last view repeats the first pose, and so shows changes that earlier views left behind.
     first, second = (view.matrix for view in lightfield.views)
     poses = ((first, 1), (second, 1), (first, 2))
     views = [(render_colour(pose, seed), render_geometry(pose)) for pose, seed in poses]
@@ -170,12 +170,12 @@ def main():
         make()
         blend_file.save_scene(path)
         blend_file.open_scene(path)
-        found = inventory.inventory([FRAME])
-        whole, pruned = rendered(path), rendered(path, found)
+        scene_inventory = inventory.inventory([FRAME])
+        unpruned, pruned = rendered(path), rendered(path, scene_inventory)
         results[make.__name__] = {
-            "inventory": found,
-            "left_out": pruning.left_out(found),
-            "same": bool(np.array_equal(whole, pruned, equal_nan=True)),
+            "inventory": scene_inventory,
+            "left_out": pruning.left_out(scene_inventory),
+            "same": bool(np.array_equal(unpruned, pruned, equal_nan=True)),
             "objects": len(bpy.data.objects),
             "materials": [material.name for material in bpy.data.materials],
             "animated": [owner.name for owner, _ in animation.animated()],

@@ -1,9 +1,9 @@
-"""Program that renders one smooth room from one place through several lenses with Cycles.
+"""Renders one smooth room from one place through several lenses with Cycles.
 
 Runs in a process of its own, because bpy keeps one global state. Input: JSON on standard input, a
 list of {"name", "resolution", "camera": attributes of Blender's camera, "rotation": (3, 3) of the
-camera in the world, "seed", "samples"}. Output: an .npz file with the colour ("<name>.color"), the
-mean over each pixel, and the distance pass at the pixels' centres ("<name>.depth").
+camera in the world, "seed", "samples"}. Output: an .npz file with the mean colour over each pixel
+("<name>.color"), and the distance pass at the pixels' centres ("<name>.depth").
 """
 
 import json
@@ -21,7 +21,7 @@ HALF_SIZE = 10
 
 
 def build() -> None:
-    """Fill the scene with a cube whose walls glow in slow waves: no light path has any noise."""
+    """Fill the scene with a cube whose walls glow in slow waves, so that renders have no noise."""
     bpy.ops.mesh.primitive_cube_add(size=2 * HALF_SIZE)
     material = bpy.data.materials.new("waves")
     material.use_nodes = True

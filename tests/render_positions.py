@@ -1,9 +1,9 @@
-"""Program that renders views exactly as the workflow does, and Cycles' Position pass beside them.
+"""Renders views exactly as the workflow does, and also Cycles' Position pass.
 
 Runs in a process of its own, because bpy keeps one global state. Arguments: a .blend, an .npz to
-write, and a JSON file that maps names to the content of a lightfield.json; of each, the first
-frame is rendered. Output, for each name: the depth channel as the dataset would hold it, and the
-points that Cycles hit, in world coordinates (NaN without a hit).
+write, and a JSON file that maps names to the content of a lightfield.json. The first frame of each
+is rendered. Output, for each name: the depth channel as in the dataset, and the points that
+Cycles hit, in world coordinates (NaN without a hit).
 """
 
 import json

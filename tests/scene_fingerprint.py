@@ -1,6 +1,6 @@
-"""The SHA-256 of all that a builder makes, and if asked of a small render of it.
+"""Prints the SHA-256 of everything that a builder makes, and on request that of a small render.
 
-`python scene_fingerprint.py BUILDER SEED [pixels]` prints them.
+Run as `python scene_fingerprint.py BUILDER SEED [pixels]`.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def fingerprint(builder, seed, hash_seed, pixels=False):
-    """Build in a process whose sets and dictionaries are hashed by ``hash_seed``."""
+    """Build in a new process, which hashes sets and dictionaries with ``hash_seed``."""
     result = subprocess.run(
         [sys.executable, __file__, builder, str(seed), *(["pixels"] if pixels else [])],
         capture_output=True,
@@ -52,26 +52,26 @@ def main():
     import numpy as np
 
     def values(collection, name, size, kind):
-        found = np.empty(size * len(collection), kind)
-        collection.foreach_get(name, found)
-        return found.tobytes()
+        array = np.empty(size * len(collection), kind)
+        collection.foreach_get(name, array)
+        return array.tobytes()
 
     builder, seed, *pixels = sys.argv[1:]
     bpy.ops.wm.read_factory_settings(use_empty=True)
     importlib.import_module(f"scenes.{builder}").build({"seed": int(seed), "detail": 0.05})
     digest = hashlib.sha256()
-    for thing in sorted(bpy.data.objects, key=lambda each: each.name):
-        digest.update(thing.name.encode() + np.array(thing.matrix_world).tobytes())
-        if thing.type == "MESH":
-            digest.update(values(thing.data.vertices, "co", 3, np.float32))
-            digest.update(values(thing.data.loops, "vertex_index", 1, np.int32))
-            digest.update(values(thing.data.polygons, "material_index", 1, np.int32))
-        elif thing.type == "CURVES":
-            digest.update(values(thing.data.points, "position", 3, np.float32))
-    found = [digest.hexdigest()]
+    for obj in sorted(bpy.data.objects, key=lambda each: each.name):
+        digest.update(obj.name.encode() + np.array(obj.matrix_world).tobytes())
+        if obj.type == "MESH":
+            digest.update(values(obj.data.vertices, "co", 3, np.float32))
+            digest.update(values(obj.data.loops, "vertex_index", 1, np.int32))
+            digest.update(values(obj.data.polygons, "material_index", 1, np.int32))
+        elif obj.type == "CURVES":
+            digest.update(values(obj.data.points, "position", 3, np.float32))
+    digests = [digest.hexdigest()]
     if pixels:
-        found.append(hashlib.sha256(rendered()).hexdigest())
-    print("fingerprint", *found)
+        digests.append(hashlib.sha256(rendered()).hexdigest())
+    print("fingerprint", *digests)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""A build of the smoke scene without a rendered pixel: every file is there, and all are consistent.
+"""Makes a consistent build of the smoke scene without rendering: every file is there.
 
-Snakemake has nothing to do in it, and what a test spoils in it must be planned again.
+Snakemake has nothing to do in it. If a test damages a file, Snakemake must plan it again.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def build(folder: Path) -> list[Dataset]:
 
 
 def note(names: Iterable[str]) -> None:
-    """Write into the ledger that a job of its own made each of these files."""
+    """Write into the ledger that a separate job made each of these files."""
     jobs = ledger.Ledger(Path("work", ledger.NAME))
     for name in names:
         stamps = {name: ledger.Stamp.of(name)}
@@ -60,7 +60,7 @@ def note(names: Iterable[str]) -> None:
 
 
 def note_again(folder: Path, output: Path) -> None:
-    """Write into the ledger that the files of an output's job are right as they are now."""
+    """Write into the ledger that the files of an output's job are correct as they are now."""
     with contextlib.chdir(folder):
         path = Path("work", ledger.NAME)
         job = next(job for job in ledger.jobs(path) if str(output) in job.outputs)
@@ -69,7 +69,7 @@ def note_again(folder: Path, output: Path) -> None:
 
 
 def _note_jobs(folder: Path, datasets: list[Dataset], inputs: Mapping[str, Iterable[str]]) -> None:
-    """Write the ledger, as if every file had a job of its own that read its ``inputs``."""
+    """Write a ledger in which each file has a job of its own, which read its ``inputs``."""
     with contextlib.chdir(folder):
         jobs = ledger.Ledger(Path("work", ledger.NAME))
         for dataset in datasets:
@@ -91,7 +91,7 @@ def _note_jobs(folder: Path, datasets: list[Dataset], inputs: Mapping[str, Itera
 
 
 def planned(folder: Path, *arguments: str) -> set[str]:
-    """Return the files that the next run would make."""
+    """Return the files that the next run would update."""
     result = snakemake(folder, "--summary", *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
     rows = [line.split("\t") for line in result.stdout.splitlines()]
@@ -99,7 +99,7 @@ def planned(folder: Path, *arguments: str) -> set[str]:
 
 
 def _views(folder: Path, dataset: Dataset) -> None:
-    """Write the views and their records, every pixel of another colour."""
+    """Write the views and their records. The views differ in colour."""
     lightfield = LightField.from_rig(
         dataset.rig, dataset.rig.camera.make(), **dataset.origin(dataset.render)
     )
@@ -131,7 +131,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
 
 
 def _write(path: Path, number: int) -> None:
-    """Write a file that only needs to be there: a mapping, an image, or some bytes."""
+    """Write a file whose content does not matter: a mapping, an image, or some bytes."""
     match path.suffix:
         case ".json":
             write_json(path, {"path": str(path), "number": number, "valid": True})

@@ -1,12 +1,12 @@
-"""A Slurm cluster of one node, this machine, from Debian's packages: start it, use it, stop it.
+"""Runs a command against a Slurm cluster of one node, this machine, from Debian's packages.
 
-    python tests/slurm_node.py FOLDER COMMAND ...
+python tests/slurm_node.py FOLDER COMMAND ...
 
-installs what is missing (as root, by apt), starts the daemons with all that they write in FOLDER,
-runs the command against them, and stops them. Everything listens on the loopback address. The one
-file outside FOLDER is /etc/slurm/slurm.conf, where a job's steps find the cluster; it goes again.
-If this program is killed, its daemons go with it, and the next one takes the file's place.
-Where file systems may be mounted, the node's temporary files lie on a small disk of its own.
+Installs missing packages (as root, with apt), starts the daemons, runs the command, and stops the
+daemons. These write into FOLDER and listen on the loopback address. The only file outside FOLDER is
+/etc/slurm/slurm.conf, where a job's steps look for the cluster. It is removed at the end. If this
+program is killed, the daemons end too, and the next run replaces the file. If file systems can be
+mounted, the node's temporary files lie on a small disk of its own.
 """
 
 import argparse
@@ -28,11 +28,11 @@ PACKAGES = {
     "sbatch": "slurm-client",
     "munged": "munge",
 }
-# Where Slurm's commands look by themselves: the executor hides SLURM_CONF from a job's steps.
+# Slurm's commands look here by default. The executor hides SLURM_CONF from a job's steps.
 CONFIGURED = Path("/etc/slurm/slurm.conf")
-# Debian puts daemons where not every user looks.
+# Debian installs daemons where not every user's PATH leads.
 PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
-# Mounted for the node's daemon and its jobs alone.
+# Mounts a disk that only the node's daemon and its jobs see.
 DISK = 'mount -t tmpfs -o size=64m node "$0" && mount --bind "$0" /dev/shm && exec "$@"'
 
 CLUSTER = "ClusterName=plenoforge\n"
@@ -40,7 +40,7 @@ CONFIGURATION = """SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={controller_port}
 SlurmdPort={node_port}
 SlurmUser=root
-# A job that lost its node is submitted anew after so many seconds.
+# A job that lost its node is submitted again after this many seconds.
 AuthInfo=socket={folder}/munge.socket,cred_expire=20
 CredType=cred/munge
 StateSaveLocation={folder}/state
@@ -69,7 +69,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 
 
 def install() -> None:
-    """Install the packages that are not there; exits with the line to run if that cannot be."""
+    """Install missing packages. Exits with the command to run if that is not allowed."""
     missing = [name for program, name in PACKAGES.items() if not shutil.which(program, path=PATH)]
     if not missing:
         return
@@ -77,18 +77,19 @@ def install() -> None:
     if os.geteuid() != 0:
         sys.exit(f"error: Slurm is missing; on Debian or Ubuntu: sudo {' '.join(command)}")
     environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-    for words in (["apt-get", "--quiet=2", "update"], command):
-        subprocess.run(words, env=environment, check=True, stdout=subprocess.DEVNULL)
+    for arguments in (["apt-get", "--quiet=2", "update"], command):
+        subprocess.run(arguments, env=environment, check=True, stdout=subprocess.DEVNULL)
 
 
 class Node:
-    """One node and its controller; ``environment`` is what a command needs to use them.
+    """One node and its controller. ``environment`` is for commands that use them.
 
-    ``own_disk`` is the command that gives another one the node's disk; empty where there is none.
+    ``own_disk`` is a command prefix under which another command sees the node's disk. It is empty
+    without such a disk.
     """
 
     def __init__(self, folder: Path, memory: int = 16000) -> None:
-        """``memory`` is how many MB the node says it has."""
+        """``memory`` is the node's memory in MB."""
         self.folder = folder
         for name in ("state", "spool", "disk"):
             (folder / name).mkdir(parents=True, exist_ok=True)
@@ -104,7 +105,7 @@ class Node:
             node_port=_free_port(),
         )
         if CONFIGURED.exists() and not _is_left_behind(CONFIGURED.read_text()):
-            sys.exit(f"error: {CONFIGURED} is there: this machine belongs to a cluster already")
+            sys.exit(f"error: {CONFIGURED} exists: this machine already belongs to a cluster")
         CONFIGURED.write_text(content)
         self.environment = os.environ | {"PATH": PATH, "TMPDIR": f"{folder}/disk"}
         self.own_disk = ["unshare", "--mount", "sh", "-c", DISK, f"{folder}/disk"]
@@ -130,13 +131,13 @@ class Node:
 
     def start(self, daemon: str, *arguments: str) -> None:
         """Start a daemon in the foreground, as a child of this process."""
-        words = [daemon, *arguments, *(["--foreground"] if daemon == "munged" else [])]
-        # A killed process ends no child: this lets the kernel do it.
-        words = ["setpriv", "--pdeathsig", "KILL", *words]
-        words = [*(self.own_disk if daemon == "slurmd" else []), *words]
+        command = [daemon, *arguments, *(["--foreground"] if daemon == "munged" else [])]
+        # The daemons do not end with a killed parent, so the kernel must kill them.
+        command = ["setpriv", "--pdeathsig", "KILL", *command]
+        command = [*(self.own_disk if daemon == "slurmd" else []), *command]
         with (self.folder / f"{daemon}.out").open("ab") as output:
             self.daemons[daemon] = subprocess.Popen(
-                words, env=self.environment, stdout=output, stderr=output
+                command, env=self.environment, stdout=output, stderr=output
             )
 
     def start_node(self) -> None:
@@ -146,7 +147,7 @@ class Node:
         wait_until(lambda: self.state() in up, self.daemons["slurmd"], 60)
 
     def fill_disk(self) -> Path:
-        """Leave no byte on the node's own disk; return the file that takes them all."""
+        """Fill the node's own disk to the last byte. Return the file that fills it."""
         filler = Path(f"/proc/{self.daemons['slurmd'].pid}/root{self.folder}/disk/filler")
         with filler.open("wb", buffering=0) as file, suppress(OSError):
             while True:
@@ -159,19 +160,19 @@ class Node:
         self.daemons["slurmd"].kill()
         self.daemons["slurmd"].wait()
 
-    def run(self, *words: str) -> str:
-        """Run one of Slurm's commands; returns what it prints."""
-        done = subprocess.run(
-            words, env=self.environment, capture_output=True, text=True, check=False
+    def run(self, *arguments: str) -> str:
+        """Run one of Slurm's commands. Return its output."""
+        result = subprocess.run(
+            arguments, env=self.environment, capture_output=True, text=True, check=False
         )
-        return done.stdout.strip()
+        return result.stdout.strip()
 
     def state(self) -> str:
         return self.run("sinfo", "--noheader", "--format=%T").rstrip("*")
 
 
 def _is_left_behind(configuration: str) -> bool:
-    """Return whether a killed program of these has written it: its daemons are gone."""
+    """Return whether a killed run of this program left the file: it is ours, and no daemon runs."""
     running = any(
         process.info["name"] == "slurmctld" and process.info["status"] != psutil.STATUS_ZOMBIE
         for process in psutil.process_iter(["name", "status"])
@@ -180,9 +181,9 @@ def _is_left_behind(configuration: str) -> bool:
 
 
 def _free_port() -> int:
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+    with socket.socket() as free_socket:
+        free_socket.bind(("127.0.0.1", 0))
+        return free_socket.getsockname()[1]
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
-"""Views of a scene whose every point is known: the inside of a sphere around the origin, or a ball.
+"""Writes views of a scene whose points are all known: the inside of a sphere, or a ball in it.
 
-Its colour follows from the place.
+A point's colour follows from its place.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ RADIUS = 3.0
 BALL, BALL_RADIUS = np.array([0.0, 1.8, 0.0]), 0.5
 RED = np.array([0.8, 0.05, 0.05])
 
-# One of each kind that a consumer may have, of pixels for tests.
+# A camera of each kind of lens that a consumer reads, with few pixels.
 LENSES = {
     "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [64, 48]},
     "shifted": {
@@ -40,7 +40,7 @@ LENSES = {
 
 
 def enlarged(camera, factor):
-    """Return a camera with so many times the pixels along each side."""
+    """Return a camera with ``factor`` times the pixels along each side."""
     pixels = {key: camera[key] for key in ("resolution", "principal_point") if key in camera}
     return camera | {key: [factor * side for side in pair] for key, pair in pixels.items()}
 
@@ -60,7 +60,7 @@ def look(lens, matrix):
 
 
 def look_at_ball(lens, matrix):
-    """What a camera sees of the sphere and of a ball in it."""
+    """Return linear colour, and distance, that a camera sees of the sphere with a ball in it."""
     colour, distance = look(lens, matrix)
     rays = lens.pixel_rays() @ matrix[:3, :3].T
     to_ball = BALL - matrix[:3, 3]

@@ -1,4 +1,4 @@
-"""What could be cheaper at equal error: found where it is known, and by the programs."""
+"""Advice on cheaper settings: from simulated renders with known answers, and by the programs."""
 
 import json
 import os
@@ -33,10 +33,10 @@ def lightfield():
 
 
 class Simulated:
-    """Renders that cost nothing: noise of N paths on a picture, in times that are known.
+    """Simulated renders: the noise of N paths on an even picture, in known times.
 
-    Without the light tree a path takes half as long. Guided, it does too, but one pixel is
-    sixty times too bright. With few bounces a tenth of the light is missing.
+    Without the light tree a path takes half the time. With guiding too, but one pixel is sixty
+    times too bright. With fewer bounces a tenth of the light is missing.
     """
 
     has_volumes = False
@@ -72,26 +72,26 @@ class Simulated:
         return trials.Trial(light.astype(np.float32), None, samples, seconds, "CPU", parts)
 
 
-def tried(maker, windows, reference_samples):
+def advice_of(maker, windows, reference_samples):
     experiment = advice.probe_experiment(maker, 32, windows, reference_samples, "room")
     return advice.measure(experiment, RENDER, INVENTORY, "room")
 
 
 @pytest.fixture(scope="module")
 def simulated():
-    found = tried(Simulated(), 2, 512)
-    return found, {json.dumps(one["change"]): one for one in found["tried"]}
+    advice_content = advice_of(Simulated(), 2, 512)
+    return advice_content, {json.dumps(entry["change"]): entry for entry in advice_content["tried"]}
 
 
-def test_what_saves_is_advised_with_its_yaml(simulated):
-    found, changes = simulated
-    one = changes['{"light_tree": false}']
-    whole = one["savings"]["whole views"]
-    assert whole["times"] == pytest.approx(2, abs=2 * whole["uncertainty"] + 0.02)
-    assert abs(whole["light"]) < 1e-6 and whole["same_picture"] and one["advised"]
-    assert one["savings"]["diffuse"] == whole
-    assert found["yaml"] == {"light_tree": False}
-    text = advice.table("room", {**found, "threads": []})
+def test_a_change_that_saves_is_advised_with_its_yaml(simulated):
+    advice_content, changes = simulated
+    entry = changes['{"light_tree": false}']
+    whole_views = entry["savings"]["whole views"]
+    assert whole_views["times"] == pytest.approx(2, abs=2 * whole_views["uncertainty"] + 0.02)
+    assert abs(whole_views["light"]) < 1e-6 and whole_views["same_picture"] and entry["advised"]
+    assert entry["savings"]["diffuse"] == whole_views
+    assert advice_content["yaml"] == {"light_tree": False}
+    text = advice.table("room", {**advice_content, "threads": []})
     assert "render:\n  light_tree: false\n" in text
     assert "- lights: 1, sun" in text and "- volumes: 1, Fog" in text
     assert "| `light_tree: false` | path tracing | yes | 2.0" in text
@@ -100,18 +100,18 @@ def test_what_saves_is_advised_with_its_yaml(simulated):
 @pytest.mark.parametrize(
     "change", ['{"max_bounces": 4}', '{"max_bounces": 2}', '{"denoise": true}']
 )
-def test_another_picture_is_not_advised(simulated, change):
-    one = simulated[1][change]
-    assert not one["savings"]["whole views"]["same_picture"] and not one["advised"]
+def test_a_change_of_the_picture_is_not_advised(simulated, change):
+    entry = simulated[1][change]
+    assert not entry["savings"]["whole views"]["same_picture"] and not entry["advised"]
     if "max_bounces" in change:
-        assert one["savings"]["whole views"]["light"] == pytest.approx(-0.1, abs=1e-3)
+        assert entry["savings"]["whole views"]["light"] == pytest.approx(-0.1, abs=1e-3)
 
 
-def test_what_hides_fireflies_is_not_advised(simulated):
-    one = simulated[1]['{"guiding": true}']
-    whole = one["savings"]["whole views"]
-    assert whole["times"] > 1.5 > 1 > whole["times_of_all_pixels"]
-    assert not one["advised"]
+def test_a_change_that_hides_fireflies_is_not_advised(simulated):
+    entry = simulated[1]['{"guiding": true}']
+    whole_views = entry["savings"]["whole views"]
+    assert whole_views["times"] > 1.5 > 1 > whole_views["times_of_all_pixels"]
+    assert not entry["advised"]
 
 
 def test_a_clamp_is_reported_and_never_advised():
@@ -126,8 +126,8 @@ def test_a_clamp_is_reported_and_never_advised():
 
 
 @pytest.mark.slow
-def test_of_one_key_the_value_that_saves_most_is_advised(monkeypatch):
-    """Guiding has fireflies, and of a denoiser's prefilters the one without is the fastest."""
+def test_the_value_of_a_key_that_saves_most_is_advised(monkeypatch):
+    """Guiding has fireflies. The prefilter "fast" is faster than "none"."""
     maker = Simulated()
     render = maker.render
 
@@ -137,25 +137,25 @@ def test_of_one_key_the_value_that_saves_most_is_advised(monkeypatch):
         return replace(trial, seconds=trial.seconds / times)
 
     monkeypatch.setattr(maker, "render", faster)
-    found = tried(maker, 1, 64)
-    assert found["yaml"]["denoise_prefilter"] == "fast"
+    advice_content = advice_of(maker, 1, 64)
+    assert advice_content["yaml"]["denoise_prefilter"] == "fast"
 
 
 def test_without_light_nothing_is_advised(monkeypatch):
     lit = Simulated.render
     monkeypatch.setattr(
-        Simulated, "render", lambda *words: replace(t := lit(*words), colour=0 * t.colour)
+        Simulated, "render", lambda *arguments: replace(t := lit(*arguments), colour=0 * t.colour)
     )
-    found = tried(Simulated(), 1, 64)
-    assert found["yaml"] == {}
-    assert "Nothing is advised" in advice.table("black", found | {"threads": []})
+    advice_content = advice_of(Simulated(), 1, 64)
+    assert advice_content["yaml"] == {}
+    assert "Nothing is advised" in advice.table("black", advice_content | {"threads": []})
 
 
-def killed(*words):
+def killed(*arguments):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_process_that_is_killed_for_memory_is_named(monkeypatch, tmp_path):
+def test_a_process_killed_for_memory_is_named(monkeypatch, tmp_path):
     write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
     monkeypatch.setattr(threads.probe, "rendered", killed)
     with pytest.raises(UserError, match=r"room: one of 1 .* was killed"):
@@ -163,14 +163,14 @@ def test_a_process_that_is_killed_for_memory_is_named(monkeypatch, tmp_path):
 
 
 def on_gpu(lightfield, blend, inventory, device, threads, folder):
-    """Stand in for a process that renders on a GPU; leave a file that says that it was started."""
+    """Stand in for a process that renders on a GPU. Leave a file that shows that it started."""
     Path(inventory).with_name(f"started-{os.getpid()}").touch()
     run = journal.Run({"device": "GPU", "start_up_seconds": 1.0})
     run.views += [{"wall_seconds": 1.0}, {"wall_seconds": 1.0}]
     return run
 
 
-def test_one_process_alone_is_tried_on_a_gpu(monkeypatch, tmp_path):
+def test_a_gpu_renders_in_one_process_alone(monkeypatch, tmp_path):
     write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
     monkeypatch.setattr(threads.probe, "rendered", on_gpu)
     scene = ("a.blend", tmp_path / "inventory.json")
@@ -182,32 +182,32 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     lightfield().write(tmp_path / "lightfield.json")
     inventory, output = tmp_path / "inventory.json", tmp_path / "room.json"
     run_program("inventory.py", "--blend", room, "--output", inventory)
-    words = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
-    words += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
-    words += ("--reference", "1024", "--cores", "2", "--output", output)
-    run_program("try_changes.py", *words)
-    found = json.loads(output.read_text())
-    assert "diffuse" in found["strata"]
-    tried = {json.dumps(one["change"]): one["savings"] for one in found["tried"]}
-    own = json.loads(inventory.read_text())["sampling"]
-    # A lamp and a closed room: fewer bounces make it darker, and nothing else does.
-    fewer = tried[json.dumps({"max_bounces": own["max_bounces"] // 4})]["whole views"]
+    arguments = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
+    arguments += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
+    arguments += ("--reference", "1024", "--cores", "2", "--output", output)
+    run_program("try_changes.py", *arguments)
+    content = json.loads(output.read_text())
+    assert "diffuse" in content["strata"]
+    savings = {json.dumps(entry["change"]): entry["savings"] for entry in content["tried"]}
+    sampling = json.loads(inventory.read_text())["sampling"]
+    # In a closed room with a lamp, fewer bounces make it darker. No other change does.
+    fewer = savings[json.dumps({"max_bounces": sampling["max_bounces"] // 4})]["whole views"]
     assert fewer["light"] < -0.01 and not fewer["same_picture"]
-    tree = tried[json.dumps({"light_tree": not own["light_tree"]})]["whole views"]
+    tree = savings[json.dumps({"light_tree": not sampling["light_tree"]})]["whole views"]
     assert 0 < abs(tree["light"]) < 0.02
-    # Each change reaches Cycles: no two make the same pixels. Only a clamp clamps nothing here, and
-    # the denoiser has the same filter for two qualities on some processors.
+    # Each change reaches Cycles: no two make the same pixels. Two are exceptions: a clamp clamps
+    # nothing here, and on some processors the denoiser has one filter for two qualities.
     same = ("clamp_indirect", "denoise_quality")
     wholes = [
         saved["whole views"]
-        for change, saved in tried.items()
+        for change, saved in savings.items()
         if not any(name in change for name in same)
     ]
-    assert len({(whole["bias"], whole["light"]) for whole in wholes}) == len(wholes)
-    qualities = [saved for change, saved in tried.items() if "denoise_quality" in change]
+    assert len({(saving["bias"], saving["light"]) for saving in wholes}) == len(wholes)
+    qualities = [saved for change, saved in savings.items() if "denoise_quality" in change]
     assert any(saved["whole views"] not in wholes for saved in qualities)
-    # Two processes of one thread have the scene twice, and one of two has it once.
-    single, double = found["threads"]
+    # Two processes of one thread hold the scene twice. One process of two threads holds it once.
+    single, double = content["threads"]
     assert (single["threads"], single["processes"]) == (1, 2)
     assert (double["threads"], double["processes"]) == (2, 1)
     assert single["memory_bytes"] > 1.5 * double["memory_bytes"]

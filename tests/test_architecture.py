@@ -15,15 +15,15 @@ PACKAGES = re.findall(r"^\| (\w+) \|", PAGE.read_text(), re.M)[1:]
 
 
 def imported(file):
-    """Return all that a file imports, anywhere in it, with dots."""
-    found = set()
+    """Return the dotted names of all that a file imports, anywhere in it."""
+    names = set()
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, file
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
 
 
 def test_each_package_says_what_it_holds():
@@ -50,9 +50,11 @@ def test_no_files_import_each_other_in_a_circle():
     arrows = {}
     for path in LIBRARY.rglob("*.py"):
         name = ".".join(("lightfield", *path.relative_to(LIBRARY).with_suffix("").parts))
-        found = imported(path)
-        # What is imported may be a file or a name in one.
-        arrows[name.removesuffix(".__init__")] = found | {n.rpartition(".")[0] for n in found}
+        imported_names = imported(path)
+        # An imported name may be a file, or a name in a file.
+        arrows[name.removesuffix(".__init__")] = imported_names | {
+            n.rpartition(".")[0] for n in imported_names
+        }
     arrows = {name: others & arrows.keys() - {name} for name, others in arrows.items()}
     while free := [name for name, others in arrows.items() if not others & arrows.keys()]:
         for name in free:
@@ -60,25 +62,25 @@ def test_no_files_import_each_other_in_a_circle():
     assert not arrows
 
 
-def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
+def test_reading_the_rules_imports_nothing_heavy():
     lines = "\n".join(file.read_text() for file in (ROOT / "rules").rglob("*.smk"))
     imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
     program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
-    found = subprocess.run(
+    modules = subprocess.run(
         [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
     ).stdout.split()
-    assert "lightfield.dataset.loading" in found
-    assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)
+    assert "lightfield.dataset.loading" in modules
+    assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
 
 
-# What a Snakefile may ask of Snakemake by its documentation.
+# Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 INSIDE = re.compile(rf"(?!{PUBLIC})\bworkflow\.\w+|__signature__|\b(?:from|import) snakemake\b")
 
 
-def test_one_file_of_rules_alone_reaches_inside_snakemake():
+def test_only_one_file_of_rules_reaches_inside_snakemake():
     files = [ROOT / "Snakefile", *(ROOT / "rules").rglob("*.smk")]
     reaching = {
         file.name: INSIDE.findall(file.read_text()) for file in files if file.stem != "internals"
     }
-    assert {name: found for name, found in reaching.items() if found} == {}
+    assert {name: uses for name, uses in reaching.items() if uses} == {}

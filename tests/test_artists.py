@@ -1,4 +1,4 @@
-"""Three .blend files as artists leave them, built from a folder of the user's own."""
+"""Builds of three .blend files as artists leave them, in a folder of the user's own."""
 
 import json
 import subprocess
@@ -59,12 +59,12 @@ TAKEN = {
 }
 
 
-def build(folder, *words, accept="accept_blend=false"):
+def build(folder, *arguments, accept="accept_blend=false"):
     return subprocess.run(
         [
             Path(sys.executable).with_name("snakemake"),
             *("--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "1"),
-            *words,
+            *arguments,
             *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
         ],
         cwd="/",
@@ -76,7 +76,7 @@ def build(folder, *words, accept="accept_blend=false"):
 
 @pytest.fixture(scope="module")
 def project(run_program, tmp_path_factory):
-    """A folder with the artists' files and their scene YAMLs, built; and what the build said."""
+    """A built folder with the artists' files and their scene YAMLs, and the build's output."""
     folder = tmp_path_factory.mktemp("project")
     run_program(Path(__file__).with_name("artists.py"), folder)
     (folder / "configs/scenes").mkdir(parents=True)
@@ -94,7 +94,7 @@ def view(folder, scene, name, channels="RGB"):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_what_is_taken_is_said_once_on_the_terminal_and_on_the_page(scene, project):
+def test_the_terminal_and_the_page_say_once_what_is_taken_from_a_blend(scene, project):
     folder, said = project
     assert said.count(f"note: {scene}.blend: {TAKEN[scene]}\n") == 1
     page = (folder / f"results/{scene}/views/report/index.html").read_text()
@@ -102,7 +102,7 @@ def test_what_is_taken_is_said_once_on_the_terminal_and_on_the_page(scene, proje
     assert json.loads((folder / f"results/{scene}/views/validation.json").read_text())["valid"]
 
 
-def test_a_missing_texture_is_magenta_and_what_is_linked_is_there(project):
+def test_a_missing_texture_is_magenta_and_linked_objects_are_rendered(project):
     folder, _ = project
     files = json.loads((folder / "work/interior/inventory.json").read_text())["external_files"]
     assert [file["path"] for file in files] == ["furniture.blend", "poster.png"]
@@ -112,18 +112,18 @@ def test_a_missing_texture_is_magenta_and_what_is_linked_is_there(project):
     assert np.any((red > 2 * green) & (red > 2 * blue))
 
 
-def test_both_view_layers_are_seen_by_the_camera_that_the_file_has_at_each_frame(project):
+def test_each_frames_camera_sees_both_view_layers(project):
     folder, _ = project
     content = json.loads((folder / "results/character/views/lightfield.json").read_text())
     assert content["frame"] == 24
     assert content["camera"]["focal_length"] == 35
     frames = {frame["name"]: frame["position"] for frame in content["frames"]}
     assert list(frames) == ["view_0024f", "view_0036f"]
-    # From one key to the other a metre across, eased.
+    # The camera moves by one metre from key to key, with easing.
     assert frames["view_0024f"] == pytest.approx([0.484, -5, 1], abs=1e-3)
     assert frames["view_0036f"] == pytest.approx([0.838, -5, 1], abs=1e-3)
     depth = view(folder, "character", "view_0024f", "Z")[..., 0]
-    # The floor of one layer, and before it the body of the other.
+    # The depth has the floor of one layer, and in front of it the body of the other.
     assert np.isfinite(depth).mean() > 0.3
     assert np.any(np.abs(depth - 4.85) < 0.1)
 
@@ -136,11 +136,11 @@ def test_the_camera_of_the_file_has_its_lens_shift_and_its_focus(project):
     colour = view(folder, "product", "view_0001f")
     depth = view(folder, "product", "view_0001f", "Z")[..., 0]
     behind = np.abs(depth - 4.85) < 0.01
-    # Sharp in its depth, and mixed in colour with the sky around it.
+    # Out of focus, the depth stays sharp, but colours mix with the sky around.
     assert behind.sum() > 20
     red = colour[..., 0] / colour.sum(axis=-1)
     assert red[behind].mean() < 0.6
-    # A film that is not transparent: the sky is seen.
+    # The film is not transparent, so the sky shows.
     sky = colour[np.isinf(depth)]
     np.testing.assert_allclose(np.median(sky, axis=0), [0.2, 0.3, 0.6], atol=0.01)
 

@@ -1,4 +1,4 @@
-"""Scenes that the user brings: downloaded, checked, and opened without running anything in them."""
+"""Scenes that the user brings: downloaded, checked, and opened without running their scripts."""
 
 import hashlib
 import json
@@ -12,7 +12,7 @@ from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset import config, download
+from lightfield.dataset import config, download, names
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.dataset.presence import check_presence
 
@@ -31,13 +31,13 @@ rigs:
 
 
 class Server:
-    """A web server on this machine whose faults a test chooses."""
+    """A local web server with faults that a test chooses."""
 
     def __init__(self):
         self.content = CONTENT
         self.ranges = True
-        self.cut_after = []  # bytes after which each of the next transfers breaks off
-        self.asked = []  # the Range of each request
+        self.cut_after = []  # Each of the next transfers breaks off after this many bytes.
+        self.asked = []  # The Range header of each request.
         owner = self
 
         class Handler(BaseHTTPRequestHandler):
@@ -84,7 +84,7 @@ def server():
     server.http.server_close()
 
 
-def test_a_transfer_that_breaks_off_goes_on_where_it_stopped(server, tmp_path):
+def test_a_broken_transfer_continues_where_it_stopped(server, tmp_path):
     target = tmp_path / "blends" / "scene.blend"
     server.cut_after = [1_000_000, 500_000]
     download.fetch(server.url, target, SUM, "the test")
@@ -93,7 +93,7 @@ def test_a_transfer_that_breaks_off_goes_on_where_it_stopped(server, tmp_path):
     assert list(target.parent.iterdir()) == [target]
 
 
-def test_a_later_run_goes_on_with_what_an_earlier_one_has_left(server, tmp_path):
+def test_a_later_run_continues_an_earlier_ones_download(server, tmp_path):
     target = tmp_path / "scene.blend"
     server.cut_after = [1_000_000, 0]
     with pytest.raises(UserError, match=r"less than 0.01 GB are kept in .*scene\.blend\.part"):
@@ -105,7 +105,7 @@ def test_a_later_run_goes_on_with_what_an_earlier_one_has_left(server, tmp_path)
     assert server.asked == ["bytes=1000000-"]
 
 
-def test_a_whole_part_is_not_asked_for_again(server, tmp_path):
+def test_a_complete_part_is_not_requested_again(server, tmp_path):
     target = tmp_path / "scene.blend"
     download.fetch(server.url, target, SUM, "the test")
     part = target.rename(tmp_path / "scene.blend.part")
@@ -118,7 +118,7 @@ def test_a_whole_part_is_not_asked_for_again(server, tmp_path):
     assert not part.exists()
 
 
-def test_a_part_that_is_longer_than_the_file_is_not_taken_for_it(server, tmp_path):
+def test_a_part_longer_than_the_file_is_downloaded_again(server, tmp_path):
     target = tmp_path / "scene.blend"
     (tmp_path / "scene.blend.part").write_bytes(CONTENT + b"more")
     tag = f'"{hashlib.md5(CONTENT).hexdigest()}"'
@@ -136,7 +136,7 @@ def test_a_server_without_ranges_sends_the_file_from_the_start(server, tmp_path)
     assert target.read_bytes() == CONTENT
 
 
-def test_a_file_that_changed_meanwhile_is_fetched_anew(server, tmp_path):
+def test_a_file_that_changed_meanwhile_is_downloaded_anew(server, tmp_path):
     target = tmp_path / "scene.blend"
     server.cut_after = [1_000_000, 0]
     with pytest.raises(UserError):
@@ -175,14 +175,14 @@ def test_a_wrong_file_is_refused_with_both_sums(server, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_server_that_is_not_there_is_told(tmp_path):
+def test_a_missing_server_is_named(tmp_path):
     with pytest.raises(UserError, match="refused"):
         download.fetch("http://127.0.0.1:9/scene.blend", tmp_path / "a.blend", SUM, "the test")
 
 
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
-    """Return a function that writes a scene YAML with a .blend where the library looks for it."""
+    """Return a function that writes a scene YAML with a .blend into the library's folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(config, "SCENES", tmp_path)
 
@@ -228,11 +228,11 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
 
 def test_a_built_scene_has_no_file_to_check(monkeypatch, tmp_path):
     (tmp_path / "any.blend").write_bytes(CONTENT)
-    with pytest.raises(UserError, match="--scene smoke: is made of no"):
+    with pytest.raises(UserError, match=r"--scene smoke: does not use a \.blend"):
         check(monkeypatch, tmp_path / "any.blend", "smoke")
 
 
-def test_the_sum_of_the_yaml_is_checked_and_needs_no_lock(scene, monkeypatch):
+def test_the_yamls_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
     blend = scene(more=f", sha256: {SUM}")
     blend.write_bytes(CONTENT)
     check(monkeypatch, blend)
@@ -252,17 +252,17 @@ def test_a_missing_file_gives_the_page_and_the_place(scene):
         check_presence(load_datasets(settings)[0])
     assert "there is no file blends/mine.blend" in str(caught.value)
     assert "get it from https://example.org/scenes and put it there" in str(caught.value)
-    # What can be downloaded may be missing.
+    # A file that can be downloaded may be missing.
     scene(more=", url: 'https://example.org/mine.blend'", blend="blends/mine.blend")
     check_presence(load_datasets(settings)[0])
 
 
-# What an original has of its own.
+# The keys that an original scene does not share with its builder's scene.
 OWN = {"scene", "description", "licence", "credit"}
 
 
 @pytest.mark.parametrize("name", ["garden", "lone_monk", "barbershop"])
-def test_an_original_has_the_rigs_of_the_scene_that_stands_in_for_it(name):
+def test_an_original_scene_has_the_rigs_of_its_builders_scene(name):
     built, original = (config.load_scene(scene) for scene in (name, f"{name}_original"))
     assert original.scene.page.startswith("https://")
     assert original.model_dump(exclude=OWN) == built.model_dump(exclude=OWN)
@@ -312,15 +312,15 @@ def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
         (tmp_path / name).write_text(text)
     folder = tmp_path / "scene"
     folder.mkdir()
-    scripts = config.BUILDERS.parent
+    scripts = names.BUILDERS.parent
     run_program(tmp_path / "make.py", folder, scripts)
-    told = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
-    # The traps do work where Blender is told to trust the file.
-    assert "trusted: driver script trap.blend" in told
-    assert "ours: trap.blend" in told
+    lines = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
+    # If Blender is told to trust the file, the traps do work.
+    assert "trusted: driver script trap.blend" in lines
+    assert "ours: trap.blend" in lines
 
 
-def test_another_bpy_makes_everything_of_a_brought_blend_anew(tmp_path, room, monkeypatch):
+def test_another_bpy_renders_a_brought_blend_again(tmp_path, room, monkeypatch):
     folder = checkout(tmp_path, brought=BLEND_SCENE.format(blend="mine.blend", more=""))
     (folder / "mine.blend").write_bytes(room.read_bytes())
     chosen = ("results/brought/LFPlane/lightfield.json", "--config", "scenes=[brought]")
@@ -356,8 +356,8 @@ for name in ("library", "main"):
 def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_program, tmp_path):
     (tmp_path / "make.py").write_text(LINKED)
     run_program(tmp_path / "make.py", tmp_path)
-    words = ("--blend", tmp_path / "main.blend", "--output", tmp_path / "inventory.json")
-    run_program("inventory.py", *words)
+    arguments = ("--blend", tmp_path / "main.blend", "--output", tmp_path / "inventory.json")
+    run_program("inventory.py", *arguments)
 
     major, minor = map(int, version("bpy").split(".")[:2])
     path = tmp_path / f"{newer}.blend"
@@ -365,15 +365,17 @@ def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_
     mark = f"v{major:02}{minor:02}".encode()
     assert mark in content[:17]
     path.write_bytes(content.replace(mark, f"v{major:02}{minor + 1:02}".encode(), 1))
-    result = run_program("inventory.py", *words, check=False)
+    result = run_program("inventory.py", *arguments, check=False)
     assert result.returncode == 1
-    told = result.stderr.splitlines()[-1]
-    assert told.startswith(f"error: {path}: was saved by Blender {major}.{minor + 1}, and Blender ")
-    assert f"Blender {version('bpy')}" in told
+    message = result.stderr.splitlines()[-1]
+    assert message.startswith(
+        f"error: {path}: was saved by Blender {major}.{minor + 1}, and Blender "
+    )
+    assert f"Blender {version('bpy')}" in message
 
 
 @pytest.mark.slow
-def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
+def test_a_downloaded_blend_needs_no_builder_and_a_built_one_no_download(server, tmp_path):
     fetched = BLEND_SCENE.format(blend="blends/fetched.blend", more=f", url: {server.url}")
     folder = checkout(
         tmp_path,
@@ -393,7 +395,7 @@ def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
     result = snakemake(folder, "blends/fetched.blend", *chosen)
     assert result.returncode == 0, result.stdout + result.stderr
     assert (folder / "blends" / "fetched.blend").read_bytes() == CONTENT
-    # What is there is never removed, to be fetched again.
+    # An existing file is never removed to be downloaded again.
     jobs = planned(folder, "--forceall", *chosen)
     assert jobs["check_blend"] == 3
     assert not any(name.startswith("fetch_") for name in jobs)

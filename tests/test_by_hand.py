@@ -1,4 +1,4 @@
-"""Programs as a person runs them by hand: what is not meant is refused in one plain line."""
+"""Programs run by hand: each refuses a mistake with one plain line."""
 
 import runpy
 import sys
@@ -19,14 +19,14 @@ from lightfield.validation.integrity import Integrity
 
 @pytest.fixture
 def refused(monkeypatch, capsys):
-    """Run a program that must refuse its arguments; return the line that says why."""
+    """Return a function that runs a program that must refuse its arguments, and its message."""
 
     def run(name, *arguments, folder=ROOT):
         monkeypatch.chdir(folder)
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
         with pytest.raises(SystemExit) as caught:
             runpy.run_path(str(SCRIPTS / name), run_name="__main__")
-        # What argparse refuses it writes itself, below the usage.
+        # argparse writes its own messages below the usage.
         said = str(caught.value) if caught.value.code != 2 else capsys.readouterr().err
         assert caught.value.code == 2 or "\n" not in said
         return said.partition("error: ")[2].strip()
@@ -36,7 +36,7 @@ def refused(monkeypatch, capsys):
 
 @pytest.fixture
 def run_in_process(monkeypatch):
-    """Run a program that must end well."""
+    """Return a function that runs a program that must succeed."""
 
     def run(name, *arguments):
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
@@ -67,7 +67,7 @@ SUMS = ["--page", "page", "--sums", "sums", "--validation"]
         ("device: is missing; scripts/try_changes.py", "advise.py", []),
     ],
 )
-def test_json_of_another_kind_is_named_with_the_key_that_it_lacks(
+def test_json_of_another_kind_is_named_with_the_missing_key(
     refused, tmp_path, content, key, program, arguments
 ):
     path, made = tmp_path / "other.json", tmp_path / "made"
@@ -83,15 +83,15 @@ def test_a_blend_whose_inventory_is_another_file_is_refused(tmp_path, refused):
     scene["rigs"] = {"Rig": {"type": "plane", "cameras": [1, 1], "size": 1, "camera": camera}}
     write_json(tmp_path / "configs/scenes/mine.yaml", scene)
     write_text(tmp_path / "other.json", "[]")
-    words = ["--scene", "mine", "--output", "made"]
-    said = refused("make_lightfield.py", *words, folder=tmp_path)
+    arguments = ["--scene", "mine", "--output", "made"]
+    said = refused("make_lightfield.py", *arguments, folder=tmp_path)
     assert said == "--inventory: is missing; scripts/inventory.py writes it for a .blend"
-    said = refused("make_lightfield.py", *words, "--inventory", "other.json", folder=tmp_path)
+    said = refused("make_lightfield.py", *arguments, "--inventory", "other.json", folder=tmp_path)
     assert said == "other.json: blend: is missing; scripts/inventory.py writes it"
 
 
 @pytest.mark.parametrize("program", ["plan.py", "status.py"])
-def test_a_count_that_is_none_is_refused(refused, tmp_path, program):
+def test_an_invalid_count_is_refused(refused, tmp_path, program):
     last = tmp_path / "probe.json" if program == "plan.py" else ""
     write_json(tmp_path / "probe.json", {})
     folders = ["--results", tmp_path, "--work", tmp_path] if program == "status.py" else []
@@ -107,11 +107,11 @@ def test_a_count_that_is_none_is_refused(refused, tmp_path, program):
         ({}, "other.json: blend: is missing; scripts/inventory.py writes it"),
     ],
 )
-def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path, content, problem):
+def test_energy_settings_and_full_size_are_checked(refused, tmp_path, content, problem):
     write_json(tmp_path / "settings.json", {"energy": {}, "full": FULL, **content})
     write_json(tmp_path / "other.json", {})
-    words = ["--settings", tmp_path / "settings.json", "--inventory", tmp_path / "other.json"]
-    said = refused("costs.py", *COSTS, *words, "--output", tmp_path / "made")
+    arguments = ["--settings", tmp_path / "settings.json", "--inventory", tmp_path / "other.json"]
+    said = refused("costs.py", *COSTS, *arguments, "--output", tmp_path / "made")
     assert said.startswith(f"{tmp_path}/{problem}")
     assert not (tmp_path / "made").exists()
 
@@ -123,7 +123,7 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
 
 
 @pytest.mark.parametrize(
-    ("program", "words", "content", "problem"),
+    ("program", "arguments", "content", "problem"),
     [
         ("report_figures.py", PAGE[:2] + PAGE[-2:], {"rig": 1}, "rig: is 1; must be a mapping"),
         ("make_lightfield.py", PAGE[-2:], CAPTURE | {"rig": {"type": "x"}}, "rig.type: is"),
@@ -136,16 +136,18 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
         ("gpu_check.py", GPU, {"full": {"a": {"views": 1}}}, "full.a: is missing the key"),
     ],
 )
-def test_a_mistake_in_a_settings_file_is_named(refused, tmp_path, program, words, content, problem):
+def test_a_mistake_in_a_settings_file_is_named(
+    refused, tmp_path, program, arguments, content, problem
+):
     path = tmp_path / "settings.json"
     write_json(path, content)
-    said = refused(program, *words, "--settings", path, folder=tmp_path)
+    said = refused(program, *arguments, "--settings", path, folder=tmp_path)
     assert said.startswith(f"{path}: {problem}")
     assert [*tmp_path.iterdir()] == [path]
 
 
 @pytest.mark.parametrize(
-    ("program", "words", "flag"),
+    ("program", "arguments", "flag"),
     [
         ("make_lightfield.py", PAGE[-2:], ["--rig", "LFSphere"]),
         ("package.py", PACK, ["--gigabytes", "1"]),
@@ -153,16 +155,16 @@ def test_a_mistake_in_a_settings_file_is_named(refused, tmp_path, program, words
         ("synthesis_quality.py", [".", "--output", "a"], ["--truth", "b"]),
     ],
 )
-def test_a_flag_beside_a_settings_file_is_refused(refused, tmp_path, program, words, flag):
+def test_a_flag_beside_a_settings_file_is_refused(refused, tmp_path, program, arguments, flag):
     path = tmp_path / "settings.json"
     write_json(path, {})
-    said = refused(program, *words, *flag, "--settings", path, folder=tmp_path)
-    assert said == f"--settings: excludes {flag[0]}; write it into the settings file"
+    said = refused(program, *arguments, *flag, "--settings", path, folder=tmp_path)
+    assert said == f"--settings: excludes {flag[0]}; write it into the file"
 
 
 @pytest.fixture
 def lightfield(tmp_path):
-    """A lightfield.json of one perspective view, whose image is not there."""
+    """A lightfield.json of one perspective view without its image."""
     lens = {"lens": "rectilinear", "fov": 90, "resolution": [8, 8]}
     rig = {"type": "plane", "cameras": [1, 1], "size": 1, "camera": lens}
     path = tmp_path / "lightfield.json"
@@ -174,14 +176,14 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
     placed = ["--scale", "1e-05", "--offset", "-1e-05", "-2.5", "3E-7"]
     box = ["--render-aabb", "-1e-05", "-.5", "0", "1", "+1e2", "1"]
     made = tmp_path / "transforms.json"
-    words = ["--input-cfg", lightfield, *placed, *box, "--output", made]
-    run_in_process("export_instant_ngp.py", *words)
+    arguments = ["--input-cfg", lightfield, *placed, *box, "--output", made]
+    run_in_process("export_instant_ngp.py", *arguments)
     options = read_json(made)["options"]
     assert (options["scale"], options["offset"]) == (1e-05, [-1e-05, -2.5, 3e-7])
     assert options["render_aabb"] == [[-1e-05, -0.5, 0], [1, 100, 1]]
-    words = ["--input-cfg", lightfield, "-i", tmp_path, "-o", tmp_path, "--png", "--dry-run"]
-    words += ["--no-reproject", "--output-cfg", made]
-    run_in_process("reproject.py", *words, "--rotation", "-1e-05,2,-3", "--exposure", "-1e-05")
+    arguments = ["--input-cfg", lightfield, "-i", tmp_path, "-o", tmp_path, "--png", "--dry-run"]
+    arguments += ["--no-reproject", "--output-cfg", made]
+    run_in_process("reproject.py", *arguments, "--rotation", "-1e-05,2,-3", "--exposure", "-1e-05")
     done = read_json(made)["reprojection"]
     assert (done["rotation"], done["exposure"]) == ([-1e-05, 2, -3], -1e-05)
 
@@ -198,20 +200,22 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
         ("package.py", "--gigabytes", ["0", "-1e-05", "nan", "inf"]),
     ],
 )
-def test_a_number_that_would_spoil_all_is_refused(refused, program, flag, values):
+def test_a_number_that_would_spoil_everything_is_refused(refused, program, flag, values):
     for value in values:
         said = refused(program, flag, value)
         assert said.startswith(f"argument {flag}: is ")
         assert "; must be " in said
 
 
-def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
+def test_no_program_overwrites_its_input(refused, lightfield, tmp_path):
     views = tmp_path / "exr"
     write_text(views / "view_0000f.exr", "rendered in an hour")
     write_text(views / "view_0000f.png", "rendered in an hour")
     folder = ["--input-cfg", lightfield]
     (tmp_path / "link").symlink_to(views)
     lens = ["--rectilinear", "18,36"]
+    link = tmp_path / "link"
+    exr_views = ["-i", views, "--filter-suffix", "exr"]
     exr = [
         *folder,
         "--image-dir",
@@ -225,7 +229,7 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
     for said in (
         refused("synthesize.py", tmp_path, "--output", views / ".."),
         refused("synthesize.py", views, "--poses", lightfield, "--output", tmp_path),
-        refused("reproject.py", "-i", views, *folder, *lens, "-o", tmp_path / "link", "--exr"),
+        refused("reproject.py", *exr_views, *folder, *lens, "-o", link, "--exr"),
         refused(
             "reproject.py",
             "--single",
@@ -254,20 +258,20 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
         refused("export_instant_ngp.py", *png, "--depth-dir", tmp_path / "link"),
         refused("export_instant_ngp.py", *folder, "--output", lightfield),
     ):
-        assert "read" in said, said
+        assert "is an input" in said or "replace the input" in said, said
     assert {path.read_text() for path in views.iterdir()} == {"rendered in an hour"}
     assert LightField.read(lightfield).views
     assert not (tmp_path / "made").exists()
 
 
-def test_a_rig_that_is_none_is_named_by_its_file(refused, lightfield, tmp_path):
+def test_an_invalid_rig_is_named_by_its_file(refused, lightfield, tmp_path):
     write_text(tmp_path / "rig.yaml", "scenes: [garden]")
-    words = ["--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
-    said = refused("synthesize.py", lightfield.parent, *words)
+    arguments = ["--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
+    said = refused("synthesize.py", lightfield.parent, *arguments)
     assert said == f"{tmp_path}/rig.yaml: is missing the key type"
 
 
-def test_splits_are_listed_by_whatever_path_they_are_named(
+def test_splits_are_listed_for_any_path_to_a_dataset(
     run_in_process, refused, lightfield, tmp_path, monkeypatch
 ):
     rig = tmp_path / "Rig"
@@ -277,14 +281,14 @@ def test_splits_are_listed_by_whatever_path_they_are_named(
     content["frames"][0]["split"] = "test"
     write_json(rig / "lightfield.json", content)
     output, read = tmp_path / "splits.json", rig / "lightfield.json"
-    for folder, words in (
+    for folder, arguments in (
         (rig, ["lightfield.json", "--output", "../splits.json"]),
         (rig, ["../Rig/./lightfield.json", "--output", output]),
         (tmp_path, [read, "--output", "splits.json"]),
         (tmp_path, ["Rig/lightfield.json", "--output", "./splits.json"]),
     ):
         monkeypatch.chdir(folder)
-        run_in_process("splits.py", *words)
+        run_in_process("splits.py", *arguments)
         assert read_json(output)["test"] == ["Rig/view_0000f"]
         output.unlink()
     said = refused("splits.py", read, "--output", rig / "x/splits.json")
@@ -298,8 +302,8 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
     for folder in (kept, lost):
         write_text(folder / "report/index.html", "<p>")
     lightfield.rename(kept / "lightfield.json")
-    words = ["--results", tmp_path / "results", "--output", tmp_path / "results/index.html"]
-    run_in_process("report_index.py", *words)
+    arguments = ["--results", tmp_path / "results", "--output", tmp_path / "results/index.html"]
+    run_in_process("report_index.py", *arguments)
     text = (tmp_path / "results/index.html").read_text()
     assert "a/Kept/report/index.html" in text
     assert "Lost" not in text
@@ -308,36 +312,48 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
 
 
 @pytest.mark.parametrize("within", [True, False])
-def test_views_are_compared_with_their_record_by_whatever_path(
-    refused, lightfield, tmp_path, within
-):
+def test_views_are_compared_with_their_record_for_any_path(refused, lightfield, tmp_path, within):
     view = tmp_path / "dataset/exr/view_0000f.exr"
     images.write_exr(view, dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
     sums = {"bytes": view.stat().st_size, "sha256": "0" * 64}
     write_json(tmp_path / "record.json", {"files": {"exr/view_0000f.exr": sums}})
-    words = ["--input-cfg", lightfield, "--source-record", tmp_path / "record.json", "--exr"]
-    words += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
+    arguments = ["--input-cfg", lightfield, "--source-record", tmp_path / "record.json", "--exr"]
+    arguments += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
     place = "." if within else view.parent
-    said = refused("reproject.py", "-i", place, *words, folder=view.parent)
+    said = refused("reproject.py", "-i", place, *arguments, folder=view.parent)
     assert "view_0000f.exr: is not as it was written" in said
 
 
 def test_a_record_of_another_kind_is_named_once(refused, lightfield, tmp_path, capsys):
     write_json(tmp_path / "record.json", [])
-    words = ["-i", tmp_path, "--input-cfg", lightfield, "--source-record", tmp_path / "record.json"]
-    said = refused("reproject.py", *words, "--no-reproject", "--exr", "-o", tmp_path / "made")
+    arguments = [
+        "-i",
+        tmp_path,
+        "--input-cfg",
+        lightfield,
+        "--source-record",
+        tmp_path / "record.json",
+    ]
+    said = refused("reproject.py", *arguments, "--no-reproject", "--exr", "-o", tmp_path / "made")
     assert said == f"{tmp_path}/record.json: files: must map paths to bytes and sha256"
     assert not capsys.readouterr().err
 
 
-def test_a_list_elsewhere_is_refused(refused, tmp_path):
+def test_a_list_outside_its_folder_is_refused(refused, tmp_path):
     write_json(tmp_path / "0-6.json", {"files": {}})
-    words = ["--store", tmp_path, "--results", tmp_path / "results", "--work", tmp_path / "work"]
-    said = refused("take_views.py", tmp_path / "0-6.json", *words)
+    arguments = [
+        "--store",
+        tmp_path,
+        "--results",
+        tmp_path / "results",
+        "--work",
+        tmp_path / "work",
+    ]
+    said = refused("take_views.py", tmp_path / "0-6.json", *arguments)
     assert said == f"{tmp_path}/0-6.json: must be in {tmp_path}/work"
 
 
-def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
+def test_the_current_folder_has_its_own_name(tmp_path, monkeypatch):
     (tmp_path / "scene/rig/exr").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "scene/rig/exr")
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
@@ -345,7 +361,7 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
         assert Integrity(path, tmp_path)._name == "scene/rig"
 
 
-def test_an_image_is_no_text(refused, tmp_path):
+def test_an_image_is_refused_as_text(refused, tmp_path):
     other = tmp_path / "view.exr"
     other.write_bytes(bytes([0x76, 0x2F, 0x31, 0x01, 0x80]))
     said = refused("splits.py", other, "--output", tmp_path / "splits.json")
@@ -369,7 +385,7 @@ def test_a_table_of_another_kind_is_named(tmp_path, name, read, column):
             read([path])
 
 
-def test_slopes_that_are_no_numbers_are_named(tmp_path):
+def test_slopes_that_are_not_numbers_are_named(tmp_path):
     path = tmp_path / "error_vs_time/scene.json"
     write_json(path, {"slopes": {"plain": {"over_time": {"slope": "steep"}}}})
     with pytest.raises(UserError, match=r"scene.json: slopes: is not what"):
@@ -383,22 +399,22 @@ def test_costs_of_another_kind_are_named(tmp_path, content):
         tables.costs(tmp_path / "costs.json")
 
 
-def test_an_index_of_no_folder_is_refused(refused, tmp_path):
-    words = ["--results", tmp_path / "none", "--output", tmp_path / "index.html"]
-    assert refused("report_index.py", *words) == f"{tmp_path}/none: no such folder"
+def test_an_index_of_a_missing_folder_is_refused(refused, tmp_path):
+    arguments = ["--results", tmp_path / "none", "--output", tmp_path / "index.html"]
+    assert refused("report_index.py", *arguments) == f"{tmp_path}/none: no such folder"
     assert not [*tmp_path.iterdir()]
 
 
-def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
+def test_a_lens_from_a_missing_blend_is_refused(refused, lightfield, tmp_path):
     camera = '{"lens": "file", "resolution": [8, 8]}'
     write_text(tmp_path / "flat.json", f'{{"camera": {camera}, "formats": ["exr"]}}')
-    words = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
-    said = refused("reproject.py", *words, "--settings", tmp_path / "flat.json")
+    arguments = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
+    said = refused("reproject.py", *arguments, "--settings", tmp_path / "flat.json")
     assert said == f"{tmp_path}/flat.json: camera.lens: file goes with a rig of type blend_camera"
     rig = '{"type": "plane", "cameras": [1, 1], "size": 1, "camera": ' + camera + "}"
     write_text(tmp_path / "rig.yaml", rig)
-    words = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
-    assert "lens: is file" in refused("synthesize.py", *words)
+    arguments = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
+    assert "lens: is file" in refused("synthesize.py", *arguments)
 
 
 def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
@@ -406,10 +422,10 @@ def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
     figures, page = (tmp_path / name for name in ("figures.json", "page.json"))
     write_json(figures, {"rig": rig})
     write_json(page, {"rig": rig, "yaml": "scene: {}", "command": "c"})
-    words = ["--dataset", tmp_path, "--output", tmp_path / "made", "--settings"]
+    arguments = ["--dataset", tmp_path, "--output", tmp_path / "made", "--settings"]
     why = f"{lightfield}: frames: are 1, but its rig has 25"
-    assert refused("report_figures.py", *words, figures) == why
-    assert refused("report_html.py", *words, page, "--name", "a/b") == why
+    assert refused("report_figures.py", *arguments, figures) == why
+    assert refused("report_html.py", *arguments, page, "--name", "a/b") == why
     assert not (tmp_path / "made").exists()
 
 
@@ -417,10 +433,10 @@ def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
     ("output", "why"),
     [("../rig.json", "must end in .tar; .json lies beside it"), ("./rig.tar", "must not be in")],
 )
-def test_a_package_is_no_list_and_not_in_itself(refused, lightfield, tmp_path, output, why):
+def test_a_package_must_be_an_archive_outside_itself(refused, lightfield, tmp_path, output, why):
     rig = tmp_path / "rig"
     rig.mkdir()
     lightfield.rename(rig / "lightfield.json")
-    words = ["--scene", "smoke", "--folder", rig, "--output", rig / output]
-    assert why in refused("package.py", *words)
+    arguments = ["--scene", "smoke", "--folder", rig, "--output", rig / output]
+    assert why in refused("package.py", *arguments)
     assert [path.name for path in tmp_path.rglob("*.*")] == ["lightfield.json"]

@@ -1,4 +1,4 @@
-"""A target error instead of a sample count: what is chosen, whether it holds, and for good."""
+"""A target error instead of samples: the choice, its confirmation, and where it is used."""
 
 import json
 import re
@@ -35,7 +35,7 @@ ASKED = ("--config", "scenes=[aimed]", "rigs=all", "preset=full")
 
 @pytest.fixture(scope="module")
 def room_probes(tmp_path_factory, run_program, room):
-    """What scripts/calibrate.py is given: the room, its inventory, and cameras in it."""
+    """Return a function for the arguments of scripts/calibrate.py: room, inventory and cameras."""
     folder = tmp_path_factory.mktemp("probes")
     made = LightField.from_rig(RIG, lenses.from_camera(CAMERA), depth="z", frame=1)
     run_program("inventory.py", "--blend", room, "--output", folder / "inventory.json")
@@ -50,18 +50,18 @@ def room_probes(tmp_path_factory, run_program, room):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory, run_program, room_probes):
-    """Calibrate the room, in a folder of its own each time."""
+    """Return a function that calibrates the room, each time in a new folder."""
 
     def run(target, *more, **limits):
         folder = tmp_path_factory.mktemp("calibrated")
-        told = run_program(
+        result = run_program(
             "calibrate.py",
             *room_probes(target_error=target, **limits),
             *("--probes", "4", "--size", "24", "--device", "cpu", "--cache", folder / "cache"),
             *("--output", folder / "record.json", "--seconds", folder / "seconds.json"),
             *more,
         )
-        return folder, told
+        return folder, result
 
     return run
 
@@ -72,21 +72,21 @@ def once(calibrated):
 
 
 def test_other_views_confirm_the_choice(once):
-    folder, told = once
+    folder, result = once
     record = json.loads((folder / "record.json").read_text())
     assert record["reached"] and record["confirmed"]
     assert abs(record["held_out_error"] / TARGET - 1) < 0.2
     assert not set(record["probes"]) & {entry["probe"] for entry in record["held_out"]}
     assert set(record["choice"]) == {"samples", "adaptive_threshold", "denoise"}
-    assert "warning" not in told.stderr
-    # Evidence: no candidate that reaches the target is cheaper.
+    assert "warning" not in result.stderr
+    # No candidate that reaches the target is cheaper.
     good = [c for c in record["candidates"] if c["error"] <= TARGET * 1.05]
     assert min(c["cost"] for c in good) == record["cost_samples"]
     assert max(record["references"]["own_error"]) < TARGET / 4
-    # In a room of diffuse walls that is the error of nearly all pixels.
+    # The room's walls are diffuse, so nearly all pixels have this error.
     reached = record["strata"]["diffuse"]
     assert reached["area"] > 0.5 and reached["error"] == pytest.approx(TARGET, rel=0.5)
-    assert f"most of: diffuse {reached['error']:.2g}" in told.stdout
+    assert f"most of: diffuse {reached['error']:.2g}" in result.stdout
     seconds = json.loads((folder / "seconds.json").read_text())
     assert len(seconds["candidates"]) == len(record["candidates"])
 
@@ -98,12 +98,12 @@ def test_the_choice_is_the_same_to_the_byte_on_other_threads(once, calibrated):
 
 
 def test_a_preset_limits_the_choice(calibrated):
-    folder, told = calibrated(0.01, most_samples=4, denoise=False)
+    folder, result = calibrated(0.01, most_samples=4, denoise=False)
     record = json.loads((folder / "record.json").read_text())
     assert record["choice"]["samples"] <= 4
     assert record["choice"]["denoise"] is False
     assert not record["reached"]
-    assert "warning: render.target_error: 0.01 is not reached within the preset's" in told.stderr
+    assert "warning: render.target_error: 0.01 is not reached within the preset's" in result.stderr
 
 
 def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
@@ -117,20 +117,22 @@ def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
-    told = snakemake(
+def test_a_dry_run_forecasts_the_cost_of_a_calibration(tmp_path):
+    result = snakemake(
         checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
     )
-    table = told.stdout.split("to render")[1]
-    # 16 windows of 24²: two references of 256 samples, which suffice for 50, 85 plain ones and 125
-    # others, 6 µs each; 41 renders of 70 ms; and a start.
-    assert re.search(r"^calibration of aimed +89 s +$", table, re.M), table
+    table = result.stdout.split("phase")[1]
+    # 16 windows of 24² pixels, 6 µs a sample: two references of 256 samples, 85 samples of plain
+    # path tracing, and 125 of the search. Add 70 ms for each of 41 renders, and
+    # two starts, one of them to choose the views.
+    assert re.search(r"^calibration +2 +92 s$", table, re.M), table
 
 
 def simulated(whole_error, bias=0.0):
-    """Plain path tracing of error 1/N, 8/N of all pixels, and other methods of half that error.
+    """Simulate renders: plain path tracing has the error 1/N, and 8/N over all pixels.
 
-    Those leave ``whole_error`` in all pixels, and ``bias`` in most, however much effort they take.
+    Other methods have half that error plus ``bias``. Their error over all pixels is
+    ``whole_error``, at any effort.
     """
 
     def measure(method):
@@ -138,36 +140,36 @@ def simulated(whole_error, bias=0.0):
         samples = min(settings["samples"], 1 / (settings["adaptive_threshold"] or 1e-4))
         is_plain = method.name == "plain"
         error = 1 / samples if is_plain else bias + 0.5 / samples
-        whole = 8 / samples if is_plain else whole_error
-        return Candidate(method.name, settings, samples, samples, error, whole, 1.0)
+        error_of_all_pixels = 8 / samples if is_plain else whole_error
+        return Candidate(method.name, settings, samples, samples, error, error_of_all_pixels, 1.0)
 
     return measure
 
 
 @pytest.mark.parametrize(("whole_error", "way"), [(0.1, "denoised"), (1.0, "plain")])
-def test_what_hides_fireflies_is_not_chosen(whole_error, way):
+def test_a_method_that_hides_fireflies_is_not_chosen(whole_error, way):
     search = Search(simulated(whole_error), TARGET)
-    # That of plain path tracing at the target, of 50 samples, is 8 / 50.
+    # Plain path tracing reaches the target with 50 samples, where all pixels have 8 / 50.
     assert search.most_whole_error == pytest.approx(2 * 8 / 50)
     choice = search.choose()
     assert choice.way == way and search.reaches(choice)
 
 
 @pytest.mark.parametrize("bias", [2 * TARGET, 1e6])
-def test_a_way_whose_bias_is_above_the_target_is_given_up(bias):
+def test_a_method_with_too_much_bias_is_given_up(bias):
     search = Search(simulated(0.0, bias), TARGET, denoise=True)
     assert search.choose().error > TARGET
     assert max(entry.settings["samples"] for entry in search.measured) <= 4096
 
 
-def test_effort_follows_from_what_lies_on_both_sides_of_the_target():
-    # A power law of slope −½ between the points, and 1/N beyond the last.
+def test_effort_is_interpolated_between_the_nearest_points():
+    # A power law with slope −½ between the points, and 1/N beyond the last.
     points = [(1, 0.8), (4, 0.4), (16, 0.2)]
     assert effort_for(0.4, points) == pytest.approx(4)
     assert effort_for(0.2828427, points) == pytest.approx(8)
     assert effort_for(0.1, points) == pytest.approx(32)
     assert effort_for(0.9, points) == 1
-    # What is far below the reference's own error may be measured as less than nothing.
+    # An error far below the reference's own may be measured as below 0.
     assert 1 < effort_for(0.4, [(1, 0.8), (2, -0.001)]) < 2
 
 
@@ -186,7 +188,7 @@ def test_only_a_scene_with_a_target_is_calibrated(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_was_chosen_is_what_is_rendered_and_shards_stay(tmp_path):
+def test_views_are_rendered_with_the_choice_in_unchanged_shards(tmp_path):
     folder = checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.05"))
     record = folder / "work/aimed/calibration.json"
     record.parent.mkdir(parents=True)
@@ -221,7 +223,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
         return config.read_scene(path)
 
     assert read("target_error: 0.01").render.target_error == 0.01
-    for render, told in {
+    for render, message in {
         "seed: 1": "render: is missing the key samples (or target_error)",
         "samples: 4, target_error: 0.1": "render.samples: does not go with target_error",
         "denoise: true, target_error: 0.1": "render.denoise: does not go with target_error",
@@ -230,7 +232,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
     }.items():
         with pytest.raises(UserError) as caught:
             read(render)
-        assert told in str(caught.value)
+        assert message in str(caught.value)
 
 
 def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):

@@ -1,4 +1,4 @@
-"""The configuration: what is right is resolved, what is wrong is told in one line."""
+"""The configuration: valid settings are resolved, and invalid ones end in one line."""
 
 import json
 import re
@@ -12,9 +12,8 @@ import pytest
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
-import schema
 from lightfield.core.errors import UserError
-from lightfield.dataset import config
+from lightfield.dataset import config, json_schema
 from lightfield.dataset.config import Preset
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.geometry.rigs import as_written
@@ -111,7 +110,7 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
     assert near.camera == far.camera
 
 
-def test_an_export_of_one_rigs_views_takes_no_heed_of_the_others(tmp_path):
+def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     content = changed("reprojections.same", {"rigs": ["LFSphere"]})
     content["rigs"]["LFSphere"]["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
     content["exports"]["colmap"] = {"sources": ["same"]}
@@ -158,17 +157,17 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
     content = changed("rigs.LFSphere.camera", camera)
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(config, "SCENES", tmp_path)
-    whole = (Preset(), (36, 24), (3000, 2000))
-    for limits, size, resolution in (whole, (Preset(resolution=65), 36, (64, 42))):
+    without_preset = (Preset(), (36, 24), (3000, 2000))
+    for limits, size, resolution in (without_preset, (Preset(resolution=65), 36, (64, 42))):
         datasets = scene_datasets("right", limits=limits)
         (rig,) = [dataset.rig for dataset in datasets if dataset.rig_name == "LFSphere"]
         assert rig.camera.sensor_size == size
         assert rig.camera.resolution == resolution
-        # As far from the middle, in degrees.
+        # The angles from the middle in degrees.
         x, y = np.subtract(rig.camera.principal_point, np.divide(resolution, 2))
         assert (x, y) == pytest.approx((15 * resolution[0] / 3000, -30 * resolution[0] / 3000))
         assert rig.camera.make().has_square_pixels
-    # What is not written stays so.
+    # Keys that the preset does not write stay.
     cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))
     assert "sensor_size" not in str(as_written(cuboid.placed_rig))
     assert "sensor_size" not in sphere.reprojections["perspective"].settings.as_json()["camera"]
@@ -211,14 +210,14 @@ def test_every_scene_of_the_repository_is_right():
         config.read_scene(path)
 
 
-@pytest.mark.parametrize("name", schema.MODELS)
-def test_the_schemas_for_editors_say_what_the_models_say(name):
-    path = schema.FOLDER / f"{name}.schema.json"
-    assert path.read_text() == schema.schema(name), "run scripts/schema.py"
+@pytest.mark.parametrize("name", json_schema.MODELS)
+def test_the_schemas_for_editors_match_the_models(name):
+    path = config.ROOT / "configs/schema" / f"{name}.schema.json"
+    assert path.read_text() == json_schema.schema(name), "run scripts/schema.py"
 
 
-def test_editors_take_every_scene_and_find_its_mistakes():
-    validator = jsonschema.Draft202012Validator(json.loads(schema.schema("scene")))
+def test_the_schemas_accept_every_scene_and_find_its_mistakes():
+    validator = jsonschema.Draft202012Validator(json.loads(json_schema.schema("scene")))
     for path in config.SCENES.glob("*.yaml"):
         validator.validate(yaml.safe_load(path.read_text()))
     for path, value in (
@@ -231,7 +230,7 @@ def test_editors_take_every_scene_and_find_its_mistakes():
         assert not validator.is_valid(changed(path, value)), path
 
 
-def test_a_bare_word_is_a_list_of_one():
+def test_a_single_word_becomes_a_list():
     content = {"preset": "full", "presets": {"full": {}}, "scenes": "artist"}
     assert config.load_config(content).scenes == ["artist"]
     assert config.load_config(content).rigs == "all"
@@ -289,14 +288,14 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
         check=False,
     )
     assert result.returncode != 0
-    told = [line for line in result.stderr.splitlines() if "error" in line.lower()]
-    assert len(told) == 1
-    assert expected in told[0]
+    errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]
+    assert len(errors) == 1
+    assert expected in errors[0]
     assert "Traceback" not in result.stderr
     assert "rule " not in result.stdout + result.stderr
 
 
-def test_no_two_scenes_have_one_folder(tmp_path, monkeypatch):
+def test_no_two_scenes_may_share_a_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(config, "SCENES", tmp_path)
     for name in ("room", "room_tiny"):
         (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(RIGHT))

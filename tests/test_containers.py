@@ -1,4 +1,4 @@
-"""Jobs in containers: with Snakemake's --sdm apptainer each runs with the image's own Python."""
+"""Jobs in containers: with Snakemake's --sdm apptainer, each job runs with the image's Python."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 from checkouts import checkout
 
 TARGET = "results/smoke/LFPlane_3x2_equisolid/lightfield.json"
-# In Apptainer's place: an image that has a folder of programs, of which it takes no other.
+# Stands in for Apptainer: an image is a folder of programs, and only these can run.
 APPTAINER = """#!/bin/sh
 case "$1" in
 --version) echo "apptainer version 1.4.5"; exit ;;

@@ -1,4 +1,4 @@
-"""What a dataset has cost: added up from journals and TSVs, and extrapolated to the full one."""
+"""The costs of a dataset: added up from journals and TSVs, and extrapolated to the full one."""
 
 import json
 import math
@@ -52,7 +52,7 @@ def end(at, wall, cpu, memory):
     }
 
 
-# Killed after two of three views, the second of which was then lost and made again.
+# Killed after two of three views. The second view was then lost, and rendered again.
 KILLED = [
     *start(1000.0),
     view("a", 1012.0, wall=10.0, traced=6.0, cpu=10.0),
@@ -68,7 +68,7 @@ RESUMED = [
 
 @pytest.fixture
 def dataset(tmp_path, run_program):
-    """A dataset of three views of 8 x 4 pixels with the journals and TSVs of its jobs."""
+    """A dataset of three views of 8 × 4 pixels with the journals and TSVs of its jobs."""
     folder, work = tmp_path / "results", tmp_path / "work"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [8, 4]})
     render = {"samples": 2, "denoise": False}
@@ -81,10 +81,10 @@ def dataset(tmp_path, run_program):
     (work / "scene.blend").write_bytes(b"x" * 5000)
     for path, row in {
         "scene/build_scene.tsv": "4.0\t0:00:04\t200.0\t0\t0\t0\t0\t0\t50\t3.0",
-        # Too short for Snakemake to look at it.
+        # The job was too short for Snakemake to measure it.
         "rig/flat/0-3.tsv": "0.4\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\tNA\tNA",
         "rig/flat/lens_map.tsv": "2.0\t0:00:02\t50.0\t0\t0\t0\t0\t0\t50\t1.0",
-        # Of the last run alone, and so not counted: the journal tells of both.
+        # This TSV has the last run alone, so it does not count. The journal has both runs.
         "rig/render/0-3.tsv": "21.0\t0:00:21\t700.0\t0\t0\t0\t0\t0\t50\t19.0",
     }.items():
         (work / path).parent.mkdir(parents=True, exist_ok=True)
@@ -93,13 +93,13 @@ def dataset(tmp_path, run_program):
     def count(*lines, full=None, inventory=None):
         journals = work / "journals"
         journals.mkdir(exist_ok=True)
-        # A user's copy is of no shard.
+        # This copy by the user belongs to no shard.
         (journals / "kept.journal.jsonl").write_text("{}\n")
         (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
-        words = []
+        arguments = []
         if inventory:
             (work / "inventory.json").write_text(json.dumps(inventory))
-            words = ["--inventory", work / "inventory.json"]
+            arguments = ["--inventory", work / "inventory.json"]
         settings = {"energy": TARIFF, "full": FULL | (full or {}), "reprojections": ["flat"]}
         (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
@@ -108,7 +108,7 @@ def dataset(tmp_path, run_program):
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
             *("--settings", tmp_path / "settings.json"),
             *("--output", tmp_path / "costs.json"),
-            *words,
+            *arguments,
         )
         return json.loads((tmp_path / "costs.json").read_text())
 
@@ -123,9 +123,9 @@ def test_the_papers_energy_and_price_follow_from_its_days_and_watts():
     assert round(tariff.price(kwh)) == 46
 
 
-def test_all_time_that_was_spent_counts_and_what_was_spent_again_is_told(dataset):
-    found = dataset(*KILLED, *RESUMED)
-    (shard,) = found["shards"]
+def test_all_time_counts_and_repeated_time_is_reported(dataset):
+    costs_content = dataset(*KILLED, *RESUMED)
+    (shard,) = costs_content["shards"]
     assert shard["shard"] == "0-3"
     assert (shard["views"], shard["views_rendered"]) == (3, 4)
     assert (shard["runs"], shard["killed_runs"]) == (2, 1)
@@ -134,15 +134,15 @@ def test_all_time_that_was_spent_counts_and_what_was_spent_again_is_told(dataset
     assert shard["peak_memory_bytes"] == 700
     assert shard["path_tracing_seconds"] == 6 + 8 + 4 + 9
     assert shard["overhead_seconds"] == 43 - 27
-    # View b's first rendering, and the second start.
+    # The first rendering of view b, and the second start.
     assert shard["repeated_seconds"] == 10 + 2
     for key in ("path_tracing_seconds", "overhead_seconds", "repeated_seconds"):
-        assert found[key] == shard[key]
+        assert costs_content[key] == shard[key]
 
 
 def test_each_stage_has_its_jobs_times_and_bytes(dataset):
-    found = dataset(*KILLED, *RESUMED)
-    stages = {stage.pop("stage"): stage for stage in found["stages"]}
+    costs_content = dataset(*KILLED, *RESUMED)
+    stages = {stage.pop("stage"): stage for stage in costs_content["stages"]}
     assert list(stages) == ["scene", "render", "flat"]
     assert stages["scene"] == {
         "jobs": 1,
@@ -159,10 +159,10 @@ def test_each_stage_has_its_jobs_times_and_bytes(dataset):
         "bytes": 70,
     }
     assert (stages["render"]["wall_seconds"], stages["render"]["bytes"]) == (43, 300)
-    # 100 W times the part of four cores that was busy.
+    # 100 W times the busy part of four cores.
     seconds = (3.0 + 40.5 + 1.4) / 4
-    assert found["energy_kwh"] == pytest.approx(100 * seconds / 3600 / 1000)
-    assert found["price"] == pytest.approx(0.5 * found["energy_kwh"])
+    assert costs_content["energy_kwh"] == pytest.approx(100 * seconds / 3600 / 1000)
+    assert costs_content["price"] == pytest.approx(0.5 * costs_content["energy_kwh"])
 
 
 def test_a_graphics_card_takes_the_whole_machine(dataset):
@@ -171,51 +171,55 @@ def test_a_graphics_card_takes_the_whole_machine(dataset):
         view("a", 12.0, wall=10.0, traced=9.0, cpu=1.0),
         end(12.0, wall=12.0, cpu=2.0, memory=1),
     ]
-    found = dataset(*lines)
-    assert found["device"] == "GPU"
-    assert found["energy_kwh"] == pytest.approx(100 * (12 + 4.4 / 4) / 3.6e6)
+    costs_content = dataset(*lines)
+    assert costs_content["device"] == "GPU"
+    assert costs_content["energy_kwh"] == pytest.approx(100 * (12 + 4.4 / 4) / 3.6e6)
 
 
 def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dataset):
     traced = [4.0, 5.0, 6.0, 5.0]
     lines = start(0.0)
-    # The first prepares the scene, and tells nothing of the others.
+    # The first view prepares the scene, so it does not represent the others.
     for name, seconds in zip("zabcd", [50.0, *traced], strict=True):
         lines.append(view(name, 10.0, wall=seconds + 1, traced=seconds, cpu=seconds + 1))
     full = {"views": 40, "resolution": [16, 8], "samples": 20}
-    found = dataset(*lines, full=full)["extrapolation"]
-    assert (found["views"], found["resolution"], found["samples"]) == (40, [16, 8], 20)
-    # Four times the pixels, ten times the samples; beside it, once a pixel, the second that
-    # each view took more, and of the jobs those of the reprojection for three views.
+    extrapolation = dataset(*lines, full=full)["extrapolation"]
+    assert (extrapolation["views"], extrapolation["resolution"], extrapolation["samples"]) == (
+        40,
+        [16, 8],
+        20,
+    )
+    # Four times the pixels, ten times the samples. In proportion to pixels: the second that each
+    # view took beside path tracing, and the reprojection's jobs for three views.
     path_tracing = 40 * statistics.mean(traced) * 40
     each = 40 * (1.0 + 1.4 / 3) * 4
     once = 1.0 + 1.0 + 3.0
-    assert found["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
-    # Of the mean of 4 out of 40.
+    assert extrapolation["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
+    # The standard error of a mean of 4 out of 40 views.
     error = statistics.stdev(traced) / 2 * math.sqrt(1 - 4 / 40)
-    assert found["core_hours_uncertainty"] == pytest.approx(error * 40 * 40 / 3600)
-    kwh = found["core_hours"] / 4 * 0.1
-    assert found["energy_kwh"] == pytest.approx(kwh)
-    assert found["price_uncertainty"] / found["price"] == pytest.approx(
-        found["core_hours_uncertainty"] / found["core_hours"]
+    assert extrapolation["core_hours_uncertainty"] == pytest.approx(error * 40 * 40 / 3600)
+    kwh = extrapolation["core_hours"] / 4 * 0.1
+    assert extrapolation["energy_kwh"] == pytest.approx(kwh)
+    assert extrapolation["price_uncertainty"] / extrapolation["price"] == pytest.approx(
+        extrapolation["core_hours_uncertainty"] / extrapolation["core_hours"]
     )
-    assert found["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
-    assert "4 views: 8 × 4 pixels, 2 samples" in found["basis"]
-    # What it says of itself follows from this build alone.
-    assert "40 times the path tracing" in found["basis"]
+    assert extrapolation["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
+    assert "4 views: 8 × 4 pixels, 2 samples" in extrapolation["basis"]
+    # The description follows from this build alone.
+    assert "40 times the path tracing" in extrapolation["basis"]
     same = dataset(*lines)["extrapolation"]["basis"]
     assert "times the path tracing" not in same
-    assert not re.search(r"\d\.\d", found["basis"] + same)
+    assert not re.search(r"\d\.\d", extrapolation["basis"] + same)
 
 
-def test_samples_that_the_file_has_are_those_of_the_full_dataset(dataset):
+def test_the_full_dataset_defaults_to_the_samples_of_the_blend(dataset):
     inventory = {"blend": {"samples": 6}}
     content = dataset(*KILLED, *RESUMED, full={"samples": "file"}, inventory=inventory)
     assert content["extrapolation"]["samples"] == 6
 
 
-def test_what_other_programs_took_is_no_part_of_a_views_path_tracing():
-    # The machine was shared: of 20 s wall time the process had 10, on one thread.
+def test_other_programs_do_not_count_as_path_tracing():
+    # Other programs used the machine too: of 20 s of wall time the process had 10, on one thread.
     lines = [*start(0.0), view("a", 20.0, wall=20.0, traced=16.0, cpu=10.0)]
     part = journal.Run(lines[0] | lines[1], [lines[2]])
     (rendering,) = costs.renderings(part)
@@ -223,10 +227,10 @@ def test_what_other_programs_took_is_no_part_of_a_views_path_tracing():
     assert rendering.rest == pytest.approx(2.0)
 
 
-def test_views_kept_without_their_journals_cost_nothing_that_is_known(dataset):
-    found = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
-    assert found["extrapolation"] is None
-    assert found["shards"][0]["views_rendered"] == 0
+def test_views_without_journals_have_no_known_cost(dataset):
+    costs_content = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
+    assert costs_content["extrapolation"] is None
+    assert costs_content["shards"][0]["views_rendered"] == 0
 
 
 def test_denoising_counts_as_three_samples(dataset):
@@ -235,7 +239,7 @@ def test_denoising_counts_as_three_samples(dataset):
         dataset(*lines, full={"denoise": denoise})["extrapolation"]["core_hours"]
         for denoise in (False, True)
     )
-    # 3 views of 5 s and 2 samples.
+    # 3 views of 5 s with 2 samples.
     assert denoised - plain == pytest.approx(3 * 5.0 * 3 / 2 / 3600)
 
 
@@ -247,11 +251,11 @@ def test_a_line_that_a_kill_cut_short_is_left_out(tmp_path):
     assert part.end is None
 
 
-def test_a_processes_peak_memory_is_in_bytes(tmp_path):
+def test_a_processs_peak_memory_is_in_bytes(tmp_path):
     file = tmp_path / "0-1.journal.jsonl"
     log = journal.Journal(file)
     now = psutil.Process().memory_info().rss
     log.end()
     (run,) = journal.read(file)
-    # The system counts a little behind; a peak is never below what is held now.
+    # The system's figure lags a little. A peak is never below the memory in use now.
     assert 0.9 * now < run.peak_memory_bytes < psutil.virtual_memory().total

@@ -56,7 +56,7 @@ def test_no_distance_where_a_z_depth_says_nothing() -> None:
     for level in (0.0, -0.0):
         assert np.isnan(distance_from_z(np.array(2.0), np.array([1.0, 0, level])))
     assert np.isnan(distance_from_z(np.array(2.0), behind))
-    # However little the point lies on the other side; in the camera itself it is no distance away.
+    # This holds even for a point just behind the plane. In the camera itself, the distance is 0.
     for z, ray in ((-2.0, ahead), (-0.5, ahead), (-1e-9, ahead), (0.5, behind), (1e-9, behind)):
         assert np.isnan(distance_from_z(np.array(z), ray))
     assert distance_from_z(np.array(0.0), ahead) == 0
@@ -64,26 +64,26 @@ def test_no_distance_where_a_z_depth_says_nothing() -> None:
     assert distance_from_z(np.array(-2.0), behind) == 2
 
 
-def test_half_depths_widen_to_the_rays() -> None:
+def test_half_depths_become_as_precise_as_the_rays() -> None:
     rays = np.array([[0, 0.6, -0.8]], np.float32)
     z = z_from_distance(np.array([65504], np.float16), rays)
     assert z.dtype == np.float32
     np.testing.assert_allclose(z, 65504 * 0.8, rtol=1e-6)
 
 
-def test_what_a_half_cannot_hold_is_as_far_as_a_miss() -> None:
-    found = with_precision(np.array([1e6, 2, -1e6], np.float32), "half")
-    assert found.dtype == np.float16
-    np.testing.assert_array_equal(found, [np.inf, 2, -np.inf])
+def test_depths_beyond_the_half_limit_become_misses() -> None:
+    stored_depth = with_precision(np.array([1e6, 2, -1e6], np.float32), "half")
+    assert stored_depth.dtype == np.float16
+    np.testing.assert_array_equal(stored_depth, [np.inf, 2, -np.inf])
 
 
 def test_rounded_depth_is_the_nearest_float_of_17_digits() -> None:
     depth = (10 ** np.random.default_rng(2).uniform(-6, 9, 1000)).astype(np.float32)
-    found = with_precision(depth, "rounded")
+    rounded = with_precision(depth, "rounded")
     mantissa, exponent = np.frexp(depth.astype(np.float64))
-    np.testing.assert_array_equal(found, np.ldexp(np.rint(mantissa * 2**17), exponent - 17))
-    assert found.dtype == np.float32 and with_precision(depth.astype("f8"), "float").dtype == "f4"
-    tie = np.float32(1 + 2.0**-17)  # midway between two floats of 17 digits, one of them even
+    np.testing.assert_array_equal(rounded, np.ldexp(np.rint(mantissa * 2**17), exponent - 17))
+    assert rounded.dtype == np.float32 and with_precision(depth.astype("f8"), "float").dtype == "f4"
+    tie = np.float32(1 + 2.0**-17)  # Midway between two floats of 17 digits, one of them even.
     odd = np.array([tie, np.inf, -np.inf, 0, -2.5], np.float32)
     np.testing.assert_array_equal(with_precision(odd, "rounded"), [1, np.inf, -np.inf, 0, -2.5])
     assert np.isnan(with_precision(np.array([0xFFFFFFFF], "u4").view("f4"), "rounded")).all()

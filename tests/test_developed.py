@@ -1,6 +1,6 @@
-"""Views as pictures: transparent ones, PNG of 8 and 16 bits, exposures, and the way back to light.
+"""Views as pictures: transparency, PNG of 8 and 16 bits, exposures, and the way back to light.
 
-The views are computed: a bright disk with a soft edge, before nothing.
+The views are computed: a bright disk with a soft edge before an empty background.
 """
 
 import json
@@ -27,7 +27,7 @@ COLOUR = np.array([0.9, 0.3, 0.05])
 
 
 def disk(lens):
-    """Return colour that is not associated (h, w, 3) and alpha (h, w) of what a lens sees."""
+    """Return the unassociated colour (h, w, 3) and the alpha (h, w) that a lens sees."""
     rays = lens.pixel_rays()
     angle = np.degrees(np.arccos(-rays[..., 2]))
     alpha = np.nan_to_num(np.clip((32 - angle) / 20, 0, 1))
@@ -51,7 +51,7 @@ def dataset(folder, camera=FISHEYE, transparent=True):
 
 @pytest.fixture
 def reproject(tmp_path, tmp_path_factory, run_program):
-    """Make a set of the dataset in tmp_path by a reprojection's YAML; return its folder."""
+    """Return a function that reprojects the dataset in tmp_path. It returns the new folder."""
 
     def run(name, **settings):
         content = Scene.model_validate(
@@ -63,7 +63,7 @@ def reproject(tmp_path, tmp_path_factory, run_program):
             }
         ).reprojections[name]
         folder = tmp_path / name
-        # Validation finds any file in the dataset's folder that is not of it.
+        # Validation finds files that do not belong to the dataset's folder.
         settings = tmp_path_factory.mktemp("settings") / f"{name}.json"
         write_json(settings, content.settings.as_json())
         run_program(
@@ -78,14 +78,14 @@ def reproject(tmp_path, tmp_path_factory, run_program):
 
 
 def read(path):
-    """Return an image's channels as (h, w, n) floats, R, G, B and perhaps A; integers up to 1."""
+    """Return R, G, B and perhaps A as (h, w, n) floats. Integers become 0 to 1."""
     channels = images.read_image(path).channels
     planes = np.stack([channels[name] for name in "RGBA" if name in channels], axis=-1)
     largest = np.iinfo(planes.dtype).max if planes.dtype.kind == "u" else 1
     return planes.astype(np.float64) / largest
 
 
-def test_alpha_goes_through_a_reprojection_and_is_associated_in_exr_alone(tmp_path, reproject):
+def test_reprojection_keeps_alpha_and_associates_it_in_exr_alone(tmp_path, reproject):
     dataset(tmp_path)
     exr = read(reproject("hdr", camera=PERSPECTIVE, format="exr") / "view_0000f.exr")
     png = read(reproject("png", camera=PERSPECTIVE) / "view_0000f.png")
@@ -95,7 +95,7 @@ def test_alpha_goes_through_a_reprojection_and_is_associated_in_exr_alone(tmp_pa
     np.testing.assert_allclose(exr[..., :3], colour * alpha[..., None], atol=0.05)
     np.testing.assert_allclose(png[..., 3], exr[..., 3], atol=0.5 / 255 + 1e-3)
     covered = alpha > 0.1
-    # Not associated: the disk's own colour up to its edge.
+    # Unassociated colour is the disk's own colour up to its edge.
     np.testing.assert_allclose(png[covered, :3], encode_srgb(colour[covered]), atol=0.01)
     assert not png[alpha == 0][:, 3].all()
     result = validate(tmp_path, ["hdr", "png"])
@@ -107,13 +107,13 @@ def test_transparent_views_are_rgba_to_trainers(tmp_path):
     source = SourceDataset(tmp_path, "", ".exr")
     folder = tmp_path / "nerf"
     nerf_synthetic.export(source, NerfSynthetic(sources=["views"]), folder)
-    found = read(next(folder.rglob("view_0000f.png")))
+    pixels = read(next(folder.rglob("view_0000f.png")))
     colour, alpha = disk(source.lens)
-    np.testing.assert_allclose(found[..., 3], alpha, atol=1 / 255)
+    np.testing.assert_allclose(pixels[..., 3], alpha, atol=1 / 255)
     covered = alpha > 0.1
-    np.testing.assert_allclose(found[covered, :3], encode_srgb(colour[covered]), atol=1.5 / 255)
+    np.testing.assert_allclose(pixels[covered, :3], encode_srgb(colour[covered]), atol=1.5 / 255)
     source.write_image(source.lightfield.views[1], folder / "one.png")
-    np.testing.assert_array_equal(read(folder / "one.png"), found)
+    np.testing.assert_array_equal(read(folder / "one.png"), pixels)
 
 
 def spoil(folder, alpha):
@@ -127,7 +127,7 @@ def test_validation_knows_alpha(tmp_path):
     spoil(tmp_path, {"A": np.full((SIZE, SIZE), 1.5, np.float16)})
     (problem,) = [text for check in validate(tmp_path).checks for text in check.problems]
     assert problem == "exr/view_0001f.exr: 2304 values of alpha are not between 0 and 1"
-    # A camera that sees nothing is none that is wrong.
+    # A camera that sees nothing is not wrong.
     spoil(tmp_path, dict.fromkeys("RGBA", np.zeros((SIZE, SIZE), np.float16)))
     assert validate(tmp_path).valid
     content.changed(render={}).write(tmp_path / "lightfield.json")
@@ -147,7 +147,10 @@ def test_a_png_of_the_views_themselves_can_be_undone(bits, exposure, reinhard, t
     assert images.read_image(folder / "view_0000f.png").channels["R"].dtype == f"uint{bits}"
     # The way back: sRGB, then v (1 + v / m²) / (1 + v) = t, then the stops.
     step = 0.5 / (2**bits - 1) + 1e-7
-    found, known = read(folder / "view_0000f.png")[..., :3], read(tmp_path / "exr/view_0000f.exr")
+    png_colour, exr_colour = (
+        read(folder / "view_0000f.png")[..., :3],
+        read(tmp_path / "exr/view_0000f.exr"),
+    )
 
     def light(encoded):
         t, m = decode_srgb(encoded.clip(0, 1)), made["reinhard"]
@@ -155,8 +158,8 @@ def test_a_png_of_the_views_themselves_can_be_undone(bits, exposure, reinhard, t
         v = t if m == 1 else (-root + np.sqrt(root**2 + 4 * m**2 * t)) / 2
         return v / 2 ** made["exposure"]
 
-    assert (light(found + step) >= known.clip(None, light(np.ones(1))) - 1e-6).all()
-    assert (light(found - step) <= known + 1e-6).all()
+    assert (light(png_colour + step) >= exr_colour.clip(None, light(np.ones(1))) - 1e-6).all()
+    assert (light(png_colour - step) <= exr_colour + 1e-6).all()
     assert validate(tmp_path, ["png"]).valid
 
 
@@ -170,13 +173,13 @@ def scene(**reprojection):
 
 
 def test_a_bracket_is_a_folder_for_each_exposure():
-    found = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).reprojections
-    assert {name: each.exposure for name, each in found.items()} == {
+    reprojections = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).reprojections
+    assert {name: each.exposure for name, each in reprojections.items()} == {
         "png_ev-2": -2.0,
         "png_ev0.5": 0.5,
         "png_ev2": 2.0,
     }
-    assert not any("camera" in each.settings.as_json() for each in found.values())
+    assert not any("camera" in each.settings.as_json() for each in reprojections.values())
 
 
 @pytest.mark.parametrize(
@@ -188,6 +191,6 @@ def test_a_bracket_is_a_folder_for_each_exposure():
         ({"exposure": [1, 1.0]}, "must not name png_ev1 twice"),
     ],
 )
-def test_what_has_no_use_is_refused(wrong, problem):
+def test_useless_settings_are_refused(wrong, problem):
     with pytest.raises(ValueError, match=problem):
         Scene.model_validate(scene(**wrong))

@@ -44,7 +44,7 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
 
-# In place of the program that builds a scene: it waits to be let go.
+# Stands in for the program that builds a scene. It waits until the test lets it go on.
 WAITING = """
 import sys, time
 from pathlib import Path
@@ -55,7 +55,7 @@ Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
 """
 BUILD = ("--config", "scenes=one", "rigs=all", "preset=full", "--", "work/one/scene.blend")
 
-# A run that lives until it is killed, and one of its jobs.
+# Starts a run that lives until it is killed, and one of its jobs.
 RUN = """
 import subprocess, sys, time
 from pathlib import Path
@@ -80,7 +80,7 @@ with temporary_folder(sys.argv[1]) as folder:
     ("sizes", "expected"),
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
 )
-def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
+def test_sizes_of_files_on_one_disk_are_added_up(sizes, expected, tmp_path, monkeypatch):
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(100e9))
     folders = [tmp_path / f"not/there/{number}" for number in range(len(sizes))]
     needs = [
@@ -118,7 +118,7 @@ DISK |= dict.fromkeys(("f_blocks", "f_bfree", "f_bavail"), 10**9)
         ({"f_flag": os.ST_RDONLY}, 0, "is read-only: mount its disk for writing, or write else"),
     ],
 )
-def test_a_disk_that_takes_nothing_more_is_refused_with_the_cause(
+def test_a_full_or_read_only_disk_is_refused_with_the_cause(
     state, files, cause, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(disk_space.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
@@ -148,7 +148,7 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     assert said.startswith("error: results: ") and " GB are free on its disk" in said
     assert "Traceback" not in result.stderr
     assert not (folder / "results").exists()
-    # The plan writes the settings of its jobs, and nothing else.
+    # The plan writes only the settings of its jobs.
     written = [path for path in (folder / "work").rglob("*") if path.is_file()]
     assert all("settings" in path.parts for path in written)
 
@@ -172,7 +172,7 @@ def test_a_disk_that_takes_nothing_ends_a_run_with_one_line(name, options, cause
     disk.mkdir()
     mounted = mount_disk(disk, options)
     if not mounted:
-        # Without the right to mount, nobody may write there.
+        # Without the right to mount, the folder itself is read-only.
         disk.chmod(0o500)
         causes = ["you may not write in"]
     try:
@@ -208,9 +208,23 @@ def test_a_full_disk_below_snakemake_itself_is_one_line(tmp_path):
 @pytest.mark.slow
 def test_a_limit_of_memory_in_which_blender_cannot_start_is_one_line(tmp_path):
     folder = checkout(tmp_path, one=ONE)
-    words = [Path(sys.executable).with_name("snakemake"), "--cores", "1", "--config", "scenes=one"]
+    arguments = [
+        Path(sys.executable).with_name("snakemake"),
+        "--cores",
+        "1",
+        "--config",
+        "scenes=one",
+    ]
     result = subprocess.run(
-        ["bash", "-c", 'ulimit -v 600000; exec "$@"', "bash", *words, "rigs=all", "preset=full"],
+        [
+            "bash",
+            "-c",
+            'ulimit -v 600000; exec "$@"',
+            "bash",
+            *arguments,
+            "rigs=all",
+            "preset=full",
+        ],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -222,7 +236,7 @@ def test_a_limit_of_memory_in_which_blender_cannot_start_is_one_line(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_dry_run_names_all_that_the_run_would_refuse(tmp_path):
+def test_a_dry_run_names_everything_that_the_run_would_refuse(tmp_path):
     folder = checkout(
         tmp_path,
         huge=HUGE,
@@ -240,23 +254,27 @@ def test_a_dry_run_names_all_that_the_run_would_refuse(tmp_path):
     missing = next((folder / "theirs/dataset/exr").iterdir())
     missing.unlink()
     scenes = "scenes=[huge,other,textured,theirs]"
-    words = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
-    result = snakemake(folder, *words)
+    arguments = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
+    result = snakemake(folder, *arguments)
     refused = [line for line in result.stderr.splitlines() if line.startswith("would be refused")]
     assert result.returncode == 0, result.stderr
     assert len(refused) == 4, refused
-    told = "\n".join(refused)
-    assert re.search(r": results: .* GB are free on its disk, and this run writes some", told)
-    assert f": other.blend: its sha256 is {files.sha256(folder / 'other.blend')}, but" in told
-    assert ": textured.blend: files that it shows are missing: textures/gone.png; put them" in told
-    assert f"theirs/dataset/exr: {missing.name}: no such file" in told
+    message = "\n".join(refused)
+    assert re.search(r": results: .* GB are free on its disk, and this run writes some", message)
+    assert f": other.blend: its sha256 is {files.sha256(folder / 'other.blend')}, but" in message
+    assert (
+        ": textured.blend: files that it shows are missing: textures/gone.png; put them" in message
+    )
+    assert f"theirs/dataset/exr: {missing.name}: no such file" in message
 
 
-def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkeypatch):
+def test_only_leftovers_of_killed_processes_are_removed(tmp_path, monkeypatch):
     monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
-    words = [sys.executable, "-c", KEEPER, tmp_path]
+    arguments = [sys.executable, "-c", KEEPER, tmp_path]
     keepers = [
-        subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)})
+        subprocess.Popen(
+            arguments, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+        )
         for _ in range(2)
     ]
     live, dead = (Path(keeper.stdout.readline().strip()) for keeper in keepers)
@@ -271,21 +289,23 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     for path in (empty, full, young):
         path.mkdir()
     (full / "picture.png").write_bytes(b"an artist's")
-    own = tmp_path / "plenoforge-checkout"
-    own.mkdir()
+    checkout_folder = tmp_path / "plenoforge-checkout"
+    checkout_folder.mkdir()
     old = time.time() - 2 * leftovers.BLENDER_AGE
-    for path in (live, dead, *paths, full / "picture.png", empty, full, own):
+    for path in (live, dead, *paths, full / "picture.png", empty, full, checkout_folder):
         os.utime(path, (old, old))
     os.utime(paths[2])
-    found = leftovers.remove([tmp_path / "results"])
-    assert {path for path in found if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
-    assert not any(path.exists() for path in found)
-    assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young, own))
+    removed = leftovers.remove([tmp_path / "results"])
+    assert {path for path in removed if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
+    assert not any(path.exists() for path in removed)
+    assert all(
+        path.exists() for path in (live / "view.exr", *paths[2:], full, young, checkout_folder)
+    )
     keepers[0].kill()
     keepers[0].wait()
 
 
-def test_a_link_with_a_temporary_folders_name_leads_to_no_removal(tmp_path, monkeypatch):
+def test_a_link_named_like_a_temporary_folder_removes_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
     monkeypatch.setattr(leftovers, "FOLDER_AGE", -1)
     kept = tmp_path / "kept/view.exr"
@@ -311,7 +331,7 @@ def test_a_temporary_folder_needs_no_locks(tmp_path, monkeypatch):
     assert not folder.exists()
 
 
-def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, monkeypatch):
+def test_processes_of_equal_number_write_separate_temporary_files(tmp_path, monkeypatch):
     monkeypatch.setattr(files.os, "getpid", lambda: 7)
     target = tmp_path / "names.json"
     with files.atomic_path(target) as one, files.atomic_path(target) as other:
@@ -321,7 +341,7 @@ def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, mo
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
+def test_a_temporary_name_without_a_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match="cannot be written"):
         files.write_text("", "text")
@@ -330,13 +350,13 @@ def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
 
 @pytest.fixture
 def start_run(tmp_path):
-    """Start runs that note themselves in a folder; return the process and its job's number."""
+    """Return a function that starts a run noted in a folder. It returns the process and its job."""
     runs = []
 
     def start(place="here"):
-        words = [sys.executable, "-c", RUN, tmp_path / "locks", place]
+        arguments = [sys.executable, "-c", RUN, tmp_path / "locks", place]
         run = subprocess.Popen(
-            words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+            arguments, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
         )
         runs.append((run, int(run.stdout.readline())))
         return runs[-1]
@@ -371,10 +391,10 @@ def start_entering(folder):
 
 
 def outcome(process):
-    """Return the runs that may live, whether locks were removed, and what would be said."""
-    told, problem = process.communicate()
+    """Return the runs that may live, whether locks were removed, and the message."""
+    output, problem = process.communicate()
     assert process.returncode == 0, problem
-    *removed, pids, refusal = told.splitlines()
+    *removed, pids, refusal = output.splitlines()
     return list(map(int, pids.split())), removed == ["locks are removed"], refusal
 
 
@@ -382,7 +402,7 @@ def entered(folder):
     return outcome(start_entering(folder))
 
 
-def test_a_run_that_lives_is_named_and_one_that_was_killed_leaves_nothing(start_run, tmp_path):
+def test_a_live_run_is_named_and_a_killed_one_leaves_nothing(start_run, tmp_path):
     folder = tmp_path / "locks"
     assert entered(folder)[:2] == ([], False)
     assert not list(folder.iterdir())
@@ -420,7 +440,7 @@ def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path)
         ),
     ],
 )
-def test_what_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
+def test_a_run_that_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
     run, job = start_run(place)
     os.kill(job, signal.SIGKILL)
     run.kill()
@@ -438,13 +458,13 @@ def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
     run.kill()
     run.wait()
     entering = start_entering(tmp_path / "locks")
-    told = entering.stderr.readline()
-    assert told.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
+    line = entering.stderr.readline()
+    assert line.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
     os.kill(job, signal.SIGKILL)
     assert outcome(entering)[:2] == ([], True)
 
 
-def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
+def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
     def flock(*_):
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -459,26 +479,26 @@ def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypa
 
 @pytest.fixture(params=["checkout", "own folder"])
 def building(request, tmp_path):
-    """A folder in which a run waits for its job to be let go, and the run's process."""
-    folder, words = checkout(tmp_path / "checkout", one=ONE), BUILD
+    """A folder with a run that waits for its job, and the run's process."""
+    folder, arguments = checkout(tmp_path / "checkout", one=ONE), BUILD
     (folder / "scripts/build_scene.py").write_text(WAITING)
     if request.param == "own folder":
-        own = tmp_path / "own"
-        (own / "configs").mkdir(parents=True)
-        (folder / "configs/scenes").rename(own / "configs/scenes")
-        shutil.copytree(own / "configs/scenes", folder / "configs/scenes")
-        words = ("--snakefile", folder / "Snakefile", "--directory", own, *BUILD)
-        folder = own
+        own_folder = tmp_path / "own"
+        (own_folder / "configs").mkdir(parents=True)
+        (folder / "configs/scenes").rename(own_folder / "configs/scenes")
+        shutil.copytree(own_folder / "configs/scenes", folder / "configs/scenes")
+        arguments = ("--snakefile", folder / "Snakefile", "--directory", own_folder, *BUILD)
+        folder = own_folder
     else:
-        words = ("--directory", folder, *BUILD)
-    process = start_snakemake(tmp_path / "checkout", *words, stderr=subprocess.PIPE, text=True)
+        arguments = ("--directory", folder, *BUILD)
+    process = start_snakemake(tmp_path / "checkout", *arguments, stderr=subprocess.PIPE, text=True)
     wait_until((folder / "started").exists, process)
 
     def run(*more, target=None):
-        given = (*words[:-1], target) if target else words
+        given = (*arguments[:-1], target) if target else arguments
         return snakemake(tmp_path / "checkout", *more, *given)
 
-    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *words, **options)
+    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *arguments, **options)
     yield folder, process, run
     (folder / "go").touch()
     with suppress(ProcessLookupError):
@@ -491,7 +511,7 @@ def last_line(run):
 
 
 @pytest.mark.slow
-def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(building):
+def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(building):
     folder, process, run = building
     refusal = f"error: another run makes these files, process {process.pid}: wait for it, or end"
     second = run()
@@ -499,7 +519,7 @@ def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(buildi
     assert last_line(second).startswith(refusal)
     assert "Traceback" not in second.stdout + second.stderr
     assert "locked" not in (dry := run("--dry-run")).stderr and dry.returncode == 0
-    # What makes no files leaves the build its locks when it ends.
+    # A run that makes no files leaves the build its locks.
     for options in ((), ("--nolock",)):
         status = run(*options, target="status")
         assert status.returncode == 0, status.stderr
@@ -510,7 +530,7 @@ def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(buildi
 
 
 @pytest.mark.slow
-def test_after_a_kill_with_its_jobs_the_next_run_goes_on_by_itself(building):
+def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
     folder, process, run = building
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -538,13 +558,13 @@ def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("building", ["checkout"], indirect=True)
-def test_a_run_that_is_stopped_says_so_and_the_next_one_goes_on(building):
+def test_a_stopped_run_says_so_and_the_next_one_continues(building):
     folder, process, run = building
     process.terminate()
     said = process.stderr.readline()
     while "stopping after SIGTERM" not in said:
         said = process.stderr.readline()
-        assert said, "it ended without a word"
+        assert said, "it ended without a message"
     (folder / "go").touch()
     *_, last = process.stderr.read().splitlines()
     assert process.wait() != 0

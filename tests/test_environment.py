@@ -1,4 +1,4 @@
-"""Which Python `make` takes (the first that runs, else what uv downloads), and what it installs."""
+"""Which Python `make` takes (the first that runs, else uv downloads one), and what it installs."""
 
 import os
 import runpy
@@ -11,14 +11,14 @@ from checkouts import ROOT
 
 
 class Machine:
-    """Has no Python; a test adds programs that answer with a text, and finds what `make` takes."""
+    """A machine without Python. Tests add programs that answer with a text."""
 
     def __init__(self, home):
         self.home, self.programs = home, home / "programs"
         self.programs.mkdir()
         for name in ("bash", "dirname"):
             (self.programs / name).symlink_to(shutil.which(name))
-        # Not root, who would install what is missing.
+        # Not root, because root would install missing packages.
         self.add("id", "echo 1000")
 
     def add(self, path, script):
@@ -28,9 +28,9 @@ class Machine:
         program.chmod(0o755)
         return str(program)
 
-    def find(self, *words):
+    def find(self, *arguments):
         return subprocess.run(
-            [self.programs / "bash", ROOT / "envs/find_python.sh", *words],
+            [self.programs / "bash", ROOT / "envs/find_python.sh", *arguments],
             env={"PATH": f"{self.home}/shims:{self.programs}", "HOME": str(self.home)},
             capture_output=True,
             text=True,
@@ -72,7 +72,7 @@ def test_without_any_uv_downloads_one(machine):
     assert "downloading" in result.stderr
 
 
-def test_where_nothing_can_be_downloaded_one_line_says_what_to_install(machine):
+def test_if_no_download_works_one_line_says_what_to_install(machine):
     machine.add("python3", "echo 3.12")
     machine.add("uv", "[[ $1 == --version ]]")
     result = machine.find()
@@ -93,13 +93,13 @@ def test_a_named_python_must_run_and_be_of_a_supported_version(machine):
         assert result.stderr.startswith(f"error: PYTHON is {wrong}, which is not Python 3.13 or")
 
 
-def test_a_version_is_found_beside_another(machine):
+def test_a_requested_version_is_found_beside_another(machine):
     machine.add("python3.13", "echo 3.13")
     older = machine.add("python3.11", "echo 3.11")
     assert machine.find("3.11").stdout == f"{older}\n"
 
 
-def test_a_version_that_is_not_there_is_downloaded(machine):
+def test_a_missing_version_is_downloaded(machine):
     machine.add("python3.13", "echo 3.13")
     machine.add("uv", '[[ $2 != find ]] || echo "$UV_PYTHON_INSTALL_DIR/bin/python$4"')
     result = machine.find("3.11")
@@ -118,7 +118,7 @@ def test_a_version_that_cannot_be_downloaded_is_an_error_of_one_line(machine):
 
 @pytest.fixture
 def check_system(machine, monkeypatch):
-    """Look for what tests need where it is not, and an apt-get that writes down what it does."""
+    """Check a system without the tests' packages. Its apt-get writes down its arguments."""
     installs = f'> "${{0%/*}}/$name"; {shutil.which("chmod")} +x "${{0%/*}}/$name"'
     machine.add("apt-get", f'echo "$@" >> "$0.log"; for name in "${{@:4}}"; do {installs}; done')
     monkeypatch.setenv("PATH", str(machine.programs))
@@ -138,12 +138,12 @@ def test_root_installs_what_is_missing(check_system):
         "--quiet=2 update",
         "--quiet=2 install --yes chromium rsync",
     ]
-    # Once is enough.
+    # A second check installs nothing.
     check_system(0)
     assert len(check_system.log.read_text().splitlines()) == 2
 
 
-def test_others_are_given_the_line_that_installs_it(check_system):
+def test_other_users_are_told_the_command_that_installs_it(check_system):
     with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium rsync$"):
         check_system(1000)
     assert not check_system.log.exists()

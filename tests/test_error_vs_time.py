@@ -1,4 +1,4 @@
-"""Error against render time, measured small: what is written, and nothing rendered twice."""
+"""Error against render time, measured small: the files, and that nothing is rendered twice."""
 
 import csv
 import json
@@ -58,18 +58,18 @@ def content(measured):
 
 
 def test_plain_path_tracing_converges_as_monte_carlo_does(content):
-    """Cycles' Sobol points make a smooth room converge a little faster than independent ones."""
+    """Cycles' Sobol points make a smooth room converge a little faster than independent points."""
     slope = content["slopes"]["plain"]["over_samples"]["slope"]
     assert -1.3 < slope < -0.9
-    whole = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
-    assert -1.3 < whole < -0.9
+    slope_of_all_pixels = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
+    assert -1.3 < slope_of_all_pixels < -0.9
     errors = [p["relative_mse"] for p in content["points"] if p["method"] == "plain"]
     assert len(errors) == 5
     assert all(more > less for more, less in pairwise(errors))
     assert 0 < content["reference_error"] < errors[-1]
 
 
-def test_every_way_is_measured_and_the_scenes_own_is_known(content):
+def test_every_method_is_measured_with_the_scenes_own_settings(content):
     counts = {}
     for point in content["points"]:
         counts[point["method"]] = counts.get(point["method"], 0) + 1
@@ -83,23 +83,23 @@ def test_every_way_is_measured_and_the_scenes_own_is_known(content):
         "path guiding": 5,
         "this scene's settings": 1,
     }
-    (own,) = content["settings"]
+    (own_point,) = content["settings"]
     (same,) = (
         point
         for point in content["points"]
         if point["method"] == "denoised" and point["settings"]["samples"] == RENDER["samples"]
     )
-    assert own["relative_mse"] == same["relative_mse"]
+    assert own_point["relative_mse"] == same["relative_mse"]
 
 
 def test_whole_views_are_made_of_their_strata(content):
-    """The room has lamps and diffuse walls; what is no light of it is no stratum."""
+    """The room has lamps and diffuse walls. It has no other strata."""
     strata = content["strata"]
     assert set(strata) <= set(STRATA) and "diffuse" in strata and "volume" not in strata
-    total = sum(found["area"] for found in strata.values())
+    total = sum(stratum["area"] for stratum in strata.values())
     assert total == pytest.approx(1, abs=0.01)
     for number, point in enumerate(content["points"]):
-        parts = [(found["area"], found["points"][number]) for found in strata.values()]
+        parts = [(stratum["area"], stratum["points"][number]) for stratum in strata.values()]
         assert all(part["method"] == point["method"] for _, part in parts)
         mean = sum(area * part["relative_mse"] for area, part in parts) / total
         assert point["relative_mse"] == pytest.approx(mean)
@@ -107,7 +107,7 @@ def test_whole_views_are_made_of_their_strata(content):
 
 
 class SimulatedPilot:
-    """A pilot that costs no render: a fire in one corner of the views, before a diffuse wall."""
+    """A pilot that renders nothing: a fire in one corner of the views before a diffuse wall."""
 
     has_volumes = True
 
@@ -140,10 +140,10 @@ def test_a_small_fire_gets_windows_of_its_own():
     assert len(windows) == 4
     for window in windows[2:]:
         assert window.x < 41 and window.x + 16 > 47 and window.y < 21 and window.y + 16 > 25
-    whole = Window(windows[0].view, 0, 0, 64, 64)
-    kinds, _ = strata.classes(maker, whole)
+    whole_view = Window(windows[0].view, 0, 0, 64, 64)
+    kinds, _ = strata.classes(maker, whole_view)
     assert (kinds == STRATA.index("volume")).sum() == 48
-    assert ((kinds == strata.NONE) == ~maker.mask(whole)).all()
+    assert ((kinds == strata.NONE) == ~maker.mask(whole_view)).all()
 
 
 @pytest.mark.parametrize(
@@ -156,12 +156,12 @@ def test_a_small_fire_gets_windows_of_its_own():
         ({"emission": 5}, "volume"),
     ],
 )
-def test_what_a_surface_is_says_what_its_pixels_show(shows, stratum):
+def test_a_surfaces_stratum_follows_from_its_light(shows, stratum):
     maker = SimulatedPilot(lenses.from_camera(CAMERA))
     maker.changes = {name: np.full((64, 64), value, np.float32) for name, value in shows.items()}
     kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == stratum
-    # Where nothing is fog or fire, what glows is a lamp too small for its pixel.
+    # Without fog or fire, light without a surface is a lamp too small for its pixel.
     maker.has_volumes = False
     kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == ("emission" if stratum == "volume" else stratum)
@@ -192,7 +192,7 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
         parts = point["bias"] + point["variance"]
         assert parts == pytest.approx(point["relative_mse_whole"], rel=1e-6, abs=1e-9)
         assert point["mse_seconds"] == point["relative_mse_whole"] * point["seconds"]
-    # A part of what denoised renders are wrong by is common to all of them.
+    # All denoised renders share a part of their errors.
     plain, denoised = (
         [p for p in content["points"] if p["method"] == method][-1]
         for method in ("plain", "denoised")
@@ -202,7 +202,7 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
     table = (measured.folder / "room.md").read_text().splitlines()
     assert all(sum(row.startswith(f"| {m} |") for row in table) == 2 for m in methods)
     assert sum(row.startswith("| diffuse |") for row in table) == len(methods)
-    # At the error of most samples plain path tracing takes these, and the denoiser fewer.
+    # At the error of its most samples, plain path tracing takes these. The denoiser takes fewer.
     most = {entry["method"]: entry for entry in content["methods_at_most_samples"]}
     assert most["plain"]["times_faster"] == pytest.approx(1)
     assert most["plain"]["equal_error"] < methods["plain"]["equal_error"]
@@ -213,10 +213,12 @@ def test_a_datasets_page_has_the_strata_in_a_table(measured, content):
     folder.mkdir()
     for suffix in (".json", ".svg"):
         (folder / f"room{suffix}").write_bytes((measured.folder / f"room{suffix}").read_bytes())
-    found = tables.error_vs_time([folder / "room.json"], "room").tables["By what pixels show"]
+    strata_table = tables.error_vs_time([folder / "room.json"], "room").tables[
+        "By what pixels show"
+    ]
     strata = content["strata"]
-    assert list(dict.fromkeys(row[0] for row in found.rows)) == ["whole views", *strata]
-    rows = [dict(zip(found.columns, row, strict=True)) for row in found.rows]
+    assert list(dict.fromkeys(row[0] for row in strata_table.rows)) == ["whole views", *strata]
+    rows = [dict(zip(strata_table.columns, row, strict=True)) for row in strata_table.rows]
     (row,) = (r for r in rows if (r["stratum"], r["method"]) == ("diffuse", "denoised"))
     assert row["part"] == strata["diffuse"]["area"]
     assert row["slope"] == strata["diffuse"]["slopes"]["denoised"]["over_time"]["slope"]
@@ -233,21 +235,21 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     plain = Method("plain", {"samples": 1})
     points = [measured_point(plain, [[trial, trial]], [reference])]
     points.append(whole_views_point({"environment": points[0]}, {"environment": 1.0}, 0.0))
-    found = evaluated(points, 0.0)
-    assert [(p["relative_mse"], p["psnr"]) for p in found["points"]] == [(0, None)] * 2
-    write_json(tmp_path / "points.json", found)
+    evaluation = evaluated(points, 0.0)
+    assert [(p["relative_mse"], p["psnr"]) for p in evaluation["points"]] == [(0, None)] * 2
+    write_json(tmp_path / "points.json", evaluation)
     seen = np.arange(9), np.arange(9)
     same = disagreement((sky, sky), (reference, reference), seen)
     assert (same.total, same.added, same.share) == (0, 0, 0)
 
 
-def test_files_can_be_read_by_others(measured, content):
+def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
-    assert len(rows) == len(content["points"]) + sum(len(found["points"]) for found in strata)
+    assert len(rows) == len(content["points"]) + sum(len(stratum["points"]) for stratum in strata)
     assert float(rows[0]["relative_mse"]) == content["points"][0]["relative_mse"]
-    whole = [row for row in rows if row["stratum"] == "whole views"]
-    assert sum(row["pareto"] == "True" for row in whole) == len(content["pareto_front"])
+    whole_views = [row for row in rows if row["stratum"] == "whole views"]
+    assert sum(row["pareto"] == "True" for row in whole_views) == len(content["pareto_front"])
     assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
     assert images.read_image(measured.folder / "room.png").channels
 
@@ -260,7 +262,7 @@ def test_a_second_run_renders_nothing(measured):
     assert (measured.folder / "room.json").read_bytes() == made
 
 
-def test_a_target_error_that_was_not_calibrated_is_told(measured, run_program, room):
+def test_a_target_error_without_calibration_is_refused(measured, run_program, room):
     path = measured.folder / "target.json"
     lightfield({"target_error": 0.01}).write(path)
     result = run_program(
@@ -285,11 +287,11 @@ def test_windows_lie_in_the_image_circle_and_in_different_views():
     for window in windows:
         assert 0 <= window.x <= 48 and 0 <= window.y <= 48
         assert maker.mask(window).mean() >= 0.75
-    # The whole view where that is small: π/4 of it.
-    (whole,) = maker.windows(100, 1)
-    assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
-    assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
-    # A circle that fills less of every window.
+    # If the view is small, the window is the whole view: its circle fills π/4 of it.
+    (whole_view,) = maker.windows(100, 1)
+    assert (whole_view.x, whole_view.y, whole_view.width, whole_view.height) == (0, 0, 64, 64)
+    assert maker.mask(whole_view).mean() == pytest.approx(np.pi / 4, abs=0.01)
+    # Here the circle fills less of every window.
     maker.lens = replace(maker.lens, principal_point=(60.0, 60.0))
     (corner,) = maker.windows(64, 1)
     assert 0 < maker.mask(corner).mean() < 0.75
@@ -311,15 +313,15 @@ def test_the_same_wall_is_found_in_both_views():
     zero = np.zeros((48, 48, 3))
     reference = Reference(zero, zero, depth, mask, 0.0)
     cameras = tuple(maker.camera(view) for view in views)
-    here, there = trials.both_see(cameras, windows, (reference, reference))
+    pixels_here, pixels_there = trials.both_see(cameras, windows, (reference, reference))
     middle = 24 * 48 + 24
-    # The pixel right of the optical axis, at 1/32 of 90 degrees, half a pixel on.
+    # The pixel right of the optical axis is at 1/32 of 90 degrees, half a pixel on.
     angle = np.radians(90) / 32 * 0.5
     other = np.arctan((2 * np.tan(angle) - 0.4) / 2) / np.radians(90) * 32 + 24
-    (found,) = there[here == middle]
-    assert found % 48 == int(other)
-    assert abs(found // 48 - 24) <= 1
-    # Nothing is seen where the second depth says that something is in front.
+    (pixel,) = pixels_there[pixels_here == middle]
+    assert pixel % 48 == int(other)
+    assert abs(pixel // 48 - 24) <= 1
+    # If the second depth has something in front, the wall is hidden.
     near = Reference(zero, zero, depth / 2, mask, 0.0)
     assert not len(trials.both_see(cameras, windows, (reference, near))[0])
 
@@ -351,10 +353,10 @@ print(*counts)
 """
 
 
-def test_what_one_device_rendered_is_not_taken_for_anothers(run_program, room, tmp_path):
+def test_a_render_is_not_reused_on_another_device(run_program, room, tmp_path):
     lightfield().write(tmp_path / "lightfield.json")
     run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
     (tmp_path / "program.py").write_text(ON_TWO_DEVICES)
     counts = run_program(tmp_path / "program.py", tmp_path, room).stdout.split()[-3:]
-    # On the processor `auto` is the processor; where it is a GPU, the window is rendered again.
+    # Without a GPU, `auto` is the processor. With one, the window is rendered again.
     assert counts == ["1", "1", "2"]

@@ -1,4 +1,4 @@
-"""Renders beside the truth: errors that are known beforehand, and none of the truth itself."""
+"""Renders compared with the truth: errors that are known beforehand, and none for the truth."""
 
 import csv
 import math
@@ -41,24 +41,24 @@ BLACK, WHITE = np.zeros(3), np.ones(3)
 def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     """Return the errors of a render by region."""
     source = SourceDataset(dataset, name, ".exr")
-    found = next(each for each in source.lightfield.views if each.name == view)
+    chosen_view = next(each for each in source.lightfield.views if each.name == view)
     rendered = evaluation.rendered(shown, source, BLACK)
-    true = evaluation.truth(source, found, shown, BLACK)
+    true = evaluation.truth(source, chosen_view, shown, BLACK)
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
-    parts = evaluation.regions(source, found, counted, true.depth)
+    parts = evaluation.regions(source, chosen_view, counted, true.depth)
     return dict(evaluation.errors(rendered, true, parts))
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
+def test_the_truth_has_no_error(dataset, tmp_path, name, run_program):
     renders = tmp_path / "renders"
     shutil.copytree(dataset / name, renders)
     source = SourceDataset(dataset, name, ".exr")
     second = next(view for view in source.lightfield.views if view.name == TESTS[1])
     (renders / f"{second.name}.exr").unlink()
     images.write_png(renders / f"{second.name}.png", source.colour(second))
-    words = [renders, "--dataset", dataset, "--source", name, "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", *words)
+    arguments = [renders, "--dataset", dataset, "--source", name, "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", *arguments)
     assert "LPIPS is left out" in result.stdout
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -80,7 +80,7 @@ def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
 
 
 def named(dataset, tmp_path, folder):
-    """Return the source of a copy of the perspective views in a folder of that name."""
+    """Return the source of a copy of the perspective views in a folder with that name."""
     shutil.copytree(dataset / "perspective", tmp_path / folder / "perspective")
     path = tmp_path / folder / "perspective" / "lightfield.json"
     LightField.read(path).changed(scene={"name": "ball"}).write(path)
@@ -96,14 +96,14 @@ def named(dataset, tmp_path, folder):
         ("ball_preview_low_spiral", "low_spiral_"),
     ],
 )
-def test_a_render_is_found_by_the_name_that_exports_give_it(dataset, tmp_path, folder, prefix):
+def test_a_render_is_found_by_its_name_in_exports(dataset, tmp_path, folder, prefix):
     source = named(dataset, tmp_path, folder)
     view = source.lightfield.views[1]
-    # The name of each rig's view in a folder of several rigs' views.
+    # A view's name in a folder with several rigs' views starts with its rig.
     for name in (view.name, f"high_{view.name}", f"{prefix}{view.name}"):
         images.write_png(tmp_path / f"{name}.png", np.zeros((48, 64, 3), np.uint8))
-        found = evaluation.find(tmp_path, source, view)
-        assert found.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
+        path_of_render = evaluation.find(tmp_path, source, view)
+        assert path_of_render.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
 
 
 def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, run_program):
@@ -113,7 +113,7 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
             name = f"spiral_{view.name}.png"
             images.write_png(tmp_path / "renders" / name, source.colour(view))
             images.write_png(tmp_path / "masks" / name, np.eye(48, 64, dtype=np.uint8))
-    words = [
+    arguments = [
         "--source",
         "perspective",
         "--masks",
@@ -121,14 +121,14 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
         "--output",
         tmp_path / "page",
     ]
-    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *words)
+    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *arguments)
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["region"] == "all"]
     assert [row["view"] for row in rows] == [*TESTS, "mean"]
     assert {(row["psnr"], float(row["pixels"])) for row in rows} == {("inf", 48)}
 
 
-def test_errors_are_those_that_were_made(dataset, tmp_path):
+def test_errors_are_those_of_the_changed_renders(dataset, tmp_path):
     path = dataset / "perspective" / "view_0001f.exr"
     image = images.read_image(path)
     source = SourceDataset(dataset, "perspective", ".exr")
@@ -148,21 +148,21 @@ def test_errors_are_those_that_were_made(dataset, tmp_path):
     assert both["flip"] > 0
     assert both["pixels"] == 48 * 64
     deeper = image.channels | {"Z": image.channels["Z"] * np.float32(1.25)}
-    # Unknown depth is as wrong as can be.
+    # An unknown depth counts as the largest error.
     deeper["Z"][:, 16:32] = np.nan
     images.write_exr(tmp_path / "view_0001f.exr", deeper)
     turned = {"R": np.full((48, 64), 1, np.float32), "B": np.full((48, 64), 1, np.float32)}
     turned["G"] = np.zeros((48, 64), np.float32)
     images.write_exr(tmp_path / "normal" / "view_0001f.exr", turned)
-    found = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
-    assert found["psnr"] == math.inf
-    assert found["depth"] == pytest.approx(0.75 * 0.25 + 0.25, abs=1e-6)
-    assert found["normal"] == pytest.approx(45)
+    row = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
+    assert row["psnr"] == math.inf
+    assert row["depth"] == pytest.approx(0.75 * 0.25 + 0.25, abs=1e-6)
+    assert row["normal"] == pytest.approx(45)
 
 
 @pytest.fixture
 def transparent(tmp_path):
-    """The source of views of a grey wall whose alpha falls from 1 at the left to 0."""
+    """The source of views of a grey wall. Its alpha falls from 1 at the left to 0."""
     folder = tmp_path / "spiral"
     write_views(folder / "views", LENSES["perspective"], RIG)
     (folder / "views").rename(folder / "exr")
@@ -176,7 +176,7 @@ def transparent(tmp_path):
 
 
 def compared(source, path, background):
-    """Return the errors of a render over a background, and what is wrong with its own."""
+    """Return a render's errors over a background, and the problem with its own background."""
     view = next(view for view in source.lightfield.views if path.stem.endswith(view.name))
     shown = evaluation.rendered(path, source, background)
     true = evaluation.truth(source, view, path, background)
@@ -186,8 +186,8 @@ def compared(source, path, background):
 
 
 def on(background, alpha):
-    """The wall's sRGB colour, 0 to 255, over a background in sRGB, 0 to 1, as trainers blend."""
-    wall = 0.5371  # 0.25 of light, by IEC 61966-2-1
+    """Return the wall's sRGB colour, 0 to 255, blended with an sRGB background as trainers do."""
+    wall = 0.5371  # Light of 0.25, by IEC 61966-2-1.
     alpha = alpha[..., None].astype(np.float64)
     return np.rint(255 * (alpha * wall + (1 - alpha) * background)).astype(np.uint8)
 
@@ -200,7 +200,7 @@ def test_renders_without_alpha_are_compared_over_their_background(
     path = tmp_path / "spiral_view_0001f.png"
     images.write_png(path, on(background, alpha))
     errors, problem = compared(transparent, path, background)
-    # A step of 8 bits at most.
+    # At most a step of 8 bits.
     assert errors["psnr"] > -20 * math.log10(1 / 255)
     assert problem is None
     errors, problem = compared(transparent, path, np.array([0, 0, 1]))
@@ -209,7 +209,7 @@ def test_renders_without_alpha_are_compared_over_their_background(
     assert f"has no alpha, and is {code} where the truth is transparent" in problem
 
 
-# The light of a grey of sRGB's 0.5, by IEC 61966-2-1.
+# The light of the grey 0.5 in sRGB, by IEC 61966-2-1.
 @pytest.mark.parametrize(("background", "light"), [(0, 0), (0.5, 0.2140411), (1, 1)])
 def test_linear_renders_are_composited_as_light(background, light, transparent, tmp_path):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
@@ -236,7 +236,7 @@ def test_renders_with_alpha_are_composited_over_the_background_too(
     assert "has another alpha than the truth in 70% of its pixels" in problem
 
 
-def test_a_render_with_holes_of_opaque_views_is_warned_of(dataset, tmp_path):
+def test_holes_in_renders_of_opaque_views_are_warned_of(dataset, tmp_path):
     source = SourceDataset(dataset, "perspective", ".exr")
     view = source.lightfield.views[1]
     alpha = np.full((48, 64), 255, np.uint8)
@@ -254,28 +254,34 @@ def test_white_renders_are_warned_of_until_their_background_is_given(
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
     for view in TESTS:
         images.write_png(tmp_path / "renders" / f"spiral_{view}.png", on(WHITE, alpha))
-    words = [tmp_path / "renders", "--dataset", transparent.dataset, "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", *words)
+    arguments = [
+        tmp_path / "renders",
+        "--dataset",
+        transparent.dataset,
+        "--output",
+        tmp_path / "page",
+    ]
+    result = run_program("evaluate.py", *arguments)
     assert f"spiral_{TESTS[0]}.png: has no alpha, and is #ffffff where" in result.stderr
     assert "--background" in result.stderr
     assert "(and 1 more of 2)" in result.stderr
     assert "#ffffff" in (tmp_path / "page" / "index.html").read_text()
-    result = run_program("evaluate.py", *words, "--background", "white")
+    result = run_program("evaluate.py", *arguments, "--background", "white")
     assert "warning" not in result.stderr
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         assert min(float(row["psnr"]) for row in csv.DictReader(file)) > 48
-    result = run_program("evaluate.py", *words, "--background", "sky", check=False)
+    result = run_program("evaluate.py", *arguments, "--background", "sky", check=False)
     assert result.returncode == 2
     assert "must be black, white or rrggbb" in result.stderr
 
 
-def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
+def test_regions_follow_the_lens_and_the_jumps_of_depth(dataset):
     source = SourceDataset(dataset, "fisheye", ".exr")
     distance = np.ones((48, 48))
     distance[:, 24:], distance[:10] = 2, np.inf
     depth = z_from_distance(distance, source.lens.pixel_rays())
-    whole = np.ones((48, 48), bool)
-    parts = evaluation.regions(source, source.lightfield.views[1], whole, depth)
+    everywhere = np.ones((48, 48), bool)
+    parts = evaluation.regions(source, source.lightfield.views[1], everywhere, depth)
     assert parts["all"].sum() == pytest.approx(math.pi * 24**2, rel=0.02)
     assert parts["centre"].sum() == pytest.approx(math.pi * 12**2, rel=0.02)
     assert (parts["centre"] ^ parts["rim"] == parts["all"]).all()
@@ -283,9 +289,9 @@ def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
     assert np.flatnonzero(parts["background"][:, 24]).tolist() == list(range(10))
 
 
-def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_program):
-    words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", tmp_path, *words, check=False)
+def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, run_program):
+    arguments = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", tmp_path, *arguments, check=False)
     assert result.returncode == 1
     assert "has no view_0001f.exr or .png, nor dataset_view_0001f.exr or .png" in result.stderr
     renders = tmp_path / "renders"
@@ -293,8 +299,8 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
         light = {name: np.full((48, 64), 0.5, np.float32) for name in "RGB"}
         light["G"][3, 3] = np.nan if number else 0.5
         images.write_exr(renders / f"{view}.exr", light)
-    result = run_program("evaluate.py", renders, *words, check=False)
-    problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
+    result = run_program("evaluate.py", renders, *arguments, check=False)
+    problem = f"{TESTS[1]}.exr: has colour that is not a number where it is compared"
     assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["renders"]
     source = SourceDataset(dataset, "perspective", ".exr")

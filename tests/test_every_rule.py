@@ -1,7 +1,7 @@
-"""Every rule runs again when anything changes that its jobs were made from, and only then.
+"""Every job runs again if anything that it was made from changes, and only then.
 
-Stand-ins do the work of all programs, so a build of every rule takes seconds. What a stand-in
-writes names its command and the SHA-256 of each input. So it shows from what it was made.
+Stand-ins replace all programs, so a build of every rule takes seconds. A stand-in writes its
+command and the SHA-256 of each input. That shows from what each file was made.
 """
 
 import hashlib
@@ -50,7 +50,7 @@ exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
 """
-# What no built scene needs: a download, a calibration, free places, and flow.
+# Scenes for the rules that a built scene does not need: download, calibration, free places, flow.
 BROUGHT = f"""
 licence: CC0-1.0
 scene:
@@ -78,12 +78,12 @@ TARGETS = [
     *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
 ]
 CHOSEN = ["--config", "scenes=[built,brought,imported]", "rigs=all", "preset=full"]
-# These have no output: they are asked for to be read, and always run, or only ask for others.
+# Rules without output: a target is read or always runs, or only asks for other targets.
 WITHOUT_OUTPUT = {
     *("all", "smoke", "report_html", "package", "error_vs_time", "gpu_check", "synthesis"),
     *("learn", "rig_tables", "plan", "status", "advise", "verify"),
 }
-# In place of every program: it writes what its job is known by, with everything that rules read.
+# Stands in for every program. It writes what identifies its job, in a form that rules can read.
 STAND_IN = f"""#!{sys.executable}
 import hashlib, json, os, sys
 from pathlib import Path
@@ -100,12 +100,12 @@ for name in job["output"]:
     is_list = Path(name).name == "export.json" or "-" in Path(name).stem
     Path(name).write_text(json.dumps(content | {{"name": name}} | (listing if is_list else {{}})))
 """
-# How a job is run, and not what it makes.
+# Options that say how a job runs, not what it makes.
 MACHINE = {"--threads", "--processes", "--cores", "--device", "--stall"}
 
 
 class Build:
-    """A checkout in which stand-ins have built everything, and Snakemake's own notes are lost."""
+    """A checkout in which stand-ins built everything, and Snakemake's own metadata is lost."""
 
     def __init__(self, folder):
         self.folder = checkout(folder, built=BUILT, brought=BROUGHT, imported=IMPORTED)
@@ -120,9 +120,19 @@ class Build:
         self.jobs = self.run()
         shutil.rmtree(folder / ".snakemake")
 
-    def start(self, *words):
+    def start(self, *arguments):
         return subprocess.Popen(
-            [sys.executable, "-m", "snakemake", "--cores", "4", *words, *CHOSEN, "--", *TARGETS],
+            [
+                sys.executable,
+                "-m",
+                "snakemake",
+                "--cores",
+                "4",
+                *arguments,
+                *CHOSEN,
+                "--",
+                *TARGETS,
+            ],
             cwd=self.folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -130,22 +140,22 @@ class Build:
             env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
         )
 
-    def snakemake(self, *words):
-        """Run everything; return what the terminal says on stderr."""
-        process = self.start(*words)
+    def snakemake(self, *arguments):
+        """Run everything. Return the terminal's stderr."""
+        process = self.start(*arguments)
         stdout, stderr = process.communicate()
         assert process.returncode == 0, stdout + stderr
         return stderr
 
-    def plan(self, *words):
-        """Return the jobs that a run would run, by their first output."""
-        stderr = self.snakemake("--dry-run", *words, "--logger", "jobs")
+    def plan(self, *arguments):
+        """Return the jobs that a run would start, by their first output."""
+        stderr = self.snakemake("--dry-run", *arguments, "--logger", "jobs")
         return {job["output"][0]: job for job in jobs_on(stderr) if job["output"]}
 
     def run(self):
-        """Run everything; return all its jobs.
+        """Run everything, twice. Return all its jobs.
 
-        A page shows the measurements that there were when it was planned, so it takes two runs.
+        A page shows the measurements that existed when it was planned, so it needs a second run.
         """
         jobs = self.prepare()
         for _ in range(2):
@@ -153,7 +163,7 @@ class Build:
         return jobs
 
     def prepare(self):
-        """Tell the stand-ins what each job reads and writes; return all jobs."""
+        """Tell the stand-ins what each job reads and writes. Return all jobs."""
         jobs = self.plan("--forceall", "--ignore-incomplete")
         work = {job["log"][0]: job for job in jobs.values()}
         for log in ("plan", "advise"):
@@ -191,7 +201,7 @@ def pristine(tmp_path_factory):
 
 @pytest.fixture
 def build(pristine):
-    """A fresh clone beside the old folders of results and work."""
+    """A fresh clone in place of the old folders of results and work."""
     shutil.copytree(pristine.folder.with_name("pristine"), pristine.folder)
     yield pristine
     shutil.rmtree(pristine.folder)
@@ -200,36 +210,36 @@ def build(pristine):
 def test_all_rules_have_jobs_in_the_build_and_none_runs_twice(build):
     listed = {*snakemake(build.folder, "--list-rules", *CHOSEN).stdout.split()}
     made = {job["rule"] for job in build.jobs.values()}
-    # Once there is a .blend, no rule fetches it.
+    # The .blend exists, so no rule downloads it.
     assert made == listed - WITHOUT_OUTPUT | {"fetch_brought"}
     assert not build.plan()
 
 
 def followers(jobs, first):
-    """Return the first outputs of these jobs and of those that follow from them."""
+    """Return the first outputs of these jobs and of all jobs that depend on them."""
     maker = {name: output for output, job in jobs.items() for name in job["output"]}
     readers = {}
     for output, job in jobs.items():
         for name in job["input"]:
             readers.setdefault(maker.get(name), set()).add(output)
     reached = set()
-    found = set(first)
-    while found:
-        reached |= found
-        found = {reader for output in found for reader in readers.get(output, ())} - reached
+    newest = set(first)
+    while newest:
+        reached |= newest
+        newest = {reader for output in newest for reader in readers.get(output, ())} - reached
     return reached
 
 
-def made_from(command):
-    """Return the words of a command but for those that say how to run it."""
-    words = iter(command)
-    return [word for word in words if word not in MACHINE or not next(words)]
+def identifying_arguments(command):
+    """Return a command's arguments except for those that say how to run it."""
+    arguments = iter(command)
+    return [word for word in arguments if word not in MACHINE or not next(arguments)]
 
 
-def assert_made_from_what_is_there(build, jobs):
-    """Each output was made by its job's present command from its present inputs.
+def assert_made_from_present_inputs(build, jobs):
+    """Check that each output was made by its job's present command from its present inputs.
 
-    The measurements that a page shows are those that there were when it was planned.
+    A page shows the measurements that existed when it was planned.
     """
     shown_later = build.plan().keys()
     assert {jobs[output]["rule"] for output in shown_later} <= {"page", "index"}
@@ -238,13 +248,15 @@ def assert_made_from_what_is_there(build, jobs):
         if first_output in shown_later:
             continue
         inputs = {name: build.sha256(name) for name in job["input"]}
-        words = shlex.split(job["command"])
-        (python,) = (word for word in words if Path(word).name == "python")
-        command = words[words.index(python) + 1 : words.index(">")]
+        arguments = shlex.split(job["command"])
+        (python,) = (word for word in arguments if Path(word).name == "python")
+        command = arguments[arguments.index(python) + 1 : arguments.index(">")]
         for output in job["output"]:
             content = json.loads((build.folder / output).read_text())
             assert content["inputs"] == inputs, output
-            assert made_from(content["command"]) == made_from(command), output
+            assert identifying_arguments(content["command"]) == identifying_arguments(command), (
+                output
+            )
         line = json.loads(lines[first_output].partition(" ")[2])
         assert {name: stamp[0] for name, stamp in line["inputs"].items()} == inputs
         assert line["files"][first_output][0] == build.sha256(first_output)
@@ -253,17 +265,17 @@ def assert_made_from_what_is_there(build, jobs):
 SCENES = {name: f"configs/scenes/{name}.yaml" for name in ("built", "brought", "imported")}
 ROOM = "scripts/scenes/room/__init__.py"
 OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
-# A light field's cameras, the panorama's, and the probes' follow from the same settings.
+# The cameras of a light field, its panorama and its probes follow from the same settings.
 CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
 RENDERED_CAMERAS = {f"{scene} {rule}" for scene in ("built", "brought") for rule in CAMERAS}
-# The probes are those of the first rig.
+# The first rig has the probes.
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
 TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
 CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("exports:")]
 TO_CUBES = BUILT[BUILT.index("render:") : BUILT.index("  cubes:")]
 INNER = BUILT[BUILT.index("  LFInner:") : BUILT.index("reprojections:")]
-# In each round one change of each scene YAML and of other files: its old and new text, and the
-# jobs whose own settings or inputs change with it, by rule and if need be by folder.
+# Each round makes one change in each scene YAML and in other files. It has the old and the new
+# text, and the jobs whose own settings or inputs change, by rule and if need be by folder.
 ROUNDS = {
     "what is built, checked, packed, and paid": {
         "built": (
@@ -289,7 +301,7 @@ ROUNDS = {
         ),
         "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
     },
-    # Nothing limits the samples of views that are imported.
+    # Nothing limits the samples of imported views.
     "the samples of a preset": {
         "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
     },
@@ -348,7 +360,7 @@ ROUNDS = {
     "a reprojection to faces no longer": {
         "built": ("cube_map: true", "cube_map: false", {"cubes reprojected_lightfield"}),
     },
-    # One that is gone is fetched again when a job needs it.
+    # A missing file is downloaded again if a job needs it.
     "a .blend to be fetched": {
         "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
         "scene.blend": (None, None, {"fetch_brought"}),
@@ -422,17 +434,16 @@ ROUNDS = {
     "a rig that is tested": {
         "built": ("    split: odd\n", f"    split: test\n{OTHER}, split: train}}\n", TESTED),
     },
-    # Its views were what those of the other were compared with.
+    # The other dataset's views were compared with its views.
     "a rig less": {"built": (INNER, "", {"measure_synthesis", "check_gpu"})},
     "a rig that is the larger one": {
         "built": ("size: 0.5", "size: 2", {"LFInner lightfield", "measure_synthesis"}),
     },
 }
-# The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
-# .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
-# other formats take its views. No scene YAML asks reproject.py for masks, or says how many
-# synthesised views are compared. A scene with another name is another scene.
-# A panorama has no neighbour.
+# The first two follow from the programs' versions, the third from the place of the scene YAML. Only
+# a .blend's camera has frames. Only instant-ngp places a rig that tests like the trained one; other
+# formats take its views. No scene YAML asks reproject.py for masks, or sets the number of compared
+# synthesised views. A scene with another name is another scene. A panorama has no neighbour.
 CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
 CONSTANT |= {"synthesis.json views", "lightfield.json scene", "panorama.json scene"}
 CONSTANT |= {"probes.json scene", "panorama.json flow"}
@@ -440,7 +451,7 @@ CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 
 def edit(build, changes):
-    """Make the changes of a round; return False, and make none, if a text is not there."""
+    """Make the changes of a round. If a text is missing, change nothing and return False."""
     paths = {name: build.folder / SCENES.get(name, name) for name in changes}
     for name, (old, new, _) in changes.items():
         is_there = paths[name].exists()
@@ -460,7 +471,7 @@ def edit(build, changes):
 
 
 def apply(build, changes):
-    """Make the changes of a round; return the plan, and the settings that it writes otherwise."""
+    """Make the changes of a round. Return the plan, and the settings that it changes."""
     before = build.settings()
     assert edit(build, changes)
     planned = build.plan()
@@ -469,7 +480,7 @@ def apply(build, changes):
 
 
 def changed_jobs(jobs, changes, build):
-    """Return the first outputs of those jobs that a round changes itself, or adds."""
+    """Return the first outputs of the jobs that a round changes or adds itself."""
     for output, job in jobs.items():
         for name, (*_, rules) in changes.items():
             # Each page shows the text of its scene YAML.
@@ -482,7 +493,7 @@ def changed_jobs(jobs, changes, build):
             yield output
 
 
-# After these rounds there are jobs less.
+# These rounds leave fewer jobs.
 WITH_FEWER_JOBS = {
     "an export less, and other options",
     "a reprojection less, and another .blend",
@@ -493,20 +504,20 @@ WITH_FEWER_JOBS = {
     "a rig that is tested",
     "a rig less",
 }
-# By round: the settings that it changes.
+# The settings that each round changes.
 CHANGED = {}
 
 
 @pytest.mark.parametrize("name", ROUNDS)
-def test_what_a_change_affects_is_planned_anew_and_nothing_else(build, name):
+def test_a_change_plans_the_affected_jobs_and_no_others(build, name):
     planned, CHANGED[name] = apply(build, ROUNDS[name])
-    # Elsewhere all jobs are those of before, but for what is planned.
+    # The other jobs are the same as before, unless they are planned.
     jobs = build.plan("--forceall") if name in WITH_FEWER_JOBS else build.jobs | planned
     assert planned.keys() == followers(jobs, changed_jobs(jobs, ROUNDS[name], build))
 
 
-def test_what_is_planned_is_made_from_what_is_there(pristine, build):
-    """Many rounds at once: what each of them plans is tested above."""
+def test_planned_jobs_are_made_from_present_inputs(pristine, build):
+    """Makes many changes at once. The test above checks the plan of each."""
     waiting = list(ROUNDS)
     while waiting:
         shutil.rmtree(build.folder)
@@ -515,7 +526,7 @@ def test_what_is_planned_is_made_from_what_is_there(pristine, build):
         together = [name for name in waiting if edit(build, ROUNDS[name])]
         jobs = build.prepare()
         build.snakemake()
-        assert_made_from_what_is_there(build, jobs)
+        assert_made_from_present_inputs(build, jobs)
         waiting = [name for name in waiting if name not in together]
 
 
@@ -526,7 +537,7 @@ def test_every_setting_of_every_job_is_changed_above(pristine, build):
         shutil.copytree(pristine.folder.with_name("pristine"), build.folder)
         _, CHANGED[name] = apply(build, ROUNDS[name])
     changed = set().union(*CHANGED.values())
-    # By the file's name, not for each scene.
+    # Compare by the file's name, not for each scene.
     untouched = {f"{Path(file).name} {key}" for file, key in settings if key not in CONSTANT}
     untouched -= {f"{Path(file).name} {key}" for file, key in changed}
     assert untouched <= CONSTANT
@@ -536,7 +547,7 @@ def test_every_setting_of_every_job_is_changed_above(pristine, build):
 
 
 def levels(jobs):
-    """Return the first outputs of jobs in groups; no job follows from another of its group."""
+    """Return the first outputs of jobs in groups. No job depends on another of its group."""
     maker = {name: output for output, job in jobs.items() for name in job["output"]}
     depths = {}
 
@@ -553,15 +564,15 @@ def levels(jobs):
 
 
 def falsified(line, names):
-    """Return a line of the ledger in which inputs of these names have other bytes and times."""
+    """Return a ledger line in which inputs with these names have other bytes and times."""
     content = json.loads(line.partition(" ")[2])
     content["inputs"] |= {name: ["0" * 64, 0, 0, 0] for name in names}
     text = json.dumps(content)
     return f"{hashlib.sha256(text.encode()).hexdigest()} {text}"
 
 
-def test_each_job_runs_again_that_was_made_from_something_else(build):
-    """Times say nothing: all else is as if two builds had run beside each other."""
+def test_each_job_with_another_input_in_the_ledger_runs_again(build):
+    """Times do not help here: all else is as if two builds had run beside each other."""
     path = build.folder / "work/ledger.txt"
     lines = build.ledger()
     jobs = build.plan("--forceall")
@@ -573,7 +584,7 @@ def test_each_job_runs_again_that_was_made_from_something_else(build):
         assert build.plan().keys() == followers(jobs, with_inputs)
 
 
-def test_each_input_of_each_job_is_noticed_if_it_is_another_file(build, monkeypatch, tmp_path):
+def test_each_changed_input_of_each_job_is_noticed(build, monkeypatch, tmp_path):
     monkeypatch.chdir(build.folder)
     inputs = 0
     for line in {*build.ledger().values()}:
@@ -586,12 +597,12 @@ def test_each_input_of_each_job_is_noticed_if_it_is_another_file(build, monkeypa
     assert inputs > 200
 
 
-def test_what_two_builds_at_once_have_mixed_up_one_run_mends(build):
-    """Their programs overwrite what those of the other read: no write of theirs is atomic."""
+def test_one_run_repairs_what_two_simultaneous_builds_mixed_up(build):
+    """The builds' programs overwrite each other's inputs, without atomic writes."""
     apply(build, ROUNDS["samples, and what may be missing"])
     jobs = build.prepare()
     builds = [build.start("--nolock", "--forceall") for _ in range(2)]
     for process in builds:
         process.communicate()
     build.snakemake()
-    assert_made_from_what_is_there(build, jobs)
+    assert_made_from_present_inputs(build, jobs)

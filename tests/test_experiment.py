@@ -1,4 +1,4 @@
-"""The experiment behind all measurements of rendering: what is rendered, and what is compared."""
+"""The experiment behind all measurements of rendering: its renders and its comparisons."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ CAMERA = {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]}
 
 
 class SimulatedTrials:
-    """Renders of N samples with an error of 1 / N: gamma distributed light around `LIGHT`."""
+    """Simulated renders of N samples with the error 1 / N: gamma distributed light at `LIGHT`."""
 
     def __init__(self):
         lens = lenses.from_camera(CAMERA)
@@ -81,7 +81,7 @@ def test_methods_take_turns_and_equal_settings_render_once(maker):
 
 
 def test_an_error_in_one_stratum_stays_in_it(maker):
-    """The left half of each window is glossy, and the renders there are twice too bright."""
+    """The left half of each window is glossy, and twice too bright in the renders."""
     method = Method("plain", {"samples": 256})
     classes = np.full((SIZE, SIZE), STRATA.index("diffuse"))
     classes[:, : SIZE // 2] = STRATA.index("glossy")

@@ -1,6 +1,5 @@
 """The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
 
-import argparse
 import json
 import math
 import re
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+import export_instant_ngp
 from lightfield.core.errors import UserError
 from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
@@ -42,7 +42,7 @@ HALF_PANORAMA = {"lens": "equirectangular", "longitude": [-90, 90], "resolution"
 
 
 class Dataset:
-    """A folder with a lightfield.json and what is exported of it."""
+    """A folder with a lightfield.json and its exports."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -52,13 +52,11 @@ class Dataset:
         lightfield.write(self.folder / "lightfield.json")
         return lightfield.to_json()
 
-    def export(self, *words: Any) -> dict[str, Any]:
-        """Return the transforms.json that the program writes on these words."""
-        parser = argparse.ArgumentParser()
-        instant_ngp.add_arguments(parser)
+    def export(self, *arguments: Any) -> dict[str, Any]:
+        """Return the transforms.json that the program writes for these arguments."""
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        instant_ngp.export(parser.parse_args([*map(str, [*paths, *words])]))
+        export_instant_ngp.main([*map(str, [*paths, *arguments])])
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -68,7 +66,7 @@ class Dataset:
     def render(
         self, content: dict[str, Any], camera: Any, meaning: str | None, distance: float
     ) -> None:
-        """Write EXR views of a sphere around each camera: pixels with a ray at one distance."""
+        """Write EXR views of a sphere around each camera. All rays have the same distance."""
         cosine = -lenses.from_camera(camera).pixel_rays()[..., 2]
         depth = distance * cosine if meaning == "z" else np.full_like(cosine, distance)
         depth = np.where(np.isnan(cosine), np.inf, depth).astype(np.float32)
@@ -87,7 +85,7 @@ def dataset(tmp_path: Path) -> Dataset:
 
 
 class Loader:
-    """instant-ngp's reading of a transforms.json: camera matrices and the ray of a pixel."""
+    """Reads a transforms.json as instant-ngp does: camera matrices and the rays of pixels."""
 
     def __init__(self, transforms: dict[str, Any]) -> None:
         self.json = transforms
@@ -104,7 +102,7 @@ class Loader:
         return axes[[1, 2, 0]], self.position(matrix[:3, 3])
 
     def ray(self, frame: int, x: float, y: float) -> tuple[Any, Any]:
-        """Return origin and unnormalised direction; the direction is zero where it refuses."""
+        """Return origin and unnormalised direction. The direction is zero for a hidden pixel."""
         axes, origin = self.camera(frame)
         width, height = np.float32(self.json["w"]), np.float32(self.json["h"])
         u = np.float32(x) / width - np.float32(self.json["cx"]) / width
@@ -140,7 +138,7 @@ def silvr_orientation(point: Any) -> list[float]:
 
 
 def seen_at(content: dict[str, Any], frame: int, point: Any) -> tuple[float, float]:
-    """Return the pixel at which lightfield.json says that a world point is seen."""
+    """Return the pixel at which lightfield.json's camera sees a world point."""
     matrix = np.array(content["frames"][frame]["world_matrix"])
     x, y, z = matrix[:3, :3].T @ (np.asarray(point) - matrix[:3, 3])
     width, height = content["resolution"]
@@ -195,7 +193,7 @@ def test_a_perspective_lens_is_named_by_its_angles_and_focal_lengths(dataset: Da
 
 
 def test_a_camera_worked_by_hand(dataset: Dataset) -> None:
-    """A level camera at (1, 2, 3) looking along +Y, and one at (3, 2, 3) looking straight down."""
+    """One camera is level at (1, 2, 3) and looks along +Y. One at (3, 2, 3) looks straight down."""
     rows = ["name,x,y,z,rx,ry,rz", f"a,1,2,3,{math.pi / 2},0,0", "b,3,2,3,0,0,0"]
     (dataset.folder / "poses.csv").write_text("\n".join(rows))
     rig = {"type": "poses", "file": str(dataset.folder / "poses.csv")}
@@ -208,17 +206,17 @@ def test_a_camera_worked_by_hand(dataset: Dataset) -> None:
     np.testing.assert_allclose(
         down, [[0, 1, 0, 2], [-1, 0, 0, -3], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-9
     )
-    # The mean camera, (2, 2, 3), is (2, −2, 3) there.
+    # The mean camera, (2, 2, 3), is at (2, −2, 3) there.
     np.testing.assert_allclose(transforms["offset"], [0.3, 0.7, -0.1], atol=1e-12)
     assert transforms["scale"] == 0.1
     assert transforms["camera_angle_x"] == pytest.approx(math.pi / 2)
     assert (transforms["fl_x"], transforms["cx"], transforms["w"]) == (128, 128, 256)
 
 
-def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(dataset: Dataset) -> None:
+def test_frames_keep_the_views_order_under_natural_sorting(dataset: Dataset) -> None:
     rig = {"type": "plane", "cameras": [12, 2]}
     content = dataset.write({**FISHEYE, "resolution": [1, 1]}, rig)
-    # As a rig of more than 10,000 views names them.
+    # These are names of a rig of more than 10,000 views.
     for number, frame in enumerate(content["frames"][12:], 9990):
         frame["name"] = f"view_{number:04d}f"
     (dataset.folder / "lightfield.json").write_text(json.dumps(content))
@@ -265,7 +263,7 @@ def test_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
     assert not list(dataset.folder.glob("dynamic_mask_*"))
 
 
-def test_where_transparent_views_see_nothing_is_not_hidden(dataset: Dataset) -> None:
+def test_empty_pixels_of_transparent_views_are_not_hidden(dataset: Dataset) -> None:
     content = dataset.write(PERSPECTIVE, render={"transparent": True})
     clear = np.zeros((48, 64, 4), np.uint8)
     half = np.full((48, 64), 0.5, np.float16)
@@ -280,9 +278,7 @@ def test_where_transparent_views_see_nothing_is_not_hidden(dataset: Dataset) -> 
     np.testing.assert_array_equal(copied["A"], half)
 
 
-def test_images_that_are_not_there_yet_are_a_warning(
-    dataset: Dataset, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFixture[str]) -> None:
     dataset.write(PERSPECTIVE)
     images.write_png(dataset.folder / "view_0000f.png", np.ones((48, 64, 3), np.uint8))
     assert len(dataset.export()["frames"]) == 6
@@ -359,7 +355,7 @@ def test_exr_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
         np.testing.assert_array_equal(second.channels[name], 0.25)
 
 
-def test_a_depth_map_counts_millimetres_and_is_0_where_there_is_none() -> None:
+def test_a_depth_map_has_millimetres_and_0_without_depth() -> None:
     depth = np.array([2.0, 0.001, 0.0004, 65.535, 65.5361, np.inf, np.nan])
     assert millimetres(depth).tolist() == [2000, 1, 0, 65535, 0, 0, 0]
 
@@ -382,7 +378,7 @@ def in_unit_cube(loader: Loader, points: Any) -> bool:
     )
 
 
-def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(dataset: Dataset) -> None:
+def test_a_box_fitted_to_the_rig_is_a_fifth_of_the_cube_and_centred(dataset: Dataset) -> None:
     content = dataset.write(FISHEYE, {"type": "sphere", "subdivisions": 2, "center": [5, 6, 7]})
     loader = Loader(dataset.export())
     positions = np.array(
@@ -400,7 +396,7 @@ def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(dataset: D
         {"type": "ring", "count": 5, "size": 3},
     ],
 )
-def test_a_rig_that_looks_inward_fills_the_cube_around_what_it_looks_at(
+def test_a_rig_that_looks_inward_fills_the_cube_around_its_target(
     rig: Any, dataset: Dataset
 ) -> None:
     content = dataset.write(PERSPECTIVE, rig | {"center": [5, 6, 7]})
@@ -412,15 +408,15 @@ def test_a_rig_that_looks_inward_fills_the_cube_around_what_it_looks_at(
     assert np.abs(apart).max() == pytest.approx(0.5, abs=1e-6)
 
 
-def test_a_point_farther_away_than_the_rig_reaches_is_not_what_it_looks_at() -> None:
+def test_a_point_beyond_the_rigs_reach_is_not_its_target() -> None:
     cameras = np.array([[98.0, 0, 0], [100, 0, 0], [102, 0, 0], [100, 0, 1]])
     for away, expected in ((2.5, None), (1.5, [100, 1.5, 0])):
         axes = np.array([100, away, 0]) - cameras
-        found = instant_ngp.looked_at(cameras, axes / np.linalg.norm(axes, axis=1, keepdims=True))
-        assert found is None if expected is None else np.allclose(found, expected)
+        target = instant_ngp.looked_at(cameras, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+        assert target is None if expected is None else np.allclose(target, expected)
 
 
-def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
+def test_a_scene_fitted_to_depth_is_within_the_cube(dataset: Dataset) -> None:
     rig = {"type": "sphere", "subdivisions": 1, "size": 0.02, "center": [1, -2, 3]}
     content = dataset.write(FISHEYE, rig, depth="distance")
     dataset.render(content, FISHEYE, "distance", 4.0)
@@ -436,8 +432,8 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
 def test_a_wall_straight_ahead_puts_the_rig_in_the_middle_of_the_cubes_sides(
     dataset: Dataset,
 ) -> None:
-    # Of three by three pixels the bounds take the one in the middle, whose ray goes through its
-    # centre: to the left and to the right they reach equally far.
+    # Of three by three pixels the bounds take the middle one, whose ray goes through its centre. So
+    # they reach equally far to the left and to the right.
     camera = {"lens": "rectilinear", "fov": 90, "resolution": [192, 192]}
     rig = {"type": "plane", "cameras": [2, 2], "size": 0.5}
     content = dataset.write(camera, rig, depth="z")
@@ -455,21 +451,21 @@ def test_split_gives_odd_sequence_numbers_to_the_test_file(
     dataset: Dataset, capsys: pytest.CaptureFixture[str]
 ) -> None:
     dataset.write(FISHEYE)
-    everything = dataset.export()
+    all_frames = dataset.export()
     said = [line.split(", scale")[0] for line in capsys.readouterr().out.splitlines()]
     counts = {"transforms": 6, "transforms_train": 3, "transforms_test": 3}
     assert said == [f"{dataset.folder / name}.json: {counts[name]} frames" for name in counts]
     parts = {}
     for part in ("train", "test"):
         parts[part] = dataset.read(f"transforms_{part}.json")
-        assert parts[part] | {"frames": 0} == everything | {"frames": 0}
+        assert parts[part] | {"frames": 0} == all_frames | {"frames": 0}
     names = [Path(frame["file_path"]).stem for frame in parts["test"]["frames"]]
     assert names == ["view_0001f", "view_0003f", "view_0005f"]
     assert len(parts["train"]["frames"]) == 3
-    assert len(everything["frames"]) == 6
+    assert len(all_frames["frames"]) == 6
 
 
-def test_what_tests_another_dataset_is_placed_as_that_one(dataset: Dataset) -> None:
+def test_a_rig_that_tests_another_dataset_is_placed_like_it(dataset: Dataset) -> None:
     dataset.write(FISHEYE)
     trained = dataset.export()
     (dataset.folder / "transforms.json").rename(dataset.folder / "trained.json")
@@ -489,7 +485,7 @@ def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
     assert transforms["render_aabb"] == [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
 
 
-def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None:
+def test_the_yaml_has_every_option_of_the_program(dataset: Dataset) -> None:
     content = dataset.write(FISHEYE, depth="distance")
     dataset.render(content, FISHEYE, "distance", 4.0)
     settings = {"sources": ["views"], "bounds": "depth", "aabb_scale": 2, "depth": True}
@@ -525,7 +521,7 @@ def test_a_settings_file_names_one_source(dataset: Dataset) -> None:
 @pytest.mark.parametrize(
     ("lens", "fov"), [("equisolid", 180), ("stereographic", 180), ("stereographic", 300)]
 )
-def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
+def test_other_fisheyes_are_approximated_to_a_quarter_of_a_pixel(
     lens: str, fov: float, dataset: Dataset
 ) -> None:
     camera: dict[str, Any] = {"lens": lens, "resolution": [512, 512], "fov": fov}
@@ -533,7 +529,7 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
         camera |= {"focal_length": 36 / 2 / 2 / math.sin(math.pi / 4)}
     dataset.write(camera)
     loader = Loader(dataset.export())
-    # Where a ray of 90 degrees appears.
+    # The place of a ray of 90 degrees.
     rim = 256 * math.tan(math.radians(45)) / math.tan(math.radians(fov / 4))
     for x in 256 + np.linspace(2, rim - 3, 40):
         radius = (x - 256) / rim
@@ -548,8 +544,8 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> None:
-    terms = [0.01, -0.1, 2e-3, -3e-4, 1e-5]  # radians per mm^i, of which a pixel has 36 / 64
+def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) -> None:
+    terms = [0.01, -0.1, 2e-3, -3e-4, 1e-5]  # Radians per mm^i; a pixel has 36 / 64 mm.
     coefficients = [turned * term for term in terms]
     lens = {"lens": "polynomial", "coefficients": coefficients, "resolution": [64, 64]}
     dataset.write(lens | {"fov": 140})
@@ -563,7 +559,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
     linear = [transforms[f"ftheta_p{power}"] for power in range(5)]
     assert linear == [0, pytest.approx(math.pi / 64, rel=1e-9), 0, 0, 0]
     assert transforms["fl_x"] == pytest.approx(64 / math.pi)
-    # It misses the loader's polynomial by less than a quarter of a pixel, as that has few.
+    # The loader's polynomial has few terms, and misses it by less than a quarter of a pixel.
     dataset.write(ORTHOGRAPHIC | {"resolution": [32, 32]})
     assert dataset.export()["w"] == 32
 
@@ -576,7 +572,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (ORTHOGRAPHIC | {"resolution": [40, 40]}, [], "misses it by 0.26 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
-        # A fisheye along both axes of the image, and none between them.
+        # A fisheye along both axes of the image, but not between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
         (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: does not go with scale"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
@@ -585,7 +581,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),
     ],
 )
-def test_what_cannot_be_exported_is_an_error(
+def test_an_impossible_export_is_an_error(
     camera: Any, arguments: list[Any], message: str, dataset: Dataset
 ) -> None:
     dataset.write(camera, {"type": "plane", "cameras": [3, 1]})
@@ -595,7 +591,7 @@ def test_what_cannot_be_exported_is_an_error(
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         ([], "required: --input-cfg, --output"),
         (["--image-suffix", ".jpg"], "--image-suffix: invalid choice: '.jpg'"),
@@ -603,13 +599,11 @@ def test_what_cannot_be_exported_is_an_error(
         (["--offset", "0", "nan", "0"], "--offset: is nan; must be a finite number"),
     ],
 )
-def test_what_the_command_line_cannot_say(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+def test_impossible_arguments_are_refused(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    parser = argparse.ArgumentParser()
-    instant_ngp.add_arguments(parser)
     with pytest.raises(SystemExit):
-        parser.parse_args(words)
+        export_instant_ngp.main(arguments)
     assert message in capsys.readouterr().err
 
 
@@ -617,7 +611,7 @@ def test_one_camera_has_no_extent_to_fit(dataset: Dataset) -> None:
     dataset.write(FISHEYE, {"type": "plane", "cameras": [1, 1], "center": [1, 2, 3]})
     with pytest.raises(UserError, match="extent is zero"):
         dataset.export()
-    # Where it is given, the mean camera lies in the middle.
+    # With a given scale, the mean camera lies in the middle.
     transforms = dataset.export("--scale", 2)
     np.testing.assert_allclose(Loader(transforms).camera(0)[1], 0.5)
     model = TypeAdapter(InstantNgp).validate_python({"sources": ["views"], "scale": 2})
@@ -642,11 +636,11 @@ def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -
 
 
 def test_the_program_names_what_is_wrong_in_a_line(dataset: Dataset, run_program: Any) -> None:
-    words = ("--input-cfg", dataset.folder / "lightfield.json")
-    words += ("--output", dataset.folder / "transforms.json")
-    result = run_program("export_instant_ngp.py", *words, check=False)
+    arguments = ("--input-cfg", dataset.folder / "lightfield.json")
+    arguments += ("--output", dataset.folder / "transforms.json")
+    result = run_program("export_instant_ngp.py", *arguments, check=False)
     assert result.returncode == 1
     assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
     dataset.write(FISHEYE)
-    run_program("export_instant_ngp.py", *words)
+    run_program("export_instant_ngp.py", *arguments)
     assert len(dataset.read("transforms.json")["frames"]) == 6

@@ -1,9 +1,8 @@
-"""Validation reads every export back: a number that is not that of lightfield.json is named.
+"""Validation reads every export back, and names a number that differs from lightfield.json's.
 
-The scene is a ball in a sphere, every export one of it that this project wrote.
+The scene is a ball in a sphere. It has every export that this project writes.
 """
 
-import argparse
 import json
 import re
 import shutil
@@ -15,12 +14,13 @@ import pytest
 from pydantic import TypeAdapter
 from sphere import LENSES, look_at_ball, write_views
 
+import export_instant_ngp
 from lightfield import export
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
-from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
@@ -29,7 +29,7 @@ from lightfield.validation.pixels import Examiner
 from lightfield.validation.validate import validate
 
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
-# As far apart across as down, which HCI's layout needs; no number of a pose is round.
+# HCI's layout needs equal steps across and down. No number of a pose is round.
 RIG = {
     "type": "plane",
     "cameras": [5, 2],
@@ -48,7 +48,7 @@ SETS = {
     "half": LENSES["half"],
     "split": LENSES["perspective"],
 }
-# What each set is exported as; "views" are the rendered ones.
+# The exports of each set; "views" are the rendered ones.
 EXPORTS = {
     "views": {"opendibr": {}, "point_cloud": {"voxel": 0.1}},
     "perspective": {
@@ -92,8 +92,8 @@ def dataset(tmp_path_factory):
     for name, formats in EXPORTS.items():
         for kind, options in formats.items():
             write_export(folder, name, kind, options)
-    for name, words in INSTANT_NGP.items():
-        write_instant_ngp(folder, name, words)
+    for name, arguments in INSTANT_NGP.items():
+        write_instant_ngp(folder, name, arguments)
     return folder
 
 
@@ -107,24 +107,24 @@ def write_export(folder, name, kind, options, beside=None):
     export.run(kind, source, settings, home(folder, name) / "exports" / kind)
 
 
-def write_instant_ngp(folder, name, words):
-    parser = argparse.ArgumentParser()
-    instant_ngp.add_arguments(parser)
-    own = home(folder, name)
-    files = ["--input-cfg", own / "lightfield.json", "--output", own / "transforms.json"]
-    files += ["--image-suffix", ".exr", "--image-dir", folder / "exr" if own == folder else own]
-    files += ["--depth-dir", own / "instant_ngp" / "depth"]
-    instant_ngp.export(parser.parse_args([*map(str, files), *words]))
+def write_instant_ngp(folder, name, arguments):
+    folder_of_set = home(folder, name)
+    images = folder / "exr" if folder_of_set == folder else folder_of_set
+    files = ["--input-cfg", folder_of_set / "lightfield.json"]
+    files += ["--output", folder_of_set / "transforms.json"]
+    files += ["--image-suffix", ".exr", "--image-dir", images]
+    files += ["--depth-dir", folder_of_set / "instant_ngp" / "depth"]
+    export_instant_ngp.main([*map(str, files), *arguments])
 
 
 def problems(folder, name, kind):
-    """Return what the checks of one kind of export of a set find, of the views' depth too."""
+    """Return the problems that the checks of one export find, with those of depth."""
     lists = home(folder, name).glob("transforms*.json")
     if kind != "instant_ngp":
         lists = [home(folder, name) / "exports" / kind / "export.json"]
     wanted = {path.resolve() for path in lists}
     sets, _ = read_sets(folder, [] if name == "views" else [name])
-    found, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
+    checks, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
     of_depth = ExportedDepth(folder, sets, exports)
     examiner = Examiner(folder, sets)
 
@@ -132,35 +132,38 @@ def problems(folder, name, kind):
         return [examiner.answer_depth(*each) for each in asked]
 
     files = [
-        File(f"{one.folder}/{view}.exr", number, index)
-        for number, one in enumerate(sets)
-        for index, view in enumerate(one.views)
+        File(f"{image_set.folder}/{view}.exr", number, index)
+        for number, image_set in enumerate(sets)
+        for index, view in enumerate(image_set.views)
     ]
     asked = [(file, of_depth.question(file)) for file in files if of_depth.question(file)]
-    answers = {(file.set, file.view): one for (file, _), one in zip(asked, ask(asked), strict=True)}
-    found += of_depth.checks(answers, ask)
-    return [line for check in found for line in check.problems]
+    answers = {
+        (file.set, file.view): image_set
+        for (file, _), image_set in zip(asked, ask(asked), strict=True)
+    }
+    checks += of_depth.checks(answers, ask)
+    return [line for check in checks for line in check.problems]
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_right_exports_agree_with_their_views(name, dataset):
+def test_correct_exports_agree_with_their_views(name, dataset):
     result = validate(dataset, [] if name == "views" else [name], manifests=MANIFESTS)
     prefix = "" if name == "views" else f"{name}/"
-    found = {check.name.removeprefix(prefix): check for check in result.checks}
-    for check in (found["exported_cameras"], found["exported_depth"]):
+    checks = {check.name.removeprefix(prefix): check for check in result.checks}
+    for check in (checks["exported_cameras"], checks["exported_depth"]):
         assert check.passed, check.problems
-    own = EXPORTS[name]
-    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & own.keys()
-    assert (found["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
-    # A part of the split has a list of instant-ngp's, too.
-    lists = len(own) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
-    assert f"{lists} exports" in found["exported_cameras"].detail
+    exports_of_set = EXPORTS[name]
+    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & exports_of_set.keys()
+    assert (checks["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
+    # Each part of the split also has a list for instant-ngp.
+    lists = len(exports_of_set) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
+    assert f"{lists} exports" in checks["exported_cameras"].detail
 
 
 def other_digit(text, place=0):
     """Return a number of the same length that differs in one digit.
 
-    It is that at a ``place`` among those that count, or the last one.
+    ``place`` counts the significant digits. If it is too large, the last digit changes.
     """
     digits = [index for index, letter in enumerate(text.partition("e")[0]) if letter.isdigit()]
     while text[digits[0]] == "0" and len(digits) > 1:
@@ -171,7 +174,7 @@ def other_digit(text, place=0):
 
 @contextmanager
 def changed(path, content):
-    """Let a file have another content of the same length for a while."""
+    """Replace a file's content for a while, by one of the same length."""
     right = path.read_bytes()
     assert len(content) == len(right)
     assert content != right
@@ -183,7 +186,7 @@ def changed(path, content):
 
 
 def in_json(path, keys, place):
-    """Return a JSON file's bytes with one digit of the number at ``keys`` changed."""
+    """Return a JSON file's bytes with a changed digit in the number at ``keys``."""
     content = read_json(path)
     *parents, last = keys
     parent = content
@@ -194,7 +197,7 @@ def in_json(path, keys, place):
 
 
 def in_text(path, pattern, place):
-    """Return a text's bytes with one digit of the number changed that is the pattern's group."""
+    """Return a text's bytes with a changed digit in the number that the pattern's group matches."""
     text = path.read_text()
     match = re.search(pattern, text, re.M)
     start, end = match.span(1)
@@ -208,7 +211,7 @@ OF_LENS = "transforms.json: its camera"
 CAMERA = ("cameras", 4)
 OF_CAMERA = "cameras[4] (view_0003f)"
 
-# Of the set and the export: the number in JSON by its keys, and what validation says of it.
+# The set, the export, the number's keys in the JSON, and the message of validation.
 IN_JSON = [
     ("perspective", "instant_ngp", "", (*FRAME, 0, 3), OF_POSITION),
     ("perspective", "instant_ngp", "", (*FRAME, 2, 1), OF_ROTATION),
@@ -298,10 +301,10 @@ IN_JSON = [
 def test_a_changed_digit_in_json_is_found(name, kind, file, keys, said, place, dataset):
     path = home(dataset, name) / (f"exports/{kind}/{file}" if file else "transforms.json")
     with changed(path, in_json(path, keys, place)):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
     shown = path.relative_to(dataset).as_posix().removesuffix(".json")
-    assert all(shown in line or f"exports/{kind}/" in line for line in found)
+    assert all(shown in line or f"exports/{kind}/" in line for line in problem_lines)
 
 
 NUMBER = r"(-?\d+\.\d+(?:e-\d+)?)"
@@ -318,7 +321,7 @@ def point_number(place):
 
 
 MODEL = "colmap/sparse/0"
-# The same of texts: the number is the group of a pattern.
+# The same for texts. The number is the group of a pattern.
 IN_TEXT = [
     *(
         (name, kind, f"{folder}/{file}", pattern, said)
@@ -386,13 +389,13 @@ IN_TEXT = [
 def test_a_changed_digit_in_text_is_found(name, kind, file, pattern, said, place, dataset):
     path = home(dataset, name) / "exports" / file
     with changed(path, in_text(path, pattern, place)):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
-    assert all(f"{name}/exports/{kind}/" in line for line in found)
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
+    assert all(f"{name}/exports/{kind}/" in line for line in problem_lines)
 
 
 def binary_places(folder):
-    """Yield file, byte and type of numbers of the binary model in a folder, and what is said."""
+    """Yield file, byte, type and message of numbers in the binary model of a folder."""
     for index in range(4):
         yield "cameras.bin", 32 + 8 * index, "d", "camera 1: its camera"
     yield "cameras.bin", 16, "Q", "camera 1: its image has"
@@ -420,9 +423,9 @@ def test_a_changed_number_in_a_binary_model_is_found(name, dataset):
             f"<{kind}", content, start, 1.001 * value + 0.001 if kind == "d" else value + 1
         )
         with changed(folder / file, content):
-            found = problems(dataset, name, "colmap")
-        assert any(said in line for line in found), (file, start, found)
-        assert all(f"{name}/exports/colmap/sparse/0/" in line for line in found)
+            problem_lines = problems(dataset, name, "colmap")
+        assert any(said in line for line in problem_lines), (file, start, problem_lines)
+        assert all(f"{name}/exports/colmap/sparse/0/" in line for line in problem_lines)
 
 
 @pytest.mark.parametrize(
@@ -442,18 +445,20 @@ def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset)
         (value,) = struct.unpack_from("<f", content, place)
         struct.pack_into("<f", content, place, value + 1e-4)
     with changed(path, content):
-        found = problems(dataset, name, kind)
-    expected = [f"points.ply: vertex {vertex}: is no point of a view's depth" for vertex in moved]
-    shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in found]
+        problem_lines = problems(dataset, name, kind)
+    expected = [
+        f"points.ply: vertex {vertex}: is not a point of a view's depth" for vertex in moved
+    ]
+    shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in problem_lines]
     if len(moved) > 100:
-        assert f"{len(moved)} of" in found[-1]
+        assert f"{len(moved)} of" in problem_lines[-1]
         shown, expected = shown[:-1], expected[:100]
     assert shown == expected
     content = bytearray(right)
     (value,) = struct.unpack_from("<f", content, start + 12)
     struct.pack_into("<f", content, start + 12, value + 0.5)
     with changed(path, content):
-        assert "vertex 0: its normal is no unit vector" in problems(dataset, name, kind)[0]
+        assert "vertex 0: its normal is not a unit vector" in problems(dataset, name, kind)[0]
 
 
 def test_the_program_names_file_view_and_number_of_a_changed_matrix(dataset, run_program):
@@ -493,10 +498,12 @@ def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset
     for content in (b"", right[: len(right) // 2], b"\xff" * 64, b"{}", b"[1]"):
         path.write_bytes(content)
         try:
-            found = problems(dataset, name, kind)
+            problem_lines = problems(dataset, name, kind)
         finally:
             path.write_bytes(right)
-        assert any(line.startswith(f"{name}/exports/{file}: ") for line in found), content[:9]
+        assert any(line.startswith(f"{name}/exports/{file}: ") for line in problem_lines), content[
+            :9
+        ]
     if path.name != "export.json":
         path.rename(tmp_path / "away")
         try:
@@ -514,7 +521,7 @@ def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset
         ("half", "miv", "sequence.json", (*CAMERA, "Rotation"), "sequence.json: cameras[4]: "),
     ],
 )
-def test_a_view_without_the_numbers_that_it_needs_is_named(name, kind, file, keys, said, dataset):
+def test_a_view_with_missing_numbers_is_named(name, kind, file, keys, said, dataset):
     path = home(dataset, name) / "exports" / kind / file
     right = path.read_bytes()
     content = json.loads(right)
@@ -526,23 +533,23 @@ def test_a_view_without_the_numbers_that_it_needs_is_named(name, kind, file, key
         parent[last] = value
         path.write_text(json.dumps(content))
         try:
-            found = problems(dataset, name, kind)
+            problem_lines = problems(dataset, name, kind)
         finally:
             path.write_bytes(right)
-        assert any(said in line for line in found), found
+        assert any(said in line for line in problem_lines), problem_lines
 
 
 @pytest.mark.parametrize("value", ["nan", "1e999", "a few"])
 @pytest.mark.parametrize("key", ["focal_length_mm", "baseline_mm", "center_cam_rx_rad", "disp_max"])
-def test_parameters_that_are_no_numbers_are_named(key, value, dataset):
+def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
     path = dataset / "perspective" / "exports" / "hci" / "parameters.cfg"
     right = path.read_text()
     path.write_text(re.sub(rf"{key} = .*", f"{key} = {value}", right))
     try:
-        found = problems(dataset, "perspective", "hci")
+        problem_lines = problems(dataset, "perspective", "hci")
     finally:
         path.write_text(right)
-    assert f"parameters.cfg: {key}: " in found[0]
+    assert f"parameters.cfg: {key}: " in problem_lines[0]
 
 
 @pytest.mark.parametrize(
@@ -589,8 +596,8 @@ def test_a_changed_name_is_found(name, kind, file, old, new, said, dataset):
     text = path.read_text()
     assert old in text
     with changed(path, text.replace(old, new, 1).encode()):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
 
 
 def test_points_are_found_in_any_order(dataset):
@@ -602,7 +609,7 @@ def test_points_are_found_in_any_order(dataset):
         assert problems(dataset, "views", "point_cloud") == []
 
 
-def test_a_list_of_a_part_is_of_all_views_where_nothing_is_split(tmp_path):
+def test_without_a_split_a_parts_list_has_all_views(tmp_path):
     folder = tmp_path / "dataset"
     write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
     write_instant_ngp(folder, "views", [])
@@ -610,7 +617,7 @@ def test_a_list_of_a_part_is_of_all_views_where_nothing_is_split(tmp_path):
     assert problems(folder, "views", "instant_ngp") == []
 
 
-def test_points_of_views_that_cannot_be_read_are_not_called_right(dataset):
+def test_points_of_unreadable_views_do_not_pass(dataset):
     path = dataset / "exr" / "view_0003f.exr"
     right = path.read_bytes()
     path.write_bytes(right[:500])
@@ -625,7 +632,7 @@ def test_points_of_views_that_cannot_be_read_are_not_called_right(dataset):
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A scene of a rig to train on, exported with the one that tests it."""
+    """A scene of a rig to train on, exported with a rig that tests it."""
     folder = tmp_path_factory.mktemp("rigs") / "scene"
     for name, split in (("around", "train"), ("along", "test")):
         rig = RIG | {"split": split, "center": [0.1 * len(name), 0, 0]}
@@ -645,7 +652,7 @@ def scene(tmp_path_factory):
     return folder
 
 
-def test_views_of_the_rig_that_tests_are_compared_with_its_own_lightfield(scene):
+def test_views_of_a_rig_that_tests_are_compared_with_its_own_lightfield(scene):
     for rig in ("around", "along"):
         for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
             if rig == "around" or kind == "instant_ngp":
@@ -653,15 +660,15 @@ def test_views_of_the_rig_that_tests_are_compared_with_its_own_lightfield(scene)
     path = scene / "around" / "exports" / "nerf_synthetic" / "transforms_test.json"
     keys = ("frames", 2, "transform_matrix", 1, 3)
     with changed(path, in_json(path, keys, 2)):
-        found = problems(scene / "around", "views", "nerf_synthetic")
-    assert "transforms_test.json: frames[2] (along_view_0002f): its position" in found[0]
+        problem_lines = problems(scene / "around", "views", "nerf_synthetic")
+    assert "transforms_test.json: frames[2] (along_view_0002f): its position" in problem_lines[0]
     path = scene / "along" / "transforms.json"
     for keys in (("scale",), ("offset", 1)):
         with changed(path, in_json(path, keys, 2)):
             assert "scale, offset" in problems(scene / "along", "views", "instant_ngp")[0]
 
 
-def test_an_unpacked_dataset_may_have_views_of_rigs_that_are_not_here(scene, tmp_path):
+def test_an_unpacked_dataset_may_lack_the_rigs_that_test_it(scene, tmp_path):
     for rig in ("around", "along"):
         shutil.copytree(scene / rig, tmp_path / f"scene_{rig}")
     for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
@@ -692,7 +699,7 @@ def test_a_rig_that_looks_inward_fills_the_unit_cube(tmp_path):
             assert "scale, offset" in problems(tmp_path / "dataset", "views", "instant_ngp")[0]
 
 
-def test_a_light_field_may_say_a_pose_twice_in_two_roundings(tmp_path):
+def test_a_lightfield_may_have_a_pose_in_two_roundings(tmp_path):
     folder = tmp_path / "dataset"
     write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
     content = read_json(folder / "lightfield.json")
@@ -700,7 +707,7 @@ def test_a_light_field_may_say_a_pose_twice_in_two_roundings(tmp_path):
         frame["position"] = [round(value, 6) for value in frame["position"]]
         frame["rotation"] = [round(value, 6) for value in frame["rotation"]]
     write_json(folder / "lightfield.json", content)
-    # The one export is by its angles, the other by its matrices.
+    # One export follows from the angles, the other from the matrices.
     write_instant_ngp(folder, "views", [])
     write_export(folder, "views", "nerfstudio", {"points": 60})
     for kind in ("instant_ngp", "nerfstudio"):

@@ -1,4 +1,4 @@
-"""Exports, read back as their consumers read them, of a scene whose every point is known."""
+"""Exports of a scene whose points are all known, read back as their consumers read them."""
 
 import configparser
 import csv
@@ -63,7 +63,7 @@ def on_sphere(points, tolerance):
 
 
 class Colmap:
-    """A model as text, by COLMAP's format.rst."""
+    """A model as text, according to COLMAP's format.rst."""
 
     def __init__(self, folder):
         def lines(name):
@@ -100,16 +100,16 @@ class Colmap:
         ]
 
     def lift(self, pixels, z):
-        """Return the points (n, 3) in the camera's frame that OpenCV finds in pixels (n, 2)."""
+        """Return the points (n, 3) in the camera's frame that OpenCV computes for pixels (n, 2)."""
         if self.distortion is None:
-            found = cv2.undistortPoints(pixels, self.matrix, None)
+            directions = cv2.undistortPoints(pixels, self.matrix, None)
         else:
-            found = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
-        return np.column_stack([found.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
+            directions = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
+        return np.column_stack([directions.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
 
 
 @pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
-def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
+def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
     folder = exported(dataset, "colmap", source, tmp_path, format="text", points=400)
     model = Colmap(folder / "sparse" / "0")
     assert 100 < len(model.positions) <= 400
@@ -119,7 +119,7 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
         assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 1
         for image, index in model.tracks[number]:
             assert model.seen[image][index, 2] == number
-    found = 0
+    point_count = 0
     for name, turn, shift in model.images.values():
         camera = -turn.T @ shift
         np.testing.assert_allclose(camera, matrices(dataset, source)[name[:-4]][:3, 3], atol=1e-12)
@@ -128,8 +128,8 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
         places = np.array([model.positions[int(number)] for number in rows[:, 2]])
         expected = model.project(places, *model.images[image][1:])
         np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
-        found += len(rows)
-    # Nothing hides anything inside a sphere: every view in whose image a point lies sees it.
+        point_count += len(rows)
+    # Nothing inside a sphere hides anything. So a view sees every point in its image.
     every = 0
     for name, turn, shift in model.images.values():
         places = np.array([*model.positions.values()])
@@ -141,18 +141,19 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
         if mask.exists():
             valid = images.read_image(mask).channels["Y"]
             column, row = np.where(inside, x, 0).astype(int), np.where(inside, y, 0).astype(int)
-            # A pixel at the rim of an image circle is valid, but not all of it is seen.
+            # A pixel at the rim of an image circle is valid, but partly outside the circle.
             angle = np.degrees(np.arctan2(np.hypot(*local.T[:2]), local[:, 2]))
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
-    assert found == every
+    assert point_count == every
 
 
 def read_by_3dgrut(model):
-    """Return the angles that 3DGRUT gives to pixels, in radians, and those it takes to pixels.
+    """Return the angles in radians that 3DGRUT computes for pixels, and those that it projects.
 
-    By its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh: the
-    angles (h, w) of pixels, and radii in focal lengths of angles up to its largest, two rows.
+    Follows its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh.
+    The first are the angles (h, w) of pixels. The others are two rows: angles up to the largest,
+    and their radii in focal lengths.
     """
     width, height = map(int, model.size_and_parameters[:2])
     fx, fy, cx, cy, *distortion = model.parameters
@@ -177,7 +178,7 @@ TURNING = [0.02, -0.01, 0.003, -0.001]
         ({"coefficients": TURNING}, "stops growing at 109.2°, but 3DGRUT reads it up to 121.5°"),
         ({"coefficients": [0, 0, 0, 0]}, None),
         ({"coefficients": [0.02, 0.01, 0, 0]}, None),
-        # Newton's method begins beyond the corner's angle, where the radius falls.
+        # Newton's method starts beyond the corner's angle, where the radius falls.
         ({"coefficients": [0.021, -0.0043, -0.002, -0.0006], "fov": 174}, "stops growing at"),
         ({"coefficients": TURNING, "focal_length": 40}, None),
         ({"coefficients": [-0.1, 0, 0, 0], "focal_length": 24}, "draws nothing beyond 60.8°"),
@@ -207,7 +208,7 @@ def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, 
     assert (off or folds_in or cut) == (problem is not None)
 
 
-def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
+def test_colmaps_binary_model_equals_its_text_model(dataset, tmp_path):
     text = exported(dataset, "colmap", "fisheye", tmp_path / "text", format="text", points=50)
     binary = exported(dataset, "colmap", "fisheye", tmp_path / "binary", points=50)
     model, folder = Colmap(text / "sparse" / "0"), binary / "sparse" / "0"
@@ -280,7 +281,7 @@ def test_colmap_depth_maps_are_0_where_a_view_sees_the_sky(tmp_path):
 
 
 def nerfstudio_rays(content):
-    """Directions as nerfstudio's Cameras.generate_rays has them, in the camera's frame."""
+    """Return directions in the camera's frame, as nerfstudio's Cameras.generate_rays does."""
     y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
     x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
     if content["camera_model"] == "PINHOLE":
@@ -309,18 +310,18 @@ def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_array_equal(matrix, expected[Path(frame["file_path"]).stem])
         depth = images.read_image(folder / frame["depth_file_path"]).channels["Y"]
         assert depth.dtype == np.uint16
-        known = depth > 0
+        has_depth = depth > 0
         if "mask_path" in frame:
             mask = images.read_image(folder / frame["mask_path"]).channels["Y"]
-            np.testing.assert_array_equal(mask > 0, known)
+            np.testing.assert_array_equal(mask > 0, has_depth)
             assert set(np.unique(mask)) == {0, 255}
         else:
-            assert known.all()
+            assert has_depth.all()
         world = rays * (depth / 1000)[..., None] @ matrix[:3, :3].T + matrix[:3, 3]
-        on_sphere(world[known], 2e-3)
+        on_sphere(world[has_depth], 2e-3)
         picture = images.read_image(folder / frame["file_path"]).channels
         rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
-        np.testing.assert_allclose(rgb[known], colour_of(world[known]), atol=1)
+        np.testing.assert_allclose(rgb[has_depth], colour_of(world[has_depth]), atol=1)
     assert ("mask_path" in content["frames"][0]) == (source in ("fisheye", "wide"))
     vertices, _ = ply(folder / content["ply_file_path"])
     on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
@@ -338,7 +339,7 @@ def test_splits_have_no_view_in_two_and_follow_the_rig(dataset, tmp_path):
     assert all(int(Path(name).stem[5:9]) % 2 for name in test)
 
 
-def test_nerf_synthetic_is_read_by_its_own_recipe(dataset, tmp_path):
+def test_nerf_synthetic_is_read_with_its_own_formula(dataset, tmp_path):
     folder = exported(dataset, "nerf_synthetic", "perspective", tmp_path)
     names = set()
     for part, count in (("train", 10), ("val", 2), ("test", 2)):
@@ -368,7 +369,7 @@ def of_disparity(levels, camera, bits):
 
 
 def opengl_points(camera, depth):
-    """Points of every pixel as OpenDIBR's vertex shader finds them, in OpenGL's world."""
+    """Return the points of all pixels in OpenGL's world, as OpenDIBR's vertex shader does."""
     width, height = camera["Resolution"]
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     if camera["Projection"] == "Perspective":
@@ -446,7 +447,7 @@ def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_allclose(red / 224 * 1.5748, apart, atol=3e-3)
 
 
-def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
+def test_miv_has_no_depth_for_empty_pixels_and_the_farthest_for_misses():
     depth = np.array([[1.0, 2.0], [np.inf, np.nan]])
     assert disparity.depth_range(depth) == (1, disparity.FARTHEST)
     assert disparity.levels(depth, (1, 1000), 16, 1).tolist() == [[65535, 32735], [1, 0]]
@@ -455,12 +456,12 @@ def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
 @pytest.mark.slow
 @pytest.mark.parametrize("depths", [[[np.inf, np.inf]], [[2.0, np.inf]], [[5000.0, 3000.0]]])
 def test_no_far_limit_is_read_as_infinity(depths):
-    # MPEG's Reference View Synthesizer takes 1000 m and more for infinity.
+    # MPEG's Reference View Synthesizer reads 1000 m and more as infinity.
     near, far = disparity.depth_range(np.array(depths))
     assert 0 < near < far < 1000
 
 
-def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
+def test_opendibr_takes_lossless_h265_if_ffmpeg_is_installed(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
     settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})
     if shutil.which("ffmpeg"):
@@ -489,9 +490,9 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     rig = {"type": "plane", "cameras": [3, 4], "size": [0.4, 1, 0.6], "rotation": [10, 20, 30]}
     folder = tmp_path / "dataset"
     write_views(folder, LENSES["perspective"], rig)
-    found = exported(folder, "hci", "views", tmp_path)
+    disparity_folder = exported(folder, "hci", "views", tmp_path)
     config = configparser.ConfigParser()
-    config.read(found / "parameters.cfg")
+    config.read(disparity_folder / "parameters.cfg")
     extrinsics, intrinsics = config["extrinsics"], config["intrinsics"]
     columns, rows = (extrinsics.getint(f"num_cams_{axis}") for axis in "xy")
     assert (columns, rows) == (3, 4)
@@ -503,11 +504,11 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     disparities = []
     for number in range(12):
         name = f"Cam{number:03}.pfm"
-        z = pfm(found / f"gt_depth_lowres_{name}")
-        disparity = pfm(found / f"gt_disp_lowres_{name}")
+        z = pfm(disparity_folder / f"gt_depth_lowres_{name}")
+        disparity = pfm(disparity_folder / f"gt_disp_lowres_{name}")
         np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
         disparities.append(disparity)
-        # A camera is the middle one moved by whole baselines, right and down.
+        # Each camera is the middle one, moved right and down by whole baselines.
         right, down = number % columns - columns // 2, number // columns - rows // 2
         y, x = np.mgrid[:48, :64] + 0.5
         local = [(x - 32) / focal * z + 0.2 * right, -(y - 24) / focal * z - 0.2 * down, -z]
@@ -516,25 +517,31 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     assert low == pytest.approx(np.min(disparities))
     assert high == pytest.approx(np.max(disparities))
     pictures = [
-        np.stack([images.read_image(found / f"input_Cam{n:03}.png").channels[c] for c in "RGB"], -1)
+        np.stack(
+            [
+                images.read_image(disparity_folder / f"input_Cam{n:03}.png").channels[c]
+                for c in "RGB"
+            ],
+            -1,
+        )
         for n in range(12)
     ]
-    # What one camera sees is by its disparity farther left in the next, and higher in the lower.
+    # A point moves left in the next camera, and up in the lower one, by its disparity.
     y, x = np.mgrid[10:38, 20:44]
     for number, step, shift in ((4, 1, (1, 0)), (4, 3, (0, 1)), (7, -3, (0, -1))):
         apart = disparities[number][y, x]
         at = [np.float32(x - shift[0] * apart), np.float32(y - shift[1] * apart)]
         moved = cv2.remap(pictures[number + step], *at, cv2.INTER_LINEAR)
         assert np.abs(moved.astype(float) - pictures[number][y, x]).max() <= 1.5
-    middle = found / "gt_disp_lowres.pfm"
-    assert middle.read_bytes() == (found / "gt_disp_lowres_Cam007.pfm").read_bytes()
+    middle = disparity_folder / "gt_disp_lowres.pfm"
+    assert middle.read_bytes() == (disparity_folder / "gt_disp_lowres_Cam007.pfm").read_bytes()
     names = {tuple(np.round(m[:3, 3], 9)): name for name, m in matrices(folder, ".").items()}
     assert names[tuple(np.round(center, 9))] == "view_0007f"
 
 
 def test_hci_is_for_regular_grids(dataset, tmp_path):
-    with pytest.raises(UserError, match="frames: are no grid of cameras that look in parallel"):
-        exported(dataset, "hci", "perspective", tmp_path)  # farther apart down than across
+    with pytest.raises(UserError, match="frames: are not a grid of cameras that look in parallel"):
+        exported(dataset, "hci", "perspective", tmp_path)  # Rows are farther apart.
 
 
 def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path):
@@ -565,7 +572,7 @@ def ply(path):
     return vertices, head
 
 
-def test_point_cloud_has_one_coloured_point_a_voxel_with_normals_to_the_cameras(dataset, tmp_path):
+def test_a_point_cloud_has_a_coloured_point_per_voxel_and_normals_to_the_cameras(dataset, tmp_path):
     folder = exported(dataset, "point_cloud", "views", tmp_path, voxel=0.1)
     vertices, _ = ply(folder / "points.ply")
     places = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(float)
@@ -574,27 +581,27 @@ def test_point_cloud_has_one_coloured_point_a_voxel_with_normals_to_the_cameras(
     colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
     np.testing.assert_allclose(colours, colour_of(places), atol=1)
     normals = np.stack([vertices[f"n{name}"] for name in "xyz"], axis=-1)
-    known = np.linalg.norm(normals, axis=-1) > 0.5
-    assert known.mean() > 0.9
-    inward = -places[known] / RADIUS
-    assert np.degrees(np.arccos((normals[known] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
+    has_normal = np.linalg.norm(normals, axis=-1) > 0.5
+    assert has_normal.mean() > 0.9
+    inward = -places[has_normal] / RADIUS
+    assert np.degrees(np.arccos((normals[has_normal] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
 
 
-def test_poses_csv_is_a_rig_again(dataset, tmp_path):
+def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     with (folder / "poses.csv").open() as file:
         assert next(csv.reader(file)) == ["name", "x", "y", "z", "rx", "ry", "rz"]
     rig = {"type": "poses", "file": str(folder / "poses.csv")}
     again = LightField.from_rig(rig, lenses.from_camera(LENSES["perspective"]))
     for name, matrix in matrices(dataset, "perspective").items():
-        found = next(view for view in again.views if view.name == name)
-        np.testing.assert_allclose(found.matrix, matrix, atol=1e-11)
+        same_view = next(view for view in again.views if view.name == name)
+        np.testing.assert_allclose(same_view.matrix, matrix, atol=1e-11)
     assert rigs.from_settings(rig).view_count == 12
 
 
 def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "dataset")
-    # The first view looks at a wall right before it: nothing of the sphere is seen from there.
+    # The first view looks at a near wall, so it sees nothing of the sphere.
     path = tmp_path / "dataset" / "exr" / "view_0000f.exr"
     image = images.read_image(path)
     wall = {**image.channels, "Z": np.full_like(image.channels["Z"], 0.01)}
@@ -603,7 +610,7 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     model = Colmap(folder / "sparse" / "0")
     number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
     _, turn, shift = model.images[number]
-    # No other view sees the wall, and its points are kept.
+    # No other view sees the wall, so its points stay.
     assert len(model.seen[number]) > 10
     for index in model.seen[number][:, 2]:
         assert model.tracks[int(index)][:, 0].tolist() == [number]
@@ -611,7 +618,7 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     assert all(len(rows) for rows in model.seen.values())
 
 
-def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
+def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
     camera = {"lens": "rectilinear", "fov": 40, "resolution": [24, 24]}
     write_views(tmp_path / "dataset", camera, {"type": "sphere", "subdivisions": 2, "size": 0.2})
     sky = "view_0007f"
@@ -619,7 +626,7 @@ def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
     image = images.read_image(path)
     nothing = {**image.channels, "Z": np.full_like(image.channels["Z"], np.inf)}
     images.write_exr(path, nothing, {images.DEPTH_ATTRIBUTE: "z"})
-    # The views look in 42 directions, and four points are too few for all of them.
+    # The views look in 42 directions, so four points are too few.
     folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=4)
     model = Colmap(folder / "sparse" / "0")
     assert len(model.images) == 42
@@ -632,30 +639,30 @@ def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
             np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
     alone = sum(len(track) == 1 for track in model.tracks.values())
     printed = capsys.readouterr().out
-    assert f"{len(model.positions)} points, of which one view alone sees {alone}" in printed
+    assert f"{len(model.positions)} points; one view alone sees {alone} of them" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
-    one = exported(dataset, "colmap", "fisheye", tmp_path / "one", points=50)
+    first_export = exported(dataset, "colmap", "fisheye", tmp_path / "one", points=50)
     two = exported(dataset, "colmap", "fisheye", tmp_path / "two", points=50)
-    files = json.loads((one / "export.json").read_text())["files"]
+    files = json.loads((first_export / "export.json").read_text())["files"]
     assert files == {
         path.relative_to(two).as_posix(): sha256(path)
         for path in two.rglob("*")
         if path.is_file() and path.name != "export.json"
     }
-    assert (one / "export.json").read_bytes() == (two / "export.json").read_bytes()
+    assert (first_export / "export.json").read_bytes() == (two / "export.json").read_bytes()
     shutil.copytree(dataset, tmp_path / "dataset")
     target = tmp_path / "dataset" / "fisheye" / "exports" / "colmap"
-    shutil.copytree(one, target)
+    shutil.copytree(first_export, target)
     sets, _ = validation_files.read_sets(tmp_path / "dataset", ["fisheye"])
 
     def checked():
         return validation_files.of_exports(tmp_path / "dataset", sets, [], export.MANIFESTS)
 
-    found, others, check = checked()
+    exports_check, others, check = checked()
     assert check.passed
-    assert {*others, *(file.path for file in found)} >= {
+    assert {*others, *(file.path for file in exports_check)} >= {
         f"fisheye/exports/colmap/{name}" for name in (*files, "export.json")
     }
     points = target / "sparse" / "0" / "points3D.bin"
@@ -664,12 +671,12 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
     points.write_bytes(content)
     assert not checked()[2].passed
     points.unlink()
-    assert "is no file of the dataset" in checked()[2].problems[0]
+    assert "is not a file of the dataset" in checked()[2].problems[0]
     outside = tmp_path / "outside.txt"
     outside.touch()
     listed = {"files": {"../../../../outside.txt": sha256(outside)}}
     (target / "export.json").write_text(json.dumps(listed))
-    assert "outside.txt is no file of the dataset" in checked()[2].problems[0]
+    assert "outside.txt is not a file of the dataset" in checked()[2].problems[0]
 
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
@@ -700,21 +707,19 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "is a part of a panorama",
         ),
         ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
-        ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
+        ("nerf_synthetic", "views", VIEWS, {}, "is not a pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
         ("opendibr", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("miv", "views", VIEWS, {}, "a fisheye of 180 degrees with longitude: .-90, 90."),
         ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
-        ("hci", "views", VIEWS, {}, "is no pinhole camera"),
+        ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
-        ("scannetpp", "views", VIEWS, {}, "no equidistant fisheye below 180 degrees"),
+        ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
-def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
-    name, source, camera, options, problem
-):
+def test_yaml_that_a_consumer_cannot_take_is_refused(name, source, camera, options, problem):
     content = {
         "scene": {"blend": "a.blend"},
         "render": {"samples": 1},
@@ -727,7 +732,7 @@ def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
     assert f"exports.{name}.sources: " in str(caught.value)
 
 
-def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
+def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     camera = LENSES["perspective"]
     rigs = {
         "Plane": RIG | {"camera": camera},
@@ -743,7 +748,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
     }
     assert TypeAdapter(Scene).validate_python(content).exports.hci
     content["exports"] = {"hci": {"sources": ["views"]}}
-    with pytest.raises(ValidationError, match="views is of the rig Ball, which is no plane"):
+    with pytest.raises(ValidationError, match="views is of the rig Ball, which is not a plane"):
         TypeAdapter(Scene).validate_python(content)
     content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
     content["reprojections"] = {}
@@ -755,7 +760,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
     assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp
 
 
-def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
+def test_only_an_earlier_export_is_replaced(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     (folder / "export.json").unlink()
     with pytest.raises(UserError, match=r"perspective: holds poses.csv, which is of no export"):
@@ -763,7 +768,7 @@ def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
     assert (folder / "poses.csv").is_file()
 
 
-def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_path):
+def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
     (folder / "thesis.txt").write_text("years of work")
     with pytest.raises(UserError, match=r"perspective: holds thesis.txt, which is of no export"):
@@ -781,29 +786,31 @@ def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_pat
 @pytest.mark.parametrize(
     ("name", "source", "why"),
     [
-        ("nerf_synthetic", "fisheye", "is no pinhole camera"),
+        ("nerf_synthetic", "fisheye", "is not a pinhole camera"),
         ("miv", "fisheye", "has a lens that MIV lacks"),
-        ("scannetpp", "perspective", "is no equidistant fisheye"),
+        ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
     ],
 )
-def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, name, source, why):
+def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
+    dataset, tmp_path, name, source, why
+):
     with pytest.raises(UserError, match=rf"lightfield.json: {why}"):
         exported(dataset, name, source, tmp_path)
     assert not [*tmp_path.iterdir()]
 
 
-def by_hand(run_program, dataset, folder, *words):
-    """Export a table of poses by the program; return the names of its views."""
-    words = ["poses_csv", "--dataset", dataset, "--output", folder, *words]
-    run_program("export.py", *words)
+def by_hand(run_program, dataset, folder, *arguments):
+    """Export a table of poses with the program. Return the names of its views."""
+    arguments = ["poses_csv", "--dataset", dataset, "--output", folder, *arguments]
+    run_program("export.py", *arguments)
     rows = (folder / "poses.csv").read_text().splitlines()[1:]
     return [row.split(",")[0] for row in rows]
 
 
 def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, tmp_path):
-    words = ["--source", "perspective", "--suffix", ".exr"]
-    names = by_hand(run_program, dataset, tmp_path / "flags", *words)
+    arguments = ["--source", "perspective", "--suffix", ".exr"]
+    names = by_hand(run_program, dataset, tmp_path / "flags", *arguments)
     settings = tmp_path / "settings.json"
     content = {"options": {"sources": ["perspective"]}, "suffix": ".exr"}
     settings.write_text(json.dumps(content))
@@ -817,16 +824,16 @@ def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dat
     content = {"options": {"sources": ["views"], "point": 5}}
     settings = tmp_path / "settings.json"
     settings.write_text(json.dumps(content))
-    words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
-    refused = run_program("export.py", "colmap", *words, check=False)
+    arguments = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
+    refused = run_program("export.py", "colmap", *arguments, check=False)
     assert refused.stderr.startswith(f"error: {settings}: options.point: unknown key")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
-    refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
+    refused = run_program("export.py", "colmap", *arguments, "--suffix", ".png", check=False)
     assert "--settings: excludes --suffix" in refused.stderr
     assert not (tmp_path / "made").exists()
 
 
-def test_a_model_as_text_may_be_without_points(tmp_path):
+def test_a_text_model_may_have_no_points(tmp_path):
     def sky(lens, _):
         shape = (lens.height, lens.width)
         return np.ones((*shape, 3)), np.full(shape, np.inf)
@@ -839,7 +846,7 @@ def test_a_model_as_text_may_be_without_points(tmp_path):
     assert (folder / "sparse/0/images.txt").read_text().endswith(".png\n\n")
 
 
-def test_points_are_lifted_from_views_that_see_the_sky_too():
+def test_points_come_from_views_with_sky_too():
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
     rays = lens.pixel_rays()
     distance = np.full(rays.shape[:2], np.inf)
@@ -860,7 +867,7 @@ def test_points_are_as_dense_at_the_origin_as_elsewhere():
         assert gaps.max() < 1.5 * np.median(gaps)
 
 
-def test_points_that_several_views_see_alike_are_kept_once():
+def test_a_point_that_several_views_see_alike_is_kept_once():
     points = np.random.default_rng(1).normal(size=(50, 3))
     assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))
 

@@ -1,4 +1,4 @@
-"""Extreme renders: none of them is wrong without a word, and the check of cameras says the word."""
+"""Extreme renders: none is wrong without a warning, and the check of cameras gives the warning."""
 
 import csv
 from pathlib import Path
@@ -9,7 +9,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 
 ROOT = Path(__file__).parents[1]
-# Builds a scene of benchmarks/extremes.py, named by its case, as a .blend.
+# Builds a scene of benchmarks/extremes.py as a .blend. The case's name chooses it.
 BUILD = """
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -21,7 +21,8 @@ blend_file.new_scene()
 case.build()
 blend_file.save_scene(Path(sys.argv[3]))
 """
-# At 0 what no render shows, fog, and a transparent text; at 5 and 10 m what no viewport shows.
+# At 0 m are objects that no render shows, fog, and a transparent text. At 5 and 10 m are objects
+# that no viewport shows.
 HIDDEN = """
 import sys
 from pathlib import Path
@@ -52,7 +53,7 @@ bpy.context.object.data.extrude = 1
 bpy.context.object.data.materials.append(clear)
 blend_file.save_scene(Path(sys.argv[1]))
 """
-# Measures one case whose truth is another one.
+# Measures one case with another case's truth.
 UNTRUE = """
 import dataclasses, sys
 sys.path.insert(0, sys.argv[1])
@@ -66,27 +67,29 @@ run(extremes.main)
 """
 
 
-def test_no_case_is_wrong_without_a_word(tmp_path, run_program):
+def test_no_case_is_wrong_without_a_warning(tmp_path, run_program):
     run_program(ROOT / "benchmarks/extremes.py", "--output", tmp_path)
     with (tmp_path / "extremes.csv").open() as file:
         rows = {row["case"]: row for row in csv.DictReader(file)}
-    found = {kind: [] for kind in ("right", "warned", "refused", "as asked")}
+    rows_of_verdict = {kind: [] for kind in ("right", "warned", "refused", "as asked")}
     for name, row in rows.items():
-        found[row["verdict"]].append(name)
-    assert len(found["right"]) >= 25
-    assert found["warned"] == [
+        rows_of_verdict[row["verdict"]].append(name)
+    assert len(rows_of_verdict["right"]) >= 25
+    assert rows_of_verdict["warned"] == [
         *(f"a room of 4 m, 1e{power} m from the origin" for power in (5, 6, 7)),
         "light of 1e+06",
         "1,000 transparent layers, of 8 that may be",
         "a sun of 0° through glass, filter glossy 0, clamped at 0",
     ]
-    assert found["refused"] == [
+    assert rows_of_verdict["refused"] == [
         "a room of 1 mm",
         "a surface 0.0001 m ahead",
         "a surface 5e-05 m ahead",
     ]
-    assert all(rows[name]["said"] for kind in ("warned", "refused") for name in found[kind])
-    assert len(found["as asked"]) == 2
+    assert all(
+        rows[name]["said"] for kind in ("warned", "refused") for name in rows_of_verdict[kind]
+    )
+    assert len(rows_of_verdict["as asked"]) == 2
     assert (tmp_path / "extremes.md").read_text().count("\n") == len(rows) + 2
 
 
@@ -95,11 +98,11 @@ def test_a_wrong_case_fails_the_run(tmp_path, run_program):
     program.write_text(UNTRUE)
     result = run_program(program, ROOT / "benchmarks", tmp_path, check=False)
     assert result.returncode == 1
-    assert "error: 1 of 2 cases are wrong without a word: light of 65000" in result.stderr
+    assert "error: 1 of 2 cases are wrong without a warning: light of 65000" in result.stderr
 
 
 def checked(folder, run_program, blend, **rig):
-    """Run the check of the cameras of a lattice."""
+    """Run the check of cameras on a lattice of them."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [32, 16]})
     content = LightField.from_rig({"type": "lattice", **rig}, lens, depth="distance", frame=1)
     content.write(folder / "lightfield.json")
@@ -130,7 +133,7 @@ def test_the_check_of_cameras_warns(tmp_path, run_program, case, place, said):
     assert said is None or said in warnings[0]
 
 
-def test_the_check_of_cameras_sees_what_a_render_shows_and_that_alone(tmp_path, run_program):
+def test_the_check_of_cameras_sees_exactly_what_a_render_shows(tmp_path, run_program):
     program, blend = tmp_path / "build.py", tmp_path / "scene.blend"
     program.write_text(HIDDEN)
     run_program(program, blend)

@@ -1,4 +1,4 @@
-"""Extreme depths, rotations, places and pixels, each within what its condition number allows."""
+"""Extreme depths, rotations, places and pixels: errors stay within the condition number's bound."""
 
 import math
 from collections.abc import Iterable
@@ -29,13 +29,13 @@ def digits() -> None:
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("degrees", [0, 1e-3, 45, 89, 89.99, 89.9999999])
-def test_depths_of_all_sizes_convert_up_to_a_hair_from_90_degrees(degrees, dtype) -> None:
+def test_depths_of_all_sizes_convert_even_close_to_90_degrees(degrees, dtype) -> None:
     theta = math.radians(degrees)
     distance = (10.0 ** np.arange(-6, 10)).astype(dtype)
     ray = np.array([math.sin(theta), 0, -math.cos(theta)], dtype)
     rays = np.broadcast_to(ray, (len(distance), 3))
     z = z_from_distance(distance, rays)
-    # The ray is a datum: a product and a quotient of data have condition number 2.
+    # The ray is given: a product and a quotient of given numbers have condition number 2.
     bound = 2 * ROUNDINGS * float(np.finfo(dtype).eps)
     for got, metres in zip(z, distance, strict=True):
         exact = mpf(float(metres)) * -mpf(float(ray[2]))
@@ -87,15 +87,15 @@ def test_a_rigs_rotation_survives_gimbal_lock(pitch, turn) -> None:
     matrix = rigs.from_settings(rig).poses()[0].matrix()[:3, :3]
     turned = exact_euler(float(np.radians(angle)) for angle in rig["rotation"])
     exact = turned * rotation(0, mpf(math.pi / 2))
-    # A rig publishes its angles rounded to 12 decimals: half a unit of the last of each of three
-    # angles. The rotation itself is perfectly conditioned.
+    # A rig publishes its angles rounded to 12 decimals, so each of three angles may be off by half
+    # a unit of the last. The rotation itself is perfectly conditioned.
     bound = ROUNDINGS * (EPS + 1.5e-12)
     assert max(abs(mpf(matrix[i, j]) - exact[i, j]) for i in range(3) for j in range(3)) <= bound
     np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=bound)
 
 
 def smallest_move(lens, pixel) -> mpf:
-    """Return the smallest move of the ray with the pixel's coordinates, in radians per pixel."""
+    """Return the least motion of the ray per motion of the pixel, in radians per pixel."""
     ray = mpmath.matrix(stability.exact_ray(lens, pixel))
     step = stability.STEP * 1000
     beside = [(pixel[0] + step, pixel[1]), (pixel[0], pixel[1] + step)]
@@ -129,11 +129,11 @@ def test_cameras_a_million_metres_from_the_origin_see_the_same_point(name) -> No
     exact_ray = mpmath.matrix(stability.exact_ray(lens, (mpf(x), mpf(y))))
     point = turns[1].T * (turns[0] * exact_ray * distance + mpmath.matrix(offset))
     exact = stability.exact_pixel(lens, list(point))
-    # Three numbers of a million metres move by one eps each; the pixel moves with the angle.
+    # Three numbers of a million metres are each off by up to one eps. The pixel follows the angle.
     moves = 3 * mpf(place[0]) / mpmath.norm(point) / smallest_move(lens, exact)
     bound = ROUNDINGS * EPS * (moves + 2 * stability.extent(lens, exact))
-    for found, wanted in ((lens.pixels(seen[:3]), exact), (lens.pixels(back[:3]), (x, y))):
-        assert max(abs(mpf(float(f)) - w) for f, w in zip(found, wanted, strict=True)) <= bound
+    for projected, wanted in ((lens.pixels(seen[:3]), exact), (lens.pixels(back[:3]), (x, y))):
+        assert max(abs(mpf(float(f)) - w) for f, w in zip(projected, wanted, strict=True)) <= bound
 
 
 SOURCE = Equirectangular(width=64, height=32)
@@ -161,10 +161,10 @@ def test_an_even_image_stays_even_from_denormals_to_the_half_limit(name, value) 
 
 @pytest.mark.parametrize("value", [math.inf, math.nan])
 @pytest.mark.parametrize("name", FILTERS)
-def test_one_pixel_that_is_no_number_changes_nothing_far_from_it(name, value) -> None:
+def test_a_pixel_that_is_not_a_number_spoils_nothing_far_from_it(name, value) -> None:
     made, shape, (row, column) = mapping_of(name)
     bad = (shape[0] // 2, shape[1] // 2)
-    # Eight source pixels are 45 degrees: further than any filter reads here.
+    # Eight source pixels are 45 degrees, farther than any filter reaches here.
     far = SEEN & (
         RAYS @ SOURCE.rays(column + bad[1] + 0.5, row + bad[0] + 0.5) < math.cos(math.pi / 4)
     )

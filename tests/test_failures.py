@@ -1,4 +1,4 @@
-"""Failing programs: each fails its job, and why is the last thing that the terminal says."""
+"""Failing programs: each fails its job, and the terminal ends with the cause."""
 
 import argparse
 import json
@@ -22,7 +22,7 @@ from lightfield.imaging import images
 from lightfield.reprojection import lens_map
 
 ROOT = Path(__file__).parents[1]
-# A scene that needs what the smoke scene does not: a download, a calibration, and free places.
+# A scene that needs more than the smoke scene does: a download, a calibration, and free places.
 BROUGHT = """
 scene:
   blend: scene.blend
@@ -62,7 +62,7 @@ RULES = [
         if "    shell:" in body
     ),
 ]
-# In place of every program: it does its work, as far as Snakemake can see, and fails after that.
+# Stands in for every program. It writes its outputs, and then fails.
 FAILING = f"""#!{sys.executable}
 import json, os, sys
 from pathlib import Path
@@ -77,7 +77,7 @@ WHEN = 1_700_000_000
 
 
 class Failing:
-    """A checkout whose programs fail; every file that a job reads or writes is there."""
+    """A checkout whose programs fail. All files that jobs read or write exist."""
 
     def __init__(self, folder):
         self.folder = checkout(folder, brought=BROUGHT, imported=IMPORTED)
@@ -90,7 +90,7 @@ class Failing:
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(FAILING)
         with_consumers(self.folder)
-        # No job's program: it runs before the first one.
+        # This rule runs no job's program, but runs before the first one.
         (self.folder / "scripts/check_device.py").write_text("")
         (self.folder / "bin").mkdir()
         (self.folder / "bin/tar").write_text(FAILING)
@@ -110,7 +110,7 @@ class Failing:
         self.files = {file for file in self.files if not file.startswith("configs/")}
 
     def run(self, *arguments, work=None):
-        """Run Snakemake; ``work`` has what the job of a log writes."""
+        """Run Snakemake. ``work`` maps each job's log to what the job writes."""
         return subprocess.run(
             [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
             cwd=self.folder,
@@ -125,12 +125,14 @@ class Failing:
             },
         )
 
-    def apart(self):
-        """Return the rules in groups, of which no job reads what one of another rule writes."""
+    def independent_groups(self):
+        """Return the rules in groups. No job reads what another rule of its group writes."""
         groups = []
         for rule in RULES:
             for group in groups:
-                if not any(self.is_read(one, rule) or self.is_read(rule, one) for one in group):
+                if not any(
+                    self.is_read(member, rule) or self.is_read(rule, member) for member in group
+                ):
                     group.append(rule)
                     break
             else:
@@ -141,8 +143,8 @@ class Failing:
         return bool(self.written[written_by] & self.read[read_by])
 
     def fail(self, *rules, options=(), config=()):
-        """Run the job of each rule alone; return what the terminal says."""
-        # One content and one time that pass for a record, a calibration, and a checked .blend.
+        """Run the job of each rule alone. Return the terminal's output."""
+        # This content and time are valid for a record, a calibration, and a checked .blend.
         content = {"files": {}, "cost_samples": 4, "bytes": 200, "mtime_ns": WHEN * 10**9}
         content |= {"external_files": []}
         for file in self.files:
@@ -154,10 +156,10 @@ class Failing:
         targets = [job["output"][0] if job["output"] else job["rule"] for job in jobs]
         work = {job["log"][0]: job["output"] for job in jobs}
         for file in (file for outputs in work.values() for file in outputs):
-            # A .blend that is there is not fetched.
+            # An existing .blend would not be downloaded.
             (self.folder / file).unlink()
         run = self.run(
-            # A page would have the filled-in files of its dataset made anew: they are not whole.
+            # A page would update the filled-in files of its dataset, because they are damaged.
             *("--allowed-rules", *rules, "--rerun-triggers", "mtime", *options),
             *(*CHOSEN, *config, "--force", *targets),
             work=work,
@@ -180,14 +182,14 @@ def last_words(failing, *rules):
 
 @pytest.fixture(scope="module")
 def failed(failing):
-    """Of each rule what the terminal said as its job failed, and what that left of its files."""
-    found = {}
-    for rules in failing.apart():
+    """For each rule: the terminal's output after its failure, and its remaining files."""
+    failures = {}
+    for rules in failing.independent_groups():
         terminal = failing.fail(*rules, options=["--keep-going"])
         for rule in rules:
             outputs = (failing.folder / file for file in failing.jobs[rule]["output"])
-            found[rule] = terminal, [path for path in outputs if path.exists()]
-    return found
+            failures[rule] = terminal, [path for path in outputs if path.exists()]
+    return failures
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -207,7 +209,7 @@ def test_every_job_that_failed_is_named_at_the_end(failing):
     assert terminal.endswith(last_words(failing, "rig_tables", "stability")), terminal
 
 
-# Of the two jobs of this group the second waits for the first; it did not fail.
+# The second job of this group waits for the first, so it did not fail.
 @pytest.mark.parametrize("groups", [[], ["--groups", "render=shard", "reproject=shard"]])
 @pytest.mark.slow
 def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
@@ -226,7 +228,7 @@ def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     ("groups", "name"), [([], "render"), (["--groups", "render=shard"], "shard_render")]
 )
 @pytest.mark.slow
-def test_of_a_job_that_never_began_the_batch_systems_log_is_named(failing, groups, name):
+def test_the_batch_systems_log_is_named_for_a_job_that_never_began(failing, groups, name):
     submit = failing.folder / "submit.sh"
     said = "slurmstepd: error: execve(): python: No such file or directory"
     submit.write_text(f"echo '{said}' > .snakemake/$1-17.log; echo failed\n")
@@ -257,7 +259,7 @@ UNKNOWN = "The given account nobody's appears to be invalid. Available accounts:
     ],
 )
 @pytest.mark.slow
-def test_why_slurm_takes_no_job_is_said_at_the_end(
+def test_the_end_says_why_slurm_refuses_a_job(
     failing, tmp_path, monkeypatch, groups, account, said
 ):
     commands = dict.fromkeys(["sinfo", "scontrol", "squeue", "sacct"], "")
@@ -274,7 +276,7 @@ def test_why_slurm_takes_no_job_is_said_at_the_end(
             *("--slurm-init-seconds-before-status-checks", "1"),
         ],
     )
-    # The account is judged before there is a job; older plugins break the line.
+    # The account is checked before a job exists. Older plugins break the line.
     lines = terminal.splitlines()
     assert " ".join(lines[:-1]).endswith(said) or " ".join(lines).endswith(said), terminal
     assert account != "mine" or lines[-2].startswith("render failed: "), terminal
@@ -312,7 +314,7 @@ def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
 
 @pytest.mark.slow
 def test_a_signal_to_a_job_and_its_shell_is_named(failing):
-    """As `timeout`, a CI and a batch system send it: to each process of a run."""
+    """`timeout`, a CI and a batch system send a signal to each process of a run."""
     program = failing.folder / "scripts/render_shard.py"
     program.write_text(
         "import os, signal\n"
@@ -326,13 +328,13 @@ def test_a_signal_to_a_job_and_its_shell_is_named(failing):
 
 
 @pytest.mark.slow
-def test_a_job_whose_log_takes_nothing_more_is_explained_by_its_disk(failing, small_disk):
+def test_a_job_whose_log_does_not_fit_on_the_disk_is_explained(failing, small_disk):
     disk, mounted = small_disk
     logs = failing.folder / "work/logs"
     shutil.rmtree(logs, ignore_errors=True)
     logs.symlink_to(disk)
     program = failing.folder / "scripts/render_shard.py"
-    # It fills the disk, and cannot say why it fails.
+    # The job fills the disk, so it cannot say why it fails.
     program.write_text(f"""
 import errno, sys
 with open({str(disk / "filler")!r}, "wb", buffering=0) as file:
@@ -361,7 +363,7 @@ sys.exit({"'error: no log has it'" if mounted else "1"})
         ("check_gpu", [], "error: device: this machine has no GPU that Cycles can use"),
     ],
 )
-def test_a_device_that_is_not_there_is_reported_before_the_first_job(
+def test_a_missing_device_is_reported_before_the_first_job(
     failing, monkeypatch, rule, config, said
 ):
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "-1")
@@ -377,7 +379,7 @@ def test_a_device_that_is_not_there_is_reported_before_the_first_job(
 
 
 @pytest.mark.slow
-def test_a_device_of_the_nodes_need_not_be_on_the_machine_that_submits(failing):
+def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing):
     program = failing.folder / "scripts/check_device.py"
     shutil.copy(ROOT / "scripts/check_device.py", program)
     submit = failing.folder / "submit.sh"
@@ -402,7 +404,7 @@ def test_a_device_of_the_nodes_need_not_be_on_the_machine_that_submits(failing):
         (FileNotFoundError(2, "No usable temporary directory"), "error: No usable temporary"),
     ],
 )
-def test_what_the_system_refuses_is_one_line(problem, said):
+def test_an_error_of_the_operating_system_is_one_line(problem, said):
     def main():
         raise problem
 
@@ -414,7 +416,7 @@ def test_what_the_system_refuses_is_one_line(problem, said):
 @pytest.mark.parametrize(
     "name", ["view.exr", "view.png", "lens_map.npy", "record.json", "log.jsonl", "poses.csv"]
 )
-def test_a_file_that_may_not_be_read_is_named_with_the_cause(name, nobody):
+def test_a_file_without_read_permission_is_named_with_the_cause(name, nobody):
     path = nobody / name
     path.write_bytes(b"anything")
     path.chmod(0)
@@ -445,13 +447,13 @@ def test_a_count_is_one_or_more(count, capsys):
         (stops, "101", "is 101; must be from -100 to 100 stops"),
     ],
 )
-def test_a_number_is_one_and_no_exposure_is_beyond_all_bounds(kind, text, problem):
+def test_numbers_and_exposures_have_limits(kind, text, problem):
     assert kind("-1.5") == -1.5
     with pytest.raises(argparse.ArgumentTypeError, match=problem):
         kind(text)
 
 
-def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):
+def test_a_cause_that_many_jobs_share_is_said_once(tmp_path):
     causes = {"a": "error: no GPU", "b": "error: no GPU", "c": "error: full"}
     jobs = [("render", why, tmp_path / name) for name, why in causes.items()]
     assert failure_report(jobs).splitlines() == [

@@ -1,4 +1,4 @@
-"""Files and logs are on the disk, whole, before anybody relies on them: a power cut loses none."""
+"""Files and logs are complete on the disk before anybody relies on them: a power cut loses none."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ from lightfield.dataset.ledger import Job, Ledger
 
 @pytest.fixture
 def flushed(monkeypatch):
-    """Return the sizes of the files that were flushed to the disk, and what was there then."""
+    """Return the sizes of files when they were flushed to the disk, and the names at that time."""
     seen = []
     fsync = os.fsync
 
@@ -25,13 +25,13 @@ def flushed(monkeypatch):
     return seen
 
 
-def test_a_file_gets_its_name_when_its_bytes_are_on_the_disk(flushed, tmp_path):
+def test_a_file_gets_its_name_after_its_bytes_are_on_the_disk(flushed, tmp_path):
     target = tmp_path / "record.json"
     target.write_bytes(b"old")
     files.write_bytes(target, b"another")
     ((size, path),) = flushed
     assert size == len(b"another")
-    # Under its own name lay still the old file.
+    # The old file still had the name.
     assert path != str(target) and path.startswith(str(tmp_path))
     assert target.read_bytes() == b"another"
 

@@ -1,4 +1,4 @@
-"""Flow between views: what it leads to has the same colour, and is hidden where rays say so.
+"""Flow between views: it leads to a point of the same colour, unless rays say that it is hidden.
 
 The scene is the inside of a textured sphere, with a ball in it.
 """
@@ -27,7 +27,7 @@ LENSES = {
     "fisheye": {"lens": "equidistant", "fov": 200, "resolution": [96, 96]},
     "panorama": {"lens": "equirectangular", "resolution": [128, 64]},
 }
-# Looking along +Y, at the ball.
+# The camera looks along +Y, at the ball.
 TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -38,7 +38,7 @@ def camera(x, z):
 
 
 def ball(origin, rays):
-    """Return how far along unit rays (..., 3) the ball is; inf where they miss it."""
+    """Return the ball's distance along unit rays (..., 3), inf for rays that miss it."""
     along = rays @ (BALL - origin)
     under = SIZE**2 - np.sum((BALL - origin) ** 2) + along**2
     with np.errstate(invalid="ignore"):
@@ -53,21 +53,21 @@ def test_flow_leads_to_the_same_point_unless_it_is_hidden(name):
     for matrix in (here, there):
         rays = lens.pixel_rays() @ matrix[:3, :3].T
         distances.append(np.fmin(look(lens, matrix)[1], ball(matrix[:3, 3], rays)))
-    found, visible = flow(lens, here, there, *distances)
+    field, visible = flow(lens, here, there, *distances)
     points = here[:3, 3] + lens.pixel_rays() @ here[:3, :3].T * distances[0][..., None]
     offset = points - there[:3, 3]
     expected = np.linalg.norm(offset, axis=-1)
     to_point = offset / expected[..., None]
-    # By rays to the points themselves, of which those on the ball's own rim are doubtful.
+    # Rays to the points themselves tell. Points on the ball's own rim are doubtful.
     hidden = ball(there[:3, 3], to_point) < expected - 0.02
-    inside = np.isfinite(found[..., 0])
-    pixels = np.indices(expected.shape)[::-1].transpose(1, 2, 0) + 0.5 + found
+    inside = np.isfinite(field[..., 0])
+    pixels = np.indices(expected.shape)[::-1].transpose(1, 2, 0) + 0.5 + field
     inside &= ((pixels >= 0) & (pixels < (lens.width, lens.height))).all(axis=-1) | (
         name == "panorama"
     )
     assert hidden[inside].sum() > 20 and not visible[~inside].any()
     assert (visible[inside] == ~hidden[inside]).mean() > 0.98
-    # Warped: the colour there is that of the point here, to what a pixel's rounding moves it.
+    # The warped colour equals that of the point here, up to the rounding of a pixel.
     rays = lens.rays(*np.moveaxis(pixels, -1, 0)) @ there[:3, :3].T
     seen = inside & ~hidden
     error = np.linalg.norm(np.cross(rays, to_point), axis=-1)[seen]
@@ -76,10 +76,10 @@ def test_flow_leads_to_the_same_point_unless_it_is_hidden(name):
     assert np.ptp(colour_of(points[wall])) > 50
 
 
-def test_a_neighbour_is_the_nearest_of_another_place_that_looks_most_alike():
+def test_a_neighbour_is_the_nearest_view_elsewhere_with_the_most_similar_direction():
     lens = lenses.from_camera(LENSES["perspective"] | {"fov": 90})
-    found = LightField.from_rig(ROW, lens).with_flow()
-    assert [view.flow for view in found.views] == [
+    lightfield = LightField.from_rig(ROW, lens).with_flow()
+    assert [view.flow for view in lightfield.views] == [
         "view_0000f_to_view_0001f",
         "view_0001f_to_view_0000f",
         "view_0002f_to_view_0001f",
@@ -92,7 +92,7 @@ def test_a_neighbour_is_the_nearest_of_another_place_that_looks_most_alike():
 
 @pytest.fixture
 def folder(tmp_path):
-    """A checkout with views that are there already, of which flow is asked for."""
+    """A checkout with existing views, whose YAML asks for flow."""
     folder = checkout(tmp_path / "plenoforge", theirs=YAML)
     write_views(folder / "published/dataset", LENSES["perspective"] | {"resolution": [48, 48]}, ROW)
     (folder / "published/dataset").rename(folder / "published/row")
@@ -100,7 +100,7 @@ def folder(tmp_path):
 
 
 @pytest.mark.slow
-def test_flow_is_a_part_of_the_dataset_as_long_as_the_yaml_asks_for_it(folder):
+def test_flow_belongs_to_the_dataset_only_while_the_yaml_asks_for_it(folder):
     def build():
         made = snakemake(folder, "--config", "scenes=theirs", "preset=full")
         assert made.returncode == 0, made.stdout + made.stderr
@@ -111,17 +111,17 @@ def test_flow_is_a_part_of_the_dataset_as_long_as_the_yaml_asks_for_it(folder):
     assert files[0].name == "view_0000f_to_view_0001f.exr" and len(files) == 3
     assert "flow/view_0000f_to_view_0001f.exr" in (dataset / "sha256sums.txt").read_text()
     assert "flow" in (dataset / "lightfield.json").read_text()
-    there = images.read_image(files[0]).channels
-    assert {name: str(plane.dtype) for name, plane in there.items()} == dict.fromkeys(
+    channels = images.read_image(files[0]).channels
+    assert {name: str(plane.dtype) for name, plane in channels.items()} == dict.fromkeys(
         "XYV", "float32"
     )
-    check_warp(dataset, there)
-    # One that is missing is made again alone, to the same bytes.
+    check_warp(dataset, channels)
+    # A missing file alone is computed again, to the same bytes.
     made, kept = files[1].read_bytes(), files[0].stat().st_mtime_ns
     files[1].unlink()
     build()
     assert (files[1].read_bytes(), files[0].stat().st_mtime_ns) == (made, kept)
-    # Out of the YAML, out of the dataset.
+    # Removed from the YAML, flow is no part of the dataset.
     (folder / "configs/scenes/theirs.yaml").write_text("scene: {dataset: published}")
     build()
     assert not (dataset / "flow").exists()
@@ -130,7 +130,7 @@ def test_flow_is_a_part_of_the_dataset_as_long_as_the_yaml_asks_for_it(folder):
 
 
 def check_warp(dataset, flow):
-    """Check that the other view's colour, by bilinear interpolation, is this one's."""
+    """Check that the other view's colour, interpolated bilinearly, equals this one's."""
     views = [images.read_image(dataset / "exr" / f"view_000{n}f.exr").colour for n in (0, 1)]
     rows, columns = np.nonzero(flow["V"] == 1)
     x = columns + flow["X"][rows, columns]
@@ -158,12 +158,12 @@ def computed(tmp_path_factory, run_program):
     write_views(folder, LENSES["fisheye"] | {"resolution": [48, 48]}, ROW)
     LightField.read(folder / "lightfield.json").with_flow().write(folder / "lightfield.json")
     run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
-    assert found(folder).passed
+    assert flow_check(folder).passed
     return folder
 
 
 @pytest.mark.parametrize("what", SPOILED)
-def test_validation_knows_what_flow_must_hold(what, computed, tmp_path):
+def test_validation_checks_flow(what, computed, tmp_path):
     folder = shutil.copytree(computed, tmp_path / "dataset")
     path = folder / "flow/view_0000f_to_view_0001f.exr"
     wrong, problem = SPOILED[what]
@@ -173,7 +173,7 @@ def test_validation_knows_what_flow_must_hold(what, computed, tmp_path):
         channels = dict(images.read_image(path).channels)
         planes = {name: np.full((48, 48), value, np.float32) for name, value in wrong.items()}
         images.write_exr(path, channels | planes)
-    (said,) = found(folder).problems
+    (said,) = flow_check(folder).problems
     assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
 
 
@@ -184,8 +184,8 @@ def test_flow_follows_a_change_of_either_view(changed, computed, tmp_path, run_p
     image = images.read_image(path)
     channels = dict(image.channels) | {"Z": image.channels["Z"] * np.float32(0.9)}
     images.write_exr(path, channels, image.attributes)
-    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "flow")
-    run_program("flow.py", *words)
+    arguments = ("--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    run_program("flow.py", *arguments)
     name = "flow/view_0000f_to_view_0001f.exr"
     assert (folder / name).read_bytes() != (computed / name).read_bytes()
     kept = "flow/view_0002f_to_view_0001f.exr"
@@ -193,7 +193,7 @@ def test_flow_follows_a_change_of_either_view(changed, computed, tmp_path, run_p
     assert is_same == (changed == "view_0000f")
 
 
-def found(folder):
+def flow_check(folder):
     return next(check for check in validate(folder).checks if check.name == "passes")
 
 

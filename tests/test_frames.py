@@ -1,4 +1,4 @@
-"""Scenes that change with time: what holds for one frame is not taken to hold for another."""
+"""Scenes that change with time: the facts of one frame are not used for another."""
 
 import json
 from pathlib import Path
@@ -52,7 +52,7 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def folder(run_program, tmp_path_factory):
-    """A folder with a .blend of each case, saved at frame 1, and what was rendered of it."""
+    """A folder with a .blend of each case, saved at frame 1, and the results of its renders."""
     folder = tmp_path_factory.mktemp("animated")
     run_program(Path(__file__).with_name("animated_renders.py"), folder)
     return folder
@@ -66,31 +66,31 @@ def scenes(folder):
 @pytest.mark.parametrize("name", CASES)
 def test_pruning_changes_no_pixel_at_any_frame(name, scenes):
     assert scenes[name]["same"] == [True, True]
-    # The two frames differ: there is something to lose.
+    # The two frames differ, so pruning could lose something.
     assert scenes[name]["changes"]
 
 
 @pytest.mark.parametrize("name", ["blur_by_velocities", "blur_by_velocities_from_nodes"])
-def test_what_has_velocities_is_blurred_though_it_stands_still(name, scenes):
+def test_meshes_with_velocities_are_blurred_at_rest(name, scenes):
     assert scenes[name]["left_out"] == ["viewport"]
 
 
-def test_what_has_keyframes_is_known_by_all_the_values_that_it_may_have(scenes):
-    found = scenes["keyed_material"]["inventory"]
-    assert found["transmission"] == found["transparency"] == ["sphere"]
-    assert found["emission"] == ["torus"]
+def test_keyframed_values_are_listed_completely(scenes):
+    scene_inventory = scenes["keyed_material"]["inventory"]
+    assert scene_inventory["transmission"] == scene_inventory["transparency"] == ["sphere"]
+    assert scene_inventory["emission"] == ["torus"]
 
 
 def test_objects_are_counted_at_the_frame_that_shows_most(scenes):
-    found = scenes["keyed_visibility"]["inventory"]
-    assert found["frames"] == [1, 5]
-    assert found["fullest_frame"] == 5
-    # The room's six, and the cube.
-    assert found["objects"] == 7
+    scene_inventory = scenes["keyed_visibility"]["inventory"]
+    assert scene_inventory["frames"] == [1, 5]
+    assert scene_inventory["fullest_frame"] == 5
+    # The room's six objects, and the cube.
+    assert scene_inventory["objects"] == 7
 
 
 @pytest.mark.parametrize("name", ["keyed_samples", "keyed_view_layer"])
-def test_keyframes_do_not_override_what_the_yaml_says(name, scenes):
+def test_keyframes_do_not_override_the_yaml(name, scenes):
     assert scenes[name]["pixels"] == scenes["keyed_light"]["pixels"]
 
 
@@ -113,22 +113,22 @@ def test_a_cube_that_appears_at_the_yamls_frame_is_in_the_view(folder, run_progr
     blend = ("--blend", "keyed_visibility.blend")
     inventory = ("--inventory", "inventory.json")
     made = "View/lightfield.json"
-    for program, *words in (
+    for program, *arguments in (
         ("check_blend.py", "--scene", "late", *blend, "--output", "blend.json"),
         ("inventory.py", "--scene", "late", *blend, "--output", "inventory.json"),
         ("make_lightfield.py", "--scene", "late", *inventory, "--output", made),
         ("render_shard.py", *blend, *inventory, "--lightfield", made, "--output", "View/exr"),
     ):
-        run_program(program, *words, cwd=folder)
-    found = json.loads((folder / "inventory.json").read_text())
-    assert found["frames"] == [json.loads((folder / made).read_text())["frame"]] == [5]
-    assert found["hidden"] == []
+        run_program(program, *arguments, cwd=folder)
+    scene_inventory = json.loads((folder / "inventory.json").read_text())
+    assert scene_inventory["frames"] == [json.loads((folder / made).read_text())["frame"]] == [5]
+    assert scene_inventory["hidden"] == []
     depth = images.read_image(folder / "View/exr/view_0000f.exr").channels["Z"]
     assert depth[4, 4] == pytest.approx(1.5 - 0.4, abs=1e-5)
 
 
 def write_lightfield(path, frame, center=(0.5, 1.5, 1), **render):
-    """Write a light field of two cameras: one where the cube is at frame 5, one beside it."""
+    """Write a light field of two cameras: one at the cube's place at frame 5, one beside it."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "center": list(center)}
     LightField.from_rig(
@@ -142,12 +142,14 @@ def write_lightfield(path, frame, center=(0.5, 1.5, 1), **render):
 
 
 @pytest.mark.parametrize("name", CASES[:4])
-def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_program, tmp_path):
+def test_cameras_are_checked_against_their_frame(name, folder, run_program, tmp_path):
     def checked(frame):
         lightfield = tmp_path / f"{frame}.json"
         write_lightfield(lightfield, frame)
-        words = ("--blend", folder / f"{name}.blend", "--lightfield", lightfield)
-        return run_program("check_cameras.py", *words, "--output", tmp_path / "out", check=False)
+        arguments = ("--blend", folder / f"{name}.blend", "--lightfield", lightfield)
+        return run_program(
+            "check_cameras.py", *arguments, "--output", tmp_path / "out", check=False
+        )
 
     assert checked(1).returncode == 0
     inside = checked(5)
@@ -159,27 +161,32 @@ def test_a_camera_that_touches_the_floor_is_refused(room, run_program, tmp_path)
     rig = {"type": "lattice", "cameras": [1, 1, 2], "size": 1, "center": [0.2, 0.1, 0.5005]}
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     LightField.from_rig(rig, lens, depth="distance", frame=1).write(tmp_path / "lightfield.json")
-    words = ("--blend", room, "--lightfield", tmp_path / "lightfield.json")
+    arguments = ("--blend", room, "--lightfield", tmp_path / "lightfield.json")
     output = ("--output", tmp_path / "cameras.json")
-    result = run_program("check_cameras.py", *words, *output, check=False)
+    result = run_program("check_cameras.py", *arguments, *output, check=False)
     assert result.returncode == 1
     assert "1 of 2 cameras are inside a surface" in result.stderr
 
 
-def test_cameras_are_checked_against_what_particles_place(folder, run_program, tmp_path):
-    # The first camera is where the emitter is at frame 5. Each grain is hidden itself.
+def test_cameras_are_checked_against_particles(folder, run_program, tmp_path):
+    # The first camera is at the emitter's place at frame 5. The grains themselves are hidden.
     write_lightfield(tmp_path / "lightfield.json", 5, center=[1.5, 1, 1.05])
-    words = ("--blend", folder / "particles_from_a_keyed_emitter.blend")
-    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "cameras.json")
-    result = run_program("check_cameras.py", *words, check=False)
+    arguments = ("--blend", folder / "particles_from_a_keyed_emitter.blend")
+    arguments += (
+        "--lightfield",
+        tmp_path / "lightfield.json",
+        "--output",
+        tmp_path / "cameras.json",
+    )
+    result = run_program("check_cameras.py", *arguments, check=False)
     assert "1 of 2 cameras are inside grain: view_0000f" in result.stderr
 
 
 def test_keyframes_do_not_number_objects(folder, run_program, tmp_path):
     write_lightfield(tmp_path / "lightfield.json", 5, passes=["object"])
-    words = ("--blend", folder / "keyed_number.blend", "--views", "1:2")
-    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
-    run_program("render_shard.py", *words)
+    arguments = ("--blend", folder / "keyed_number.blend", "--views", "1:2")
+    arguments += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
+    run_program("render_shard.py", *arguments)
     names = json.loads((tmp_path / "object/names.json").read_text())
     assert names == {name: number for number, name in enumerate(sorted(names), 1)}
     (pixels,) = images.read_image(tmp_path / "object/view_0001f.exr").channels.values()
@@ -193,11 +200,11 @@ def test_keyframes_do_not_number_objects(folder, run_program, tmp_path):
         ("particles_from_a_keyed_emitter", "plane > grain"),
     ],
 )
-def test_instances_that_only_a_render_shows_are_told(blend, shown, folder, run_program, tmp_path):
+def test_objects_that_only_a_render_shows_are_reported(blend, shown, folder, run_program, tmp_path):
     write_lightfield(tmp_path / "lightfield.json", 5, passes=["instance"])
-    words = ("--blend", folder / f"{blend}.blend", "--views", "1:2")
-    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
-    run_program("render_shard.py", *words)
+    arguments = ("--blend", folder / f"{blend}.blend", "--views", "1:2")
+    arguments += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
+    run_program("render_shard.py", *arguments)
     names = json.loads((tmp_path / "instance/names.json").read_text())
     numbers = [number for name, number in names.items() if name.startswith(shown)]
     (pixels,) = images.read_image(tmp_path / "instance/view_0001f.exr").channels.values()
@@ -224,6 +231,6 @@ def test_the_frames_of_a_scene_are_those_of_all_its_rigs(tmp_path, monkeypatch):
     (tmp_path / "moving.yaml").write_text(SEQUENCE)
     monkeypatch.setattr(config, "SCENES", tmp_path)
     assert rendered_frames(scene_datasets("moving")) == [1, 5, 9]
-    own = SEQUENCE.replace("builder: garden, frame: 5", "blend: a.blend, frame: file")
-    (tmp_path / "moving.yaml").write_text(own)
+    own_scene = SEQUENCE.replace("builder: garden, frame: 5", "blend: a.blend, frame: file")
+    (tmp_path / "moving.yaml").write_text(own_scene)
     assert rendered_frames(scene_datasets("moving")) == [1, 5, 9, "file"]

@@ -1,4 +1,4 @@
-"""Every writer on a disk that is full: an error that names the file, and the old file unharmed."""
+"""Writers on a full disk: each raises an error that names the file, and keeps the old file."""
 
 import os
 import re
@@ -51,7 +51,7 @@ def write_plot(path, seed):
 
 
 def write_page(path, seed):
-    keys = ("rig", "link", "resolution", "lens", "valid", "picture")
+    keys = ("rig", "link", "resolution", "lens", "projection", "state", "picture")
     page.write(
         path, "index.html.j2", datasets=[dict.fromkeys(keys) | {"scene": "a", "views": seed}]
     )
@@ -77,7 +77,7 @@ def write_blend(path, seed):
         blend_file.save_scene(temporary)
 
 
-# A .blend holds memory addresses: written again it may be somewhat smaller.
+# A .blend holds memory addresses, so a second one may be somewhat smaller.
 SMALLER = {"a.blend": 2000}
 WRITERS = [
     (write_exr, "a.exr"),
@@ -96,7 +96,7 @@ WRITERS = [
 
 @contextmanager
 def largest_file(size):
-    """Let no file grow beyond ``size`` bytes, as RLIMIT_FSIZE does."""
+    """Limit all files to ``size`` bytes, with RLIMIT_FSIZE."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -107,7 +107,7 @@ def largest_file(size):
 
 @contextmanager
 def nearly_full(disk, blocks):
-    """Leave ``blocks`` blocks of a small disk; on another one, of each file."""
+    """Leave ``blocks`` blocks on a small disk. Without one, limit each file to that size."""
     folder, mounted = disk
     filler = folder / "filler"
     with nullcontext() if mounted else largest_file(blocks * BLOCK):
@@ -121,15 +121,15 @@ def nearly_full(disk, blocks):
 
 
 def assert_refused(write, path):
-    """Assert that the file is not replaced and that the error is one line with its path."""
+    """Assert that the file is not replaced, and that the error is one line with its path."""
     before = {p.name: p.read_bytes() for p in path.parent.iterdir()}
     with pytest.raises(UserError) as caught:
         write(path, 1)
-    told = str(caught.value)
-    assert told.startswith(f"{path.with_suffix('')}.")
-    assert ": cannot be written: " in told and "\n" not in told
-    # What to do, and sizes as a person reads them.
-    assert re.search(r"GB are free on its disk: |is full: free some space", told), told
+    message = str(caught.value)
+    assert message.startswith(f"{path.with_suffix('')}.")
+    assert ": cannot be written: " in message and "\n" not in message
+    # The message says what to do, and has sizes that a person can read.
+    assert re.search(r"GB are free on its disk: |is full: free some space", message), message
     after = {p.name: p.read_bytes() for p in path.parent.iterdir()}
     assert after.keys() == before.keys()
     assert after[path.name] == before[path.name]
@@ -137,7 +137,7 @@ def assert_refused(write, path):
 
 @pytest.mark.parametrize(("write", "name"), WRITERS)
 @pytest.mark.slow
-def test_no_byte_is_lost_unseen(write, name, tmp_path):
+def test_an_incomplete_write_is_always_refused(write, name, tmp_path):
     path = tmp_path / "folder" / name
     write(path, 1)
     size = path.stat().st_size - SMALLER.get(name, 0)
@@ -151,7 +151,7 @@ def test_no_byte_is_lost_unseen(write, name, tmp_path):
 
 
 @pytest.mark.parametrize(("write", "name"), WRITERS)
-def test_after_space_is_made_the_file_is_written(write, name, small_disk):
+def test_with_space_again_the_file_is_written(write, name, small_disk):
     path = small_disk[0] / name
     write(path, 1)
     blocks = -(-(path.stat().st_size - SMALLER.get(name, 0)) // BLOCK)
@@ -164,7 +164,7 @@ def test_after_space_is_made_the_file_is_written(write, name, small_disk):
     assert path.read_bytes() != before
 
 
-def test_a_journal_goes_on_after_a_line_that_was_cut_short(tmp_path):
+def test_a_journal_continues_after_a_truncated_line(tmp_path):
     path = tmp_path / "journal.jsonl"
     journal = Journal(path)
     size = path.stat().st_size

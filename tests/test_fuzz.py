@@ -1,8 +1,8 @@
 """Files that damage or another program has changed: each is read, or refused in one line.
 
-A seed spoils every kind of file that a program reads. Each file is read, or a `UserError` of one
-line names it. Sums that a file holds of itself are made right again in two of three files: else
-they would hide what lies behind them.
+A seed decides how each kind of file is spoiled. Each file is read, or a `UserError` of one line
+names it. In two of three files, checksums of the file itself are corrected. Otherwise these would
+hide all other faults.
 """
 
 import contextlib
@@ -51,7 +51,7 @@ from lightfield.reprojection import lens_map
 from lightfield.validation import readers, splits_check
 
 TIMES = itertools.count(10**18, 10**6)
-# Files of each kind. The few take seconds, and belong to each run of the tests.
+# The number of files of each kind. "few" takes seconds, and runs in each run of the tests.
 COUNTS = [pytest.param(40, id="few"), pytest.param(600, id="many", marks=pytest.mark.slow)]
 
 HOSTILE = [
@@ -68,7 +68,7 @@ WORDS = [
 
 
 def places(content, path=()):
-    """Yield the path to each part of a JSON, the whole first."""
+    """Yield the path to each part of a JSON, first that of the whole JSON."""
     yield path
     items = content.items() if isinstance(content, dict) else ()
     items = enumerate(content) if isinstance(content, list) else items
@@ -82,7 +82,7 @@ def spoiled(content, rng):
     for _ in range(rng.randint(1, 3)):
         path = rng.choice(list(places(content)))
         if not path:
-            # The whole of it seldom: that is refused at once.
+            # The whole JSON rarely: such files are refused at once.
             if rng.random() < 0.1:
                 content = copy.deepcopy(rng.choice(HOSTILE))
             continue
@@ -114,7 +114,7 @@ def reworded(data, rng):
 
 
 def damaged(data, rng):
-    """Return bytes that are cut short, flipped, repeated, or somebody else's."""
+    """Return bytes that are cut short, flipped, repeated, or replaced."""
     data = bytearray(data)
     match rng.randrange(6):
         case 0:
@@ -160,14 +160,14 @@ def lightfield(rng):
 
 
 def read_lightfield(path, _):
-    found = LightField.read(path)
-    found.matrices  # noqa: B018
-    found.with_flow()
-    found.lens.fitted(8).pixel_rays()
-    found.lens.pixels([[0.1, 0.2, -1.0]])
-    json.dumps(found.to_json())
+    lightfield = LightField.read(path)
+    lightfield.matrices  # noqa: B018
+    lightfield.with_flow()
+    lightfield.lens.fitted(8).pixel_rays()
+    lightfield.lens.pixels([[0.1, 0.2, -1.0]])
+    json.dumps(lightfield.to_json())
     for key in ("passes", "transparent", "frame", "scene", "render"):
-        getattr(found, key)
+        getattr(lightfield, key)
 
 
 def inventory(_):
@@ -191,9 +191,9 @@ def read_scene_inventory(path, dataset):
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
         read_inventory(path, key)
-    found = dataset.resolved(path)
-    found.rig.poses()
-    found.rig.camera.make()
+    resolved = dataset.resolved(path)
+    resolved.rig.poses()
+    resolved.rig.camera.make()
 
 
 def record(_):
@@ -247,18 +247,18 @@ def ledger_lines(_):
 
 
 def read_ledger(path, _):
-    found = ledger.Ledger(path)
-    found.damage  # noqa: B018
+    jobs = ledger.Ledger(path)
+    jobs.damage  # noqa: B018
     for name in ("a.json", "b"):
-        if name in found:
-            found.changed_input(name)
-    found.last_read("b.json", "0" * 64)
-    found.input_stamps(["a.json"])
+        if name in jobs:
+            jobs.changed_input(name)
+    jobs.last_read("b.json", "0" * 64)
+    jobs.input_stamps(["a.json"])
     ledger.read(path)
     ledger.damaged_lines(path)
     ledger.forget(path, "c")
-    found.refresh()
-    found.compact()
+    jobs.refresh()
+    jobs.compact()
 
 
 def transforms(_):
@@ -413,7 +413,7 @@ def read_poses(path, _):
     from_settings({"type": "poses", "file": str(path)}).poses()
 
 
-# By kind: the file's path in work/own, a sample's content, and what reads it.
+# For each kind: the file's path in work/own, a sample's content, and the function that reads it.
 KINDS = {
     "lightfield": ("View/lightfield.json", lightfield, read_lightfield),
     "inventory": ("inventory.json", inventory, read_scene_inventory),
@@ -443,8 +443,8 @@ rigs:
 
 
 def text_of(kind, content):
-    """Return a file's bytes; what holds a sum of itself holds the right one."""
-    # Without sums a NaN is one: Python writes and reads it.
+    """Return a file's bytes, with correct checksums of itself."""
+    # Without checksums NaN is possible: Python writes and reads it.
     text = json.dumps(content)
     if kind == "ledger":
         lines = [json.dumps(line) for line in content] if isinstance(content, list) else []
@@ -462,7 +462,7 @@ def text_of(kind, content):
 
 @pytest.fixture
 def home(tmp_path, monkeypatch):
-    """The folder of a user's own .blend, whose rig and samples are known from its files alone."""
+    """The folder of a user's own .blend. Only its files tell its rig and its samples."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.yaml").write_text(OWN)
     (tmp_path / "own.blend").write_bytes(b"a scene")
@@ -471,7 +471,7 @@ def home(tmp_path, monkeypatch):
     return tmp_path
 
 
-# Some spoiled files are sound lists of what is missing, or sound inventories of other .blends.
+# Some spoiled files are valid lists of missing files, or valid inventories of other .blends.
 LISTED = {
     "export": "exports/",
     "transforms": "View/",
@@ -480,10 +480,10 @@ LISTED = {
 
 
 def assert_read_or_refused(read, path, dataset, data, listed=None):
-    """``listed`` is what a message may name instead of the file: one that it lists."""
+    """Read a file of ``data``. ``listed`` is a listed name that the message may have instead."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
-    # Programs keep what they have read of a file until its time changes.
+    # Programs cache a file's content until its time changes.
     changed = next(TIMES)
     os.utime(path, ns=(changed, changed))
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -510,20 +510,20 @@ def test_a_spoiled_file_is_read_or_refused(kind, count, home):
         (dataset,) = scene_datasets("own")
         path = home / "work/own" / name
         assert_read_or_refused(read, path, dataset, data, LISTED.get(kind))
-        # The next sample's dataset is that of the settings alone.
+        # The next sample's dataset follows from the settings alone.
         path.unlink()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_sound_file_is_read(kind, home):
-    """Otherwise the spoiled ones would be refused for what all of them have."""
+def test_an_intact_file_is_read(kind, home):
+    """Otherwise the spoiled files might be refused for a fault that all samples share."""
     name, sample, read = KINDS[kind]
     path = home / "work/own" / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text_of(kind, sample(random.Random(1))))
     (dataset,) = scene_datasets("own")
     if kind == "export":
-        # Of what it lists nothing is there.
+        # The listed files do not exist.
         with pytest.raises(UserError, match=r"cannot be read|no such file|No such file|is no"):
             read(path, dataset)
         return
@@ -541,7 +541,7 @@ def test_a_spoiled_lens_map_is_read_or_refused(count, tmp_path):
     for number in range(count):
         data = damaged(sound, rng)
         if number % 3 == 0:
-            # In what says how the rest is read.
+            # Damage the header, which says how to read the rest.
             data = damaged(sound[:header], rng) + sound[header:]
         elif number % 3 == 1:
             description = sound.index(b"{", header)
@@ -587,7 +587,7 @@ def read_picture(path, _):
     images.read_image(path).srgb  # noqa: B018
 
 
-# By a file's name: what writes it, and what reads it.
+# For each file's name: the functions that write and read it.
 FILES = {
     "poses.csv": (pose_table, read_poses),
     "images.txt": (image_list, read_poses),

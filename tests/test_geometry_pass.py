@@ -1,4 +1,4 @@
-"""The geometry pass: the first surface at each pixel's centre, against surfaces that are known."""
+"""The geometry pass: the first surface at each pixel's centre, in scenes with known surfaces."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ LENSES = {
     "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
 }
 FOGS = ["mesh_fog", "clear_surface_fog", "volume_object", "nodes_fog", "world_fog"]
-# Of `known` in geometry_views.py: floor, wall and sphere.
+# The sphere of `known_surfaces` in geometry_views.py.
 SPHERE, RADIUS = np.array([-1, 1.5, 1.25]), 1.0
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 2}
 TURNED = {"center": [0.2, -0.4, 1.1], "rotation": [8, -5, 12]}
@@ -32,7 +32,7 @@ def lightfield(camera, place, frame=1, depth=None, **more):
 
 
 CASES = {
-    **{name: ("known", lightfield(camera, TURNED)) for name, camera in LENSES.items()},
+    **{name: ("known_surfaces", lightfield(camera, TURNED)) for name, camera in LENSES.items()},
     **{fog: (fog, lightfield(LENSES["fisheye_180"], TURNED)) for fog in FOGS},
     "moving": ("moving", lightfield(LENSES["fisheye_180"], TURNED, frame=2)),
     "unfocused": ("unfocused", lightfield(LENSES["perspective"], TURNED, depth_of_field=True)),
@@ -53,7 +53,7 @@ def views(tmp_path_factory, run_program):
 
 
 def truth(content):
-    """Return distances (h, w), normals (h, w, 3) and surfaces (h, w), 0 for none, of `known`."""
+    """Return the exact distances (h, w), normals (h, w, 3) and surfaces (h, w), 0 for none."""
     view = content.views[0]
     rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
     origin = view.position
@@ -78,7 +78,7 @@ def truth(content):
 
 
 def inside(surfaces):
-    """Return the pixels (h, w) whose eight neighbours see the same surface, and that see one."""
+    """Return the pixels (h, w) that see the same surface as their eight neighbours."""
     padded = np.pad(surfaces, 1, mode="edge")
     height, width = surfaces.shape
     around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
@@ -86,14 +86,14 @@ def inside(surfaces):
 
 
 def stored(content, distance):
-    """Return distances as the dataset holds them."""
+    """Return distances as a dataset holds them."""
     if content.depth == "distance":
         return distance
     return distance * -content.lens.pixel_rays()[..., 2]
 
 
 @pytest.mark.parametrize("name", [*LENSES, *FOGS, "moving", "unfocused"])
-def test_depth_and_normals_are_those_of_the_first_surface_at_the_pixels_centre(name, views):
+def test_depth_and_normals_are_those_of_the_first_surface(name, views):
     content = CASES[name][1]
     distance, normals, surfaces = truth(content)
     sure = inside(surfaces)
@@ -103,12 +103,12 @@ def test_depth_and_normals_are_those_of_the_first_surface_at_the_pixels_centre(n
     for surface in (1, 2, 3):
         (index,) = np.unique(materials[sure & (surfaces == surface)])
         assert index == 20 + surface
-    # A ray's direction is known to a few units of the 24th bit, and where it meets a surface at a
-    # grazing angle that moves the point by so much more.
+    # A ray's direction is exact to a few units of the 24th bit. At a grazing angle, that moves the
+    # point on the surface accordingly farther.
     rays = content.lens.pixel_rays() @ content.views[0].matrix[:3, :3].T
     facing = np.abs(np.sum(rays * normals, axis=-1))
-    z, known = views[f"{name}.z"][sure], stored(content, distance)[sure]
-    error = np.abs(z.astype(np.float64) / known - 1)
+    z, expected_z = views[f"{name}.z"][sure], stored(content, distance)[sure]
+    error = np.abs(z.astype(np.float64) / expected_z - 1)
     assert np.median(error) < 1e-6
     assert (error * facing[sure]).max() < 1.5e-6
     turned = np.linalg.norm(views[f"{name}.normal"] - normals, axis=-1)[sure]
@@ -116,7 +116,7 @@ def test_depth_and_normals_are_those_of_the_first_surface_at_the_pixels_centre(n
 
 
 @pytest.mark.parametrize("name", [*LENSES, *FOGS])
-def test_there_are_misses_where_there_is_nothing_and_nowhere_else(name, views):
+def test_depth_misses_exactly_where_there_is_no_surface(name, views):
     content = CASES[name][1]
     distance, _, surfaces = truth(content)
     around = inside(surfaces + 1)
@@ -128,26 +128,28 @@ def test_there_are_misses_where_there_is_nothing_and_nowhere_else(name, views):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_colour_is_what_it_is_without_geometry(name, views):
+def test_geometry_does_not_change_the_colour(name, views):
     colour = views[f"{name}.colour"]
     assert np.ptp(colour) > 0.1
     np.testing.assert_array_equal(colour, views[f"{name}.alone"])
 
 
-def test_what_is_wholly_transparent_is_no_surface_and_glass_is_one(views):
+def test_invisible_surfaces_have_no_depth_and_glass_has(views):
     content = CASES["curtains"][1]
     rays = content.lens.pixel_rays() @ content.views[0].matrix[:3, :3].T
     x, z = (2 * rays[..., axis] / rays[..., 1] for axis in (0, 2))
     for number, (index, normal) in enumerate(
         [(1, (np.sin(0.3), -np.cos(0.3), 0)), *((10 + n, (0, -1, 0)) for n in (1, 2, 3, 4))]
     ):
-        there = (np.abs(x - (number - 2)) < 0.4) & (np.abs(z) < 0.4)
-        assert there.sum() > 80
-        assert set(np.unique(views["curtains.objects"][there])) == {index}
+        inside_card = (np.abs(x - (number - 2)) < 0.4) & (np.abs(z) < 0.4)
+        assert inside_card.sum() > 80
+        assert set(np.unique(views["curtains.objects"][inside_card])) == {index}
         np.testing.assert_allclose(
-            views["curtains.normal"][there], np.broadcast_to(normal, (there.sum(), 3)), atol=1e-6
+            views["curtains.normal"][inside_card],
+            np.broadcast_to(normal, (inside_card.sum(), 3)),
+            atol=1e-6,
         )
         if index > 1:
             np.testing.assert_allclose(
-                views["curtains.z"][there], 2 / rays[..., 1][there], rtol=1e-6
+                views["curtains.z"][inside_card], 2 / rays[..., 1][inside_card], rtol=1e-6
             )

@@ -1,4 +1,4 @@
-"""The GPU check: what it calls the same picture, and how many hours it reckons; none is needed."""
+"""The GPU check: when pictures count as the same, and the estimated hours. Needs no GPU."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ print(json.dumps(gpu_check.check(maker, "cpu", lightfield.render, {})))
 
 
 class Simulated:
-    """Trials that cost no render: noise of their seeds on a picture that is known."""
+    """Trials that render nothing: their seeds' noise on a known picture."""
 
     def __init__(self, lens, device="cpu"):
         self.lens, self.device, self.lightfield = lens, device, None
@@ -42,7 +42,7 @@ class Simulated:
         light = np.linspace(0.1, 2, width * height * 3, dtype=np.float32)
         light = light.reshape(height, width, 3)
         random = np.random.default_rng(seed)
-        # As path tracing has it: now and then a bright path.
+        # Like path tracing, now and then a path is bright.
         noise = random.exponential(NOISE, light.shape) - NOISE
         noise += (random.random(light.shape) < 1e-3) * 5 - 0.005
         depth = np.where(light[..., 0] < 1.5, light[..., 0] + 1, np.inf)
@@ -60,11 +60,11 @@ def trials():
 
 
 def test_renders_of_other_seeds_are_the_same_picture(trials):
-    one, other, mask = trials
-    found = gpu_check.compare(one, other, mask)
-    assert found.same
-    assert found.colour == pytest.approx(1, abs=0.5)
-    assert found.depth == 0
+    first, second, mask = trials
+    comparison = gpu_check.compare(first, second, mask)
+    assert comparison.same
+    assert comparison.colour == pytest.approx(1, abs=0.5)
+    assert comparison.depth == 0
 
 
 @pytest.mark.parametrize(
@@ -79,32 +79,32 @@ def test_renders_of_other_seeds_are_the_same_picture(trials):
     ],
     ids=["exposure", "mirrored", "tinted", "depth", "shifted", "misses"],
 )
-def test_another_picture_is_not_the_same(trials, change):
-    one, other, mask = trials
-    assert not gpu_check.compare(one, [change(trial) for trial in other], mask).same
+def test_a_changed_picture_is_not_the_same(trials, change):
+    first, second, mask = trials
+    assert not gpu_check.compare(first, [change(trial) for trial in second], mask).same
 
 
-def test_a_picture_without_noise_is_the_same_or_not(trials):
-    one, _, mask = trials
-    still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in one]
+def test_pictures_without_noise_are_compared_exactly(trials):
+    first, _, mask = trials
+    still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in first]
     assert gpu_check.compare(still, still, mask).same
     brighter = [replace(trial, colour=trial.colour * 2) for trial in still]
     assert not gpu_check.compare(still, brighter, mask).same
 
 
-def test_hours_are_those_of_the_views_pixels_and_samples():
+def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": {"views": 10, "resolution": [2000, 1000]}}
     maker = Simulated(lenses.from_camera(CAMERA))
-    found = gpu_check.check(maker, "gpu", {"samples": 256}, full)
-    assert found["devices"] == ["CPU", "GPU"]
-    assert found["core_seconds"] == pytest.approx(1)
-    assert found["gpu_seconds"] == pytest.approx(0.1)
-    assert found["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
-    assert "times as fast as on one core" in gpu_check.table("garden", found)
+    content = gpu_check.check(maker, "gpu", {"samples": 256}, full)
+    assert content["devices"] == ["CPU", "GPU"]
+    assert content["core_seconds"] == pytest.approx(1)
+    assert content["gpu_seconds"] == pytest.approx(0.1)
+    assert content["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
+    assert "times as fast as on one core" in gpu_check.table("garden", content)
 
 
 def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
-    """The real renders, with the processor in place of the GPU."""
+    """Uses real renders, with the processor in place of the GPU."""
     content = LightField.from_rig(
         RIG | {"center": [0, 0, 1.5]},
         lenses.from_camera(CAMERA | {"resolution": [48, 48]}),
@@ -116,14 +116,14 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
     run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
     program = tmp_path / "check.py"
     program.write_text(PROGRAM)
-    found = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
-    assert '"same": true' in found.stdout
-    # The program itself says so in one line, without a file.
-    words = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
-    words += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
-    words += ["--output", tmp_path / "room"]
+    result = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
+    assert '"same": true' in result.stdout
+    # The program itself says so in one line, without writing a file.
+    arguments = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
+    arguments += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
+    arguments += ["--output", tmp_path / "room"]
     for device, said in (("cpu", "device: is cpu"), ("metal", "has no metal device")):
-        refused = run_program("gpu_check.py", *words, "--device", device, check=False)
+        refused = run_program("gpu_check.py", *arguments, "--device", device, check=False)
         assert refused.returncode == 1
         assert refused.stderr.count("error: ") == 1
         assert said in refused.stderr

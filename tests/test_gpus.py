@@ -1,6 +1,6 @@
-"""One GPU a process: no two processes render on the same one, and none waits for one that is free.
+"""One GPU a process: no two processes share a GPU, and none waits while another GPU is free.
 
-No GPU is needed: what is taken is its name.
+No GPU is needed: a process takes its name.
 """
 
 import os
@@ -51,7 +51,7 @@ def test_no_two_processes_take_the_same_gpu(tmp_path):
         other.close()
         lock.close()
         assert {third.stdout.readline(), fourth.stdout.readline()} == {"GPU-a\n", "GPU-b\n"}
-        # A killed process keeps none.
+        # A killed process releases its GPU.
         third.kill()
         third.wait()
         fifth, lock = gpus.take(FAKE, tmp_path)
@@ -60,7 +60,7 @@ def test_no_two_processes_take_the_same_gpu(tmp_path):
         lock.close()
 
 
-def test_a_gpu_is_free_whoever_had_it_before(nobody):
+def test_a_gpu_is_free_whoever_used_it_before(nobody):
     (nobody / "plenoforge-CUDA_VISIBLE_DEVICES_GPU_a.lock").touch(0o444)
     gpu, lock = gpus.take(FAKE[:1], nobody)
     lock.close()
@@ -83,7 +83,7 @@ def test_a_link_in_a_folder_of_all_users_is_refused_and_not_followed(tmp_path, k
     assert kind != "file" or victim.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_lock_that_was_made_first_may_be_locked_by_every_user(tmp_path):
+def test_every_user_may_lock_an_existing_lock_file(tmp_path):
     umask = os.umask(0o077)
     _, lock = gpus.take(FAKE[:1], tmp_path)
     os.umask(umask)
@@ -100,9 +100,7 @@ def test_a_lock_that_was_made_first_may_be_locked_by_every_user(tmp_path):
         ({}, [Gpu(CUDA, "GPU-1"), Gpu(CUDA, "GPU-2"), Gpu(HIP, "0"), Gpu(HIP, "1")]),
     ],
 )
-def test_the_gpus_are_those_that_are_left_to_the_process(
-    environment, expected, tmp_path, monkeypatch
-):
+def test_only_gpus_that_the_process_may_use_count(environment, expected, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     (tmp_path / "nvidia-smi").write_text("#!/bin/sh\necho GPU-1\necho GPU-2\n")
     (tmp_path / "nvidia-smi").chmod(0o755)
@@ -121,7 +119,7 @@ print(os.environ[CUDA], os.environ[HIP])
 """
 
 
-def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path):
+def test_a_process_sees_only_the_gpu_that_it_took(tmp_path):
     _, lock = gpus.take(FAKE[:1], tmp_path)
     environment = {CUDA: "GPU-a,GPU-b", HIP: "0", "TMPDIR": str(tmp_path)}
     process = subprocess.run(
@@ -142,21 +140,21 @@ def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path):
         "Out of memory in cuMemAlloc_v2(&device_pointer, size) (device_impl.cpp:601)",
     ],
 )
-def test_a_gpu_without_room_is_reported_with_what_to_lower(message, room, run_program, tmp_path):
+def test_a_gpu_without_memory_is_reported_with_advice(message, room, run_program, tmp_path):
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [16, 16]})
     sampling = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     rig = {"type": "plane", "cameras": [1, 1]}
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=1, render=sampling)
     lightfield.write(tmp_path / "lightfield.json")
-    found = run_program(
+    result = run_program(
         *(Path(__file__).with_name("full_gpu.py"), message, "--blend", room, "--device", "cuda"),
         *("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr"),
         check=False,
     )
-    assert found.returncode == 1
-    assert found.stderr.splitlines()[-1] == (
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1] == (
         f"error: Cycles cannot render the view: {message}: lower resolution, shrink the scene's "
         "textures, end what else uses the GPU, or take device=cpu"
     )
-    assert "Traceback" not in found.stderr
+    assert "Traceback" not in result.stderr
     assert not list(tmp_path.rglob("*.exr"))

@@ -1,4 +1,4 @@
-"""Images in and out, against OpenImageIO, Blender and the files' own bytes."""
+"""Images in and out, compared with OpenImageIO, Blender and the files' own bytes."""
 
 from pathlib import Path
 
@@ -26,32 +26,32 @@ ATTRIBUTES = {"plenoforge:depth": "z", "plenoforge:nan": 3, "plenoforge:scale": 
 def channels():
     rng = np.random.default_rng(0)
     halves = {name: rng.uniform(-2, 60000, (37, 53)).astype("f2") for name in "RGB"}
-    # What a kernel must not touch: infinities, NaN, denormals, and the largest half.
+    # Values that a kernel must keep: infinities, NaN, denormals, and the largest half.
     halves["R"][0, :6] = [np.inf, -np.inf, np.nan, 6e-8, 65504, -0.0]
     depth = rng.uniform(0, 1e9, (37, 53)).astype("f4")
     depth[1, :3] = [np.inf, np.nan, 1e-42]
     return halves | {"Z": depth}
 
 
-def same(found, expected):
-    return found.dtype == expected.dtype and np.array_equal(
-        found.view(np.uint8), expected.view(np.uint8)
+def same(pixels, expected):
+    return pixels.dtype == expected.dtype and np.array_equal(
+        pixels.view(np.uint8), expected.view(np.uint8)
     )
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "tif", "png", "exr", "hdr", "webp", "bmp", "tga"])
-def test_a_picture_that_ends_too_soon_is_not_whole(tmp_path, suffix):
+def test_a_picture_that_ends_too_soon_is_not_finished(tmp_path, suffix):
     path = tmp_path / f"a.{suffix}"
     pixels = np.random.default_rng(0).integers(0, 255, (64, 48, 3), dtype=np.uint8)
     assert oiio.ImageBuf(pixels).write(str(path))
     assert is_readable(path)
-    whole = path.read_bytes()
-    for size in (0, len(whole) // 2, len(whole) * 9 // 10):
-        path.write_bytes(whole[:size])
+    content = path.read_bytes()
+    for size in (0, len(content) // 2, len(content) * 9 // 10):
+        path.write_bytes(content[:size])
         assert not is_readable(path)
 
 
-def test_a_picture_of_which_a_decoder_only_warns_is_whole(tmp_path):
+def test_a_picture_with_only_a_decoders_warning_is_finished(tmp_path):
     path = tmp_path / "a.jpg"
     oiio.ImageBuf(np.zeros((8, 8, 3), np.uint8)).write(str(path))
     content = bytearray(path.read_bytes())
@@ -60,7 +60,7 @@ def test_a_picture_of_which_a_decoder_only_warns_is_whole(tmp_path):
     assert is_readable(path)
 
 
-def test_what_is_written_is_read(tmp_path, channels):
+def test_written_channels_are_read_back(tmp_path, channels):
     write_exr(tmp_path / "a.exr", channels, ATTRIBUTES)
     image = read_image(tmp_path / "a.exr")
     assert image.channels.keys() == channels.keys()
@@ -83,7 +83,7 @@ def test_arrays_of_any_layout_are_written_as_they_are(tmp_path, channels):
     assert files[0] == files[1] == files[2]
 
 
-def test_other_libraries_read_what_is_written(tmp_path, channels):
+def test_other_libraries_read_our_files(tmp_path, channels):
     path = tmp_path / "view.exr"
     write_exr(path, channels, ATTRIBUTES)
     theirs = oiio.ImageBuf(str(path))
@@ -112,7 +112,7 @@ def test_every_codec_keeps_every_bit(tmp_path, channels, codec):
     assert header["compression"] == getattr(OpenEXR, CODECS[codec])
 
 
-def test_a_codec_that_openexr_lacks_is_refused(monkeypatch):
+def test_a_codec_that_openexr_does_not_have_is_refused(monkeypatch):
     monkeypatch.delattr(OpenEXR, CODECS["zstd"])
     check_codec("zip")
     with pytest.raises(UserError, match=r"compression: is 'zstd', which OpenEXR .* zip, .*htj2k$"):
@@ -121,13 +121,13 @@ def test_a_codec_that_openexr_lacks_is_refused(monkeypatch):
 
 def test_some_rows_of_some_channels(tmp_path, channels):
     write_exr(tmp_path / "a.exr", channels)
-    found = read_image(tmp_path / "a.exr", ["Z", "G"], (17, 20)).channels
-    assert found.keys() == {"Z", "G"}
-    assert all(same(found[name], channels[name][17:20]) for name in found)
+    read_channels = read_image(tmp_path / "a.exr", ["Z", "G"], (17, 20)).channels
+    assert read_channels.keys() == {"Z", "G"}
+    assert all(same(read_channels[name], channels[name][17:20]) for name in read_channels)
     pixels = np.arange(37 * 53 * 3, dtype=np.uint8).reshape(37, 53, 3)
     write_png(tmp_path / "a.png", pixels)
-    found = read_image(tmp_path / "a.png", ["B"], (17, 20)).channels
-    assert found.keys() == {"B"} and np.array_equal(found["B"], pixels[17:20, :, 2])
+    read_channels = read_image(tmp_path / "a.png", ["B"], (17, 20)).channels
+    assert read_channels.keys() == {"B"} and np.array_equal(read_channels["B"], pixels[17:20, :, 2])
 
 
 @pytest.mark.parametrize("storage", ["parts", "tiles", "offset"])
@@ -147,23 +147,25 @@ def test_exr_files_of_other_kinds(tmp_path, channels, storage):
         case "offset":
             corners = np.array([7, -5], np.int32), np.array([59, 31], np.int32)
             OpenEXR.File(kind | {"dataWindow": corners}, dict(channels)).write(path)
-    found = read_image(path).channels
-    assert found.keys() == channels.keys()
-    assert all(same(np.ascontiguousarray(found[name]), channels[name]) for name in found)
-    some = read_image(path, ["Z"], (3, 9)).channels["Z"]
-    assert np.array_equal(some, channels["Z"][3:9], equal_nan=True)
+    read_channels = read_image(path).channels
+    assert read_channels.keys() == channels.keys()
+    assert all(
+        same(np.ascontiguousarray(read_channels[name]), channels[name]) for name in read_channels
+    )
+    some_rows = read_image(path, ["Z"], (3, 9)).channels["Z"]
+    assert np.array_equal(some_rows, channels["Z"][3:9], equal_nan=True)
 
 
 def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
     path = tmp_path / "a.exr"
     write_exr(path, channels, ATTRIBUTES)
-    whole = path.read_bytes()
-    # OpenEXR itself ends with an error of Python's, or of the system's, for both.
-    path.write_bytes(whole.replace(b"plenoforge:nan", b"\xf0lenoforge:nan"))
+    content = path.read_bytes()
+    # For both, OpenEXR itself ends with an error of Python or of the system.
+    path.write_bytes(content.replace(b"plenoforge:nan", b"\xf0lenoforge:nan"))
     assert read_header(path).attributes["plenoforge:scale"] == 0.5
     assert same(np.ascontiguousarray(read_image(path).channels["Z"]), channels["Z"])
-    path.write_bytes(whole.replace(b"\0Z\0", b"\0\xda\0"))
-    with pytest.raises(UserError, match=r"a\.exr: is no image that can be read: .*utf-8"):
+    path.write_bytes(content.replace(b"\0Z\0", b"\0\xda\0"))
+    with pytest.raises(UserError, match=r"a\.exr: is not an image that can be read: .*utf-8"):
         read_header(path)
 
 
@@ -171,24 +173,24 @@ def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
 def test_a_file_cut_short_is_named(tmp_path, channels, part):
     path = tmp_path / "cut.exr"
     write_exr(path, channels)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: part if isinstance(part, int) else int(part * len(whole))])
+    content = path.read_bytes()
+    path.write_bytes(content[: part if isinstance(part, int) else int(part * len(content))])
     with pytest.raises(UserError, match=r"cut\.exr"):
         read_image(path)
 
 
-def test_what_is_not_there_is_named(tmp_path, channels):
+def test_a_missing_file_or_channel_is_named(tmp_path, channels):
     with pytest.raises(UserError, match=r"none\.exr: no such file"):
         read_image(tmp_path / "none.exr")
     write_exr(tmp_path / "a.exr", channels)
     with pytest.raises(UserError, match=r"a\.exr: has no channel A; it has R, G, B, Z"):
         read_image(tmp_path / "a.exr", ["R", "A"])
     (tmp_path / "text.exr").write_text("no image")
-    with pytest.raises(UserError, match=r"text\.exr: is no image that can be read"):
+    with pytest.raises(UserError, match=r"text\.exr: is not an image that can be read"):
         read_header(tmp_path / "text.exr")
 
 
-def test_16_bits_are_shown_by_the_nearest_8(tmp_path):
+def test_16_bits_are_shown_as_the_nearest_8(tmp_path):
     values = np.linspace(0, 65535, 37 * 53 * 3).astype(np.uint16).reshape(37, 53, 3)
     write_png(tmp_path / "a.png", values)
     shown = read_image(tmp_path / "a.png").srgb
@@ -196,7 +198,7 @@ def test_16_bits_are_shown_by_the_nearest_8(tmp_path):
 
 
 class DamagingWriter:
-    """OpenImageIO's writer on a disk that changes a bit of what it is given."""
+    """OpenImageIO's writer on a disk that changes a bit of the data."""
 
     def __init__(self, path, writer):
         self.path = path
@@ -213,7 +215,7 @@ class DamagingWriter:
         return closed
 
 
-def test_a_png_that_the_disk_has_damaged_replaces_no_other(tmp_path, monkeypatch):
+def test_a_png_damaged_by_the_disk_replaces_no_other(tmp_path, monkeypatch):
     path = tmp_path / "a.png"
     pixels = np.random.default_rng(0).integers(0, 255, (37, 53, 3), np.uint8)
     write_png(path, pixels)
@@ -227,8 +229,8 @@ def test_a_png_that_the_disk_has_damaged_replaces_no_other(tmp_path, monkeypatch
     monkeypatch.setattr(oiio, "ImageOutput", Output)
     with pytest.raises(UserError, match=r"a\.png: cannot be written: .*damaged"):
         write_png(path, 255 - pixels)
-    found = read_image(path)
-    assert np.array_equal(np.dstack([found.channels[name] for name in "RGB"]), pixels)
+    image = read_image(path)
+    assert np.array_equal(np.dstack([image.channels[name] for name in "RGB"]), pixels)
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
 

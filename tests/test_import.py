@@ -1,4 +1,4 @@
-"""Views that somebody else has rendered, in SILVR's published layout, become a dataset of ours."""
+"""Views that somebody else rendered, in SILVR's published layout, become a dataset."""
 
 import json
 import math
@@ -46,7 +46,7 @@ from snakemake.cli import main
 main(sys.argv[1:])
 """
 
-# Runs Snakemake, then writes how many timers it had at most at one time.
+# Runs Snakemake, then writes the largest number of simultaneous timers.
 TIMING = """
 import atexit, json, sys, threading
 waiting = most = 0
@@ -66,7 +66,7 @@ main(sys.argv[1:])
 
 @pytest.fixture
 def published(tmp_path):
-    """A folder with one rig's views as SILVR publishes its own: half depth, and nothing of ours."""
+    """A folder with one rig's views as SILVR publishes them: half depth, and none of our files."""
     folder = tmp_path / "published" / "LFPlane"
     write_views(folder, VIEWS, RIG)
     content = json.loads((folder / "lightfield.json").read_text())
@@ -85,50 +85,63 @@ def published(tmp_path):
 
 
 def test_published_views_are_reprojected_exported_and_validated(published, tmp_path, run_program):
-    def run(name, *words, **options):
-        return run_program(name, *words, cwd=tmp_path, **options)
+    def run(name, *arguments, **options):
+        return run_program(name, *arguments, cwd=tmp_path, **options)
 
     dataset = tmp_path / "results" / "theirs" / "LFPlane"
-    own = dataset / "lightfield.json"
-    run("make_lightfield.py", "--scene", "theirs", "--rig", "LFPlane", "--output", own)
-    content, theirs = (json.loads(p.read_text()) for p in (own, published / "lightfield.json"))
+    own_lightfield = dataset / "lightfield.json"
+    run("make_lightfield.py", "--scene", "theirs", "--rig", "LFPlane", "--output", own_lightfield)
+    content, theirs = (
+        json.loads(p.read_text()) for p in (own_lightfield, published / "lightfield.json")
+    )
     assert content["frames"] == theirs["frames"]
     assert content["camera"] == theirs["camera"]
     assert content["depth"] == "z"
-    # Nobody knows where they were rendered.
+    # The machine that rendered them is unknown.
     assert "machine" not in content
     record, views = tmp_path / "0-4.json", dataset / "exr"
-    words = ["--dataset", published, "--lightfield", own, "--output", views, "--record", record]
-    run("import_views.py", *words)
+    arguments = [
+        "--dataset",
+        published,
+        "--lightfield",
+        own_lightfield,
+        "--output",
+        views,
+        "--record",
+        record,
+    ]
+    run("import_views.py", *arguments)
     files = json.loads(record.read_text())["files"]
     assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
     for name, entry in files.items():
         assert sha256(published / name) == sha256(dataset / name) == entry["sha256"]
-    # One file by two names: what damages the one damages the other.
+    # Both names are one file, so damage affects both.
     view = next((published / "exr").iterdir())
     content = view.read_bytes()
     view.write_bytes(content[:-1] + b"?")
-    refused = run("import_views.py", *words, check=False)
+    refused = run("import_views.py", *arguments, check=False)
     assert f"{view.name}: has other bytes than at its import" in refused.stderr
     view.write_bytes(content)
-    run("import_views.py", *words)
+    run("import_views.py", *arguments)
     again = dataset / "perspective"
     camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
     settings = tmp_path / "perspective.json"
     settings.write_text(json.dumps({"camera": camera, "formats": ["exr"]}))
-    words = ["--settings", settings, "--input-cfg", own, "--input-dir", views]
-    run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
-    words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
-    run("export_instant_ngp.py", *words, "--output", again / "transforms.json")
-    words = [dataset, "--reprojection", "perspective", "--records", record]
-    words += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
-    run("validate.py", *words)
+    arguments = ["--settings", settings, "--input-cfg", own_lightfield, "--input-dir", views]
+    run(
+        "reproject.py", *arguments, "--output-dir", again, "--output-cfg", again / "lightfield.json"
+    )
+    arguments = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
+    run("export_instant_ngp.py", *arguments, "--output", again / "transforms.json")
+    arguments = [dataset, "--reprojection", "perspective", "--records", record]
+    arguments += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
+    run("validate.py", *arguments)
     validation = json.loads((dataset / "validation.json").read_text())
     assert validation["valid"], validation["summary"]
 
 
 @pytest.mark.parametrize(("side", "fewest", "most"), [(64, 1, 1), (2048, 4, 20)])
-def test_a_shard_takes_over_as_many_views_as_are_worth_a_start(
+def test_a_shard_takes_over_enough_views_to_be_worth_a_start(
     published, tmp_path, monkeypatch, side, fewest, most
 ):
     monkeypatch.chdir(tmp_path)
@@ -141,28 +154,28 @@ def test_a_shard_takes_over_as_many_views_as_are_worth_a_start(
     yaml = tmp_path / "configs/scenes/theirs.yaml"
     yaml.write_text(YAML.replace("[24, 24]", f"[{side}, {side}]"))
     (dataset,) = scene_datasets("theirs")
-    # Of 400 views: small ones are done before a second process has started.
+    # There are 400 views. Small ones are finished before a second process could start.
     assert fewest <= len(dataset.shards) <= most
 
 
 @pytest.mark.slow
-def test_nothing_is_rendered_of_it(published, tmp_path):
-    words = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
-    jobs = planned(tmp_path, *words)
+def test_nothing_is_rendered_for_imported_views(published, tmp_path):
+    arguments = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
+    jobs = planned(tmp_path, *arguments)
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
     for target in ("plan", "advise"):
-        assert planned(tmp_path, target, *words) == {target: 1}
-        terminal = snakemake(tmp_path, target, *words).stderr
+        assert planned(tmp_path, target, *arguments) == {target: 1}
+        terminal = snakemake(tmp_path, target, *arguments).stderr
         assert f"{target} failed: error: the views of all chosen" in terminal
     dataset, (view, *_) = tmp_path / "results/theirs/LFPlane", (published / "exr").iterdir()
     again = []
     for part in (1, 0.5):
-        # A view that its owner makes anew is taken over anew.
+        # A view that its owner changes is taken over again.
         channels = images.read_image(view).channels
         images.write_exr(view, channels | {name: part * channels[name] for name in "RGB"})
-        built = snakemake(tmp_path, *words)
+        built = snakemake(tmp_path, *arguments)
         assert built.returncode == 0, built.stdout + built.stderr
         assert "\nvalid: results/theirs/LFPlane/report/index.html\n" in built.stdout + built.stderr
         assert sha256(dataset / "exr" / view.name) == sha256(view)
@@ -171,28 +184,30 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_lists_no_folder_once_a_shard(published, tmp_path):
-    """Thousands of shards have a folder of many thousand files in common."""
+def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
+    """Thousands of shards share a folder of many thousand files."""
     command = [sys.executable, "-c", COUNTING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
     command += ["--config", "scenes=theirs", "preset=full"]
     of_views_and_records = []
     for views_per_shard in (4, 1):
-        words = [*command, f"views_per_shard={views_per_shard}"]
-        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+        arguments = [*command, f"views_per_shard={views_per_shard}"]
+        subprocess.run(arguments, cwd=tmp_path, capture_output=True, check=True)
         assert len([*tmp_path.glob("work/theirs/LFPlane/render/*-?.json")]) == 4 / views_per_shard
         listings = json.loads((tmp_path / "listings.json").read_text())
         roots = ("results", "work")
-        own = {folder: count for folder, count in listings.items() if folder.startswith(roots)}
-        assert "results/theirs/LFPlane/exr" in own
-        of_views_and_records.append(own)
+        own_listings = {
+            folder: count for folder, count in listings.items() if folder.startswith(roots)
+        }
+        assert "results/theirs/LFPlane/exr" in own_listings
+        of_views_and_records.append(own_listings)
         for folder in (*roots, ".snakemake"):
             shutil.rmtree(tmp_path / folder)
     assert of_views_and_records[0] == of_views_and_records[1]
 
 
 @pytest.mark.slow
-def test_waiting_for_jobs_takes_no_more_the_more_have_finished(published, tmp_path):
-    """A timer for each job of hundreds keeps Snakemake looking for jobs without a pause."""
+def test_waiting_for_jobs_costs_the_same_for_any_number_of_finished_jobs(published, tmp_path):
+    """With a timer for each of hundreds of jobs, Snakemake would check jobs without a pause."""
     command = [sys.executable, "-c", TIMING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
     command += ["--config", "scenes=theirs", "preset=full", "views_per_shard=1"]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
@@ -209,10 +224,10 @@ def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path
     assert list(lightfields(".")) == list(lightfields("../LFPlane/exr/..")) == ["LFPlane"]
 
 
-def test_a_folder_that_can_be_no_rig_is_named(published, tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_a_rig_is_named(published, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     published.rename(published.with_name("view sphere"))
-    with pytest.raises(UserError, match=r"theirs.yaml: rigs: 'view sphere' is no name; must"):
+    with pytest.raises(UserError, match=r"theirs.yaml: rigs: 'view sphere' is not a name; must"):
         checked(TypeAdapter(Scene), {"scene": {"dataset": "published"}}, "theirs.yaml")
 
 
@@ -229,7 +244,9 @@ def test_a_folder_that_can_be_no_rig_is_named(published, tmp_path, monkeypatch):
         ),
     ],
 )
-def test_what_goes_not_with_it_is_refused(published, tmp_path, monkeypatch, content, problem):
+def test_settings_that_do_not_go_with_imported_views_are_refused(
+    published, tmp_path, monkeypatch, content, problem
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=problem):
         checked(TypeAdapter(Scene), content, "theirs.yaml")
@@ -251,19 +268,19 @@ def test_what_goes_not_with_it_is_refused(published, tmp_path, monkeypatch, cont
         },
     ],
 )
-def test_a_lens_is_a_camera_of_a_yaml_again(camera):
+def test_a_lens_can_be_written_as_a_yamls_camera(camera):
     lens = lenses.from_camera(camera)
     assert lenses.from_camera(lens.settings()) == lens
 
 
-def test_an_angle_that_blender_rounded_is_whole_again():
+def test_an_angle_that_blender_rounded_becomes_round_again():
     camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
     camera["fisheye_fov"] = float(np.float32(2 * math.pi))
     lens = lenses.from_lightfield({"camera": camera, "resolution": [8, 8]})
     assert lens.settings()["fov"] == 360
 
 
-def test_a_view_that_nobody_may_write_is_taken_over(nobody):
+def test_a_read_only_view_is_taken_over(nobody):
     view, taken = nobody / "published.exr", nobody / "exr" / "taken.exr"
     view.write_bytes(b"a view")
     view.chmod(0o444)

@@ -1,4 +1,4 @@
-"""What a scene contains, what follows from that, and that no pixel tells the difference."""
+"""What a scene contains, what pruning leaves out, and that this changes no pixel."""
 
 import json
 import subprocess
@@ -33,11 +33,11 @@ NOTHING = {
         ({"animated": ["Door"], "uses_visibility": ["Door"]}, ["animation"]),
     ],
 )
-def test_what_is_left_out_follows_from_what_is_there(contains, expected):
+def test_the_content_decides_what_is_left_out(contains, expected):
     assert pruning.left_out(NOTHING | contains) == expected
 
 
-def test_the_benchmark_of_pruning_leaves_blender_to_processes_that_it_spawns():
+def test_the_benchmark_of_pruning_imports_bpy_only_in_spawned_processes():
     # A process spawned by one that has imported bpy does not find it.
     code = "import sys, pruning; sys.exit('bpy' in sys.modules)"
     folder = Path(__file__).resolve().parents[1] / "benchmarks"
@@ -52,45 +52,47 @@ def scenes(run_program, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["plain", "left_behind", "animated", "blurred", "features"])
-def test_a_pruned_render_is_the_whole_one_byte_for_byte(name, scenes):
+def test_a_pruned_render_equals_the_unpruned_one(name, scenes):
     assert scenes[name]["same"]
 
 
-def test_what_artists_leave_behind_is_found_and_left_out(scenes):
-    found = scenes["left_behind"]
-    assert found["left_out"] == ["viewport", "hidden_objects", "motion_blur"]
-    # What a modifier or an instancer needs stays, though no ray meets it as it stands.
-    assert found["inventory"]["hidden"] == ["hidden", "in excluded", "in off", "unseen"]
-    assert "only hidden" not in found["materials"]
-    # The room's seven, the cutter by its modifier, the instanced, its instancer, our camera, and
-    # one for each kind of ray that meets nothing else.
-    assert found["objects"] == 11 + 6
+def test_leftovers_of_artists_are_found_and_left_out(scenes):
+    result = scenes["left_behind"]
+    assert result["left_out"] == ["viewport", "hidden_objects", "motion_blur"]
+    # Objects that a modifier or an instancer needs stay, although no ray hits them directly.
+    assert result["inventory"]["hidden"] == ["hidden", "in excluded", "in off", "unseen"]
+    assert "only hidden" not in result["materials"]
+    # The room's seven, the modifier's cutter, the instanced object, its instancer, our camera, and
+    # an object for each kind of ray that hits nothing else.
+    assert result["objects"] == 11 + 6
 
 
 def test_an_animation_is_frozen_at_the_frame_of_the_dataset(scenes):
-    found = scenes["animated"]
-    assert found["left_out"] == ["viewport", "animation"]
-    assert set(found["inventory"]["animated"]) == {"cone", "sphere", "Key", "pillar", "torus"}
-    # What the viewport does not show is not evaluated there: its value is not known, so it stays.
-    assert found["animated"] == ["torus"]
+    result = scenes["animated"]
+    assert result["left_out"] == ["viewport", "animation"]
+    assert set(result["inventory"]["animated"]) == {"cone", "sphere", "Key", "pillar", "torus"}
+    # Objects hidden in the viewport are not evaluated, so their values are unknown. They stay.
+    assert result["animated"] == ["torus"]
 
 
-def test_what_moves_under_motion_blur_is_not_frozen(scenes):
-    found = scenes["blurred"]
-    assert found["left_out"] == ["viewport"]
-    assert found["animated"] == ["cone"]
+def test_objects_under_motion_blur_are_not_frozen(scenes):
+    result = scenes["blurred"]
+    assert result["left_out"] == ["viewport"]
+    assert result["animated"] == ["cone"]
 
 
-def test_features_are_told_by_the_materials_that_have_them(scenes):
-    found = scenes["features"]["inventory"]
-    assert {name: found[name] for name in ("transmission", "subsurface", "transparency")} == {
+def test_features_are_listed_with_their_materials(scenes):
+    scene_inventory = scenes["features"]["inventory"]
+    assert {
+        name: scene_inventory[name] for name in ("transmission", "subsurface", "transparency")
+    } == {
         "transmission": ["sphere"],
         "subsurface": ["cone"],
         "transparency": ["box"],
     }
-    assert found["volumes"] == ["torus"]
-    assert found["displacement"] == ["pillar"]
-    assert found["emission"] == ["walls"]
+    assert scene_inventory["volumes"] == ["torus"]
+    assert scene_inventory["displacement"] == ["pillar"]
+    assert scene_inventory["emission"] == ["walls"]
     plain = scenes["plain"]["inventory"]
     names = ("transmission", "subsurface", "transparency", "volumes", "displacement", "emission")
     assert not any(plain[name] for name in names)
@@ -169,36 +171,36 @@ bpy.ops.wm.save_as_mainfile(filepath=folder + "/imports.blend", relative_remap=F
 """
 
 
-def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, monkeypatch):
+def test_missing_or_unreadable_files_are_an_error(run_program, tmp_path, monkeypatch):
     (tmp_path / "make.py").write_text(MISSING)
     scripts = Path(pruning.__file__).parents[2]
     run_program(tmp_path / "make.py", tmp_path, scripts)
     output = tmp_path / "inventory.json"
 
     def listed(name):
-        words = ("--blend", tmp_path / f"{name}.blend", "--output", output)
-        result = run_program("inventory.py", *words, check=False)
+        arguments = ("--blend", tmp_path / f"{name}.blend", "--output", output)
+        result = run_program("inventory.py", *arguments, check=False)
         return result.returncode, (result.stderr.splitlines() or [""])[-1]
 
     assert listed("textured")[0] == 0
-    found = json.loads(output.read_text())["external_files"]
+    external_files = json.loads(output.read_text())["external_files"]
     names = ["bark.png", "leaves.json", "font.woff2", "never.png"]
-    assert [Path(file["path"]).name for file in found] == names
-    assert found[0]["sha256"] == sha256(tmp_path / "bark.png")
-    assert found[3]["sha256"] is None
+    assert [Path(file["path"]).name for file in external_files] == names
+    assert external_files[0]["sha256"] == sha256(tmp_path / "bark.png")
+    assert external_files[3]["sha256"] is None
     output.unlink()
 
     monkeypatch.setenv(VARIABLE, str(tmp_path / "store"))
-    code, told = listed("textured")
+    code, errors = listed("textured")
     assert code == 1
-    assert told.startswith(f"error: {tmp_path}/textured.blend: reads {tmp_path}/")
-    assert "; with a storage, what a .blend reads must lie in this folder" in told
+    assert errors.startswith(f"error: {tmp_path}/textured.blend: reads {tmp_path}/")
+    assert "; with a storage, what a .blend reads must lie in this folder" in errors
     monkeypatch.delenv(VARIABLE)
 
     bark, font = tmp_path / "bark.png", tmp_path / "font.woff2"
     texture = f"the texture bark at {bark}"
     letters = f"the font DejaVu Sans Mono Book at {font}"
-    # Of a photograph that was not copied to its end, Cycles would show a part.
+    # Cycles would show a part of a photograph that was copied incompletely.
     photograph = tmp_path / "photograph.jpg"
     oiio.ImageBuf(np.zeros((64, 64, 3), np.uint8)).write(str(photograph))
     bark.write_bytes(photograph.read_bytes()[:-100])
@@ -207,27 +209,27 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
         f"error: {tmp_path}/{{}}.blend: {{}} of the files that it shows are missing or cannot be"
     )
     for problem in ("cannot be read", "missing"):
-        code, told = listed("textured")
+        code, errors = listed("textured")
         assert code == 1
-        assert told.startswith(
+        assert errors.startswith(
             f"{start.format('textured', 2)} read: {letters} ({problem}); {texture} ({problem}); "
         )
-        assert "scene: {allow_missing: true}" in told
+        assert "scene: {allow_missing: true}" in errors
         bark.unlink(missing_ok=True)
         font.unlink(missing_ok=True)
     (tmp_path / "library.blend").unlink()
-    code, told = listed("linked")
+    code, errors = listed("linked")
     assert code == 1
-    assert told.startswith(
+    assert errors.startswith(
         f"{start.format('linked', 1)} read: the library library.blend at {tmp_path}/library.blend "
     )
     (tmp_path / "fine.btx").unlink()
-    code, told = listed("imports")
+    code, errors = listed("imports")
     assert code == 1
-    assert f" read: the geometry tree at {tmp_path}/leaf.stl (missing); " in told
-    assert f"; the modifier's file sphere at {tmp_path}/bough.stl (missing); " in told
-    assert f"; the texture tiles at {tmp_path}/tile.u2_v2.png (missing)" in told
-    assert f"; the sculpted detail Cube at {tmp_path}/fine.btx (missing); " in told
+    assert f" read: the geometry tree at {tmp_path}/leaf.stl (missing); " in errors
+    assert f"; the modifier's file sphere at {tmp_path}/bough.stl (missing); " in errors
+    assert f"; the texture tiles at {tmp_path}/tile.u2_v2.png (missing)" in errors
+    assert f"; the sculpted detail Cube at {tmp_path}/fine.btx (missing); " in errors
     assert not output.exists()
 
 
@@ -244,7 +246,7 @@ exports: {instant_ngp: {sources: [views]}}
 
 
 @pytest.mark.slow
-def test_a_minimal_scene_plans_its_own_stages_only(tmp_path):
+def test_a_minimal_scene_plans_only_its_own_stages(tmp_path):
     folder = checkout(tmp_path, minimal=MINIMAL)
     jobs = planned(folder, "--config", "scenes=[minimal]", "rigs=all", "preset=full")
     assert {"build_scene", "render", "validate"} <= jobs.keys()

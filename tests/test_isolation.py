@@ -1,4 +1,4 @@
-"""What a user's environment, home and folder say to Python, Blender and numba changes no byte."""
+"""A user's environment, home and folder change no byte of what Python, Blender and numba make."""
 
 import ast
 import os
@@ -17,7 +17,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
-# A lamp over a floor, whose picture is in a colour space that Blender's own configuration has.
+# A lamp over a floor. The picture's colour space exists in Blender's own configuration.
 BUILD = """
 import sys
 import bpy
@@ -115,7 +115,7 @@ HOSTILE = [
 
 @pytest.fixture(scope="module")
 def render(tmp_path_factory):
-    """Render a view in an environment with further variables; return the SHA-256 of its file."""
+    """Return a function that renders with further variables, and returns the view's SHA-256."""
     folder = tmp_path_factory.mktemp("isolation")
     blend, content = folder / "scene.blend", folder / "lightfield.json"
     subprocess.run([sys.executable, "-c", BUILD, blend], check=True, capture_output=True)
@@ -152,7 +152,7 @@ def test_a_view_has_the_same_bytes_in_a_hostile_environment(hostile, render, tmp
 
 @pytest.fixture
 def reproject(tmp_path, run_program):
-    """Reproject a view in a folder, with further variables; return the SHA-256 of what is made."""
+    """Return a function that reprojects with further variables, and returns a SHA-256."""
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [32, 32]})
     LightField.from_rig(RIG, lens, depth="distance").write(tmp_path / "lightfield.json")
     (tmp_path / "exr").mkdir()
@@ -180,17 +180,17 @@ def reproject(tmp_path, run_program):
 
 
 @pytest.mark.slow
-def test_a_reprojected_view_has_the_same_bytes_where_numba_is_told_not_to_compile(reproject):
+def test_a_reprojected_view_has_the_same_bytes_without_numbas_compiler(reproject):
     assert reproject("hostile", NUMBA_DISABLE_JIT="1") == reproject("clean")
 
 
-def test_numbas_file_in_the_folder_where_a_program_runs_is_not_read(run_program, tmp_path):
+def test_numbas_options_in_the_current_folder_are_not_read(run_program, tmp_path):
     written(tmp_path / ".numba_config.yaml", "disable_jit: 1")
     (tmp_path / "kernel.py").write_text(KERNEL)
     assert run_program(tmp_path / "kernel.py", cwd=tmp_path).stdout == "True\n"
 
 
-# Settings are read before a kernel is needed, as some programs do. What is compiled has signatures.
+# As in some programs, settings are read before a kernel. Compiled kernels have signatures.
 KERNEL = """
 import lightfield.dataset.config
 from lightfield.core.compiled import kernel
@@ -204,7 +204,7 @@ print(len(double.signatures) == 1)
 """
 
 
-def test_a_plot_does_not_look_as_a_user_has_set_matplotlib_up(run_program, tmp_path):
+def test_a_users_matplotlib_settings_do_not_change_a_plot(run_program, tmp_path):
     written(tmp_path / "matplotlibrc", "lines.linewidth: 9\nfont.size: 20\naxes.facecolor: black\n")
     (tmp_path / "clean").mkdir()
     (tmp_path / "draw.py").write_text(DRAW)
@@ -235,7 +235,7 @@ def test_a_program_is_isolated_before_it_imports_any_other_package(program):
     assert others[0] == "lightfield"
 
 
-def test_what_programs_need_of_the_environment_is_left():
+def test_needed_environment_variables_are_kept():
     needed = {
         **{"HOME": "/home/me", "PATH": "/usr/bin", "TMPDIR": "/scratch", "LANG": "C.UTF-8"},
         **{"CUDA_VISIBLE_DEVICES": "1", "SLURM_JOB_ID": "7", "AWS_ACCESS_KEY_ID": "key"},

@@ -1,4 +1,4 @@
-"""What follows from journals: machines to avoid, views that hang, and views that are suspect."""
+"""What follows from journals: machines to avoid, views that hang, and suspect views."""
 
 import json
 import signal
@@ -12,7 +12,7 @@ from lightfield.dataset.journal import Run, avoided, is_suspect, read
 
 
 def runs(*hosts):
-    """Return a shard's runs; a host with ! has failed. Later ones in the list began later."""
+    """Return a shard's runs, in the order of their start. A host with ! has failed."""
     return [
         Run(
             {"started": float(number), "host": host.rstrip("!")},
@@ -25,35 +25,35 @@ def runs(*hosts):
 @pytest.mark.parametrize(
     ("shard", "others", "expected"),
     [
-        # A first submission, and nobody has failed.
+        # This is the first submission, and nobody has failed.
         ([], [], []),
         ([], [["a"], ["b"]], []),
-        # Once elsewhere after a failure.
+        # The job failed once, so it should run elsewhere.
         (["a!"], [["a"], ["b"]], ["a"]),
         # There may be no other machine.
         (["a!"], [["a"]], []),
         (["a!", "a!", "a!"], [], []),
-        # Thrice, by other shards, of which the last run may still be at work.
+        # The machine failed thrice with other shards. The last run may still be at work.
         ([], [["a!", "a!", "a!", "b"]], ["a"]),
         ([], [["a!", "a!", "b"], ["a!"]], []),
-        # Whatever ended there before.
+        # Earlier results do not matter.
         ([], [["a", "a!", "a!", "a!", "b"]], ["a"]),
-        # Not one after the other.
+        # The failures are not consecutive.
         ([], [["a!", "a!", "a", "a!", "b"]], []),
         (["c!"], [["a!", "a!", "a!", "b"]], ["a", "c"]),
     ],
 )
-def test_a_machine_is_avoided_that_fails_while_others_do_not(shard, others, expected):
+def test_a_machine_that_fails_while_others_do_not_is_avoided(shard, others, expected):
     assert avoided(runs(*shard), [runs(*hosts) for hosts in others]) == expected
 
 
-def test_a_view_is_suspect_that_took_nearly_no_time_beside_the_others():
+def test_a_view_that_took_far_less_time_than_others_is_suspect():
     assert is_suspect(0.01, [1.0, 1.1, 0.9])
     assert not is_suspect(0.1, [1.0, 1.1, 0.9])
     assert not is_suspect(0.01, [1.0, 1.1])
 
 
-def test_what_stands_before_the_first_start_is_of_no_run(tmp_path):
+def test_lines_before_the_first_start_belong_to_no_run(tmp_path):
     """A journal whose first line was damaged can still be read."""
     path = tmp_path / "0-2.journal.jsonl"
     view = {"finished": 12.0, "wall_seconds": 2.0, "cpu_seconds": 2.0, "render_seconds": 1.0}
@@ -84,8 +84,8 @@ shard.render(LightField.read(lightfield), ":", lightfield.with_name("exr"), **op
 
 
 def test_a_view_that_hangs_ends_its_process(run_program, room, tmp_path):
-    words = ("--scene", "smoke", "--rig", "LFCuboid_1x1x1")
-    run_program("make_lightfield.py", *words, "--output", tmp_path / "lightfield.json")
+    arguments = ("--scene", "smoke", "--rig", "LFCuboid_1x1x1")
+    run_program("make_lightfield.py", *arguments, "--output", tmp_path / "lightfield.json")
     run = subprocess.run(
         [sys.executable, "-c", HANG, tmp_path / "lightfield.json", room],
         env={"PYTHONPATH": str(SCRIPTS)},

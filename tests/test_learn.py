@@ -1,6 +1,6 @@
-"""What `make learn` learns from: exported files as benchmarks/nerfstudio_views.py reads them.
+"""The views from which `make learn` learns: exports, as benchmarks/nerfstudio_views.py reads them.
 
-`make consumers` checks, with torch, that a radiance field learns from them.
+`make consumers` checks with torch that a radiance field learns from them.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ def views(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_exported_files_say_where_surfaces_are(views, name):
+def test_exported_views_know_where_surfaces_are(views, name):
     exported = views[name]
     assert (exported.lens, exported.kind, exported.test.sum()) == (name, KINDS[name], 5)
     for test in (True, False):
@@ -61,7 +61,7 @@ def test_each_wrong_reading_changes_one_thing(views, name):
 
 
 @pytest.mark.slow
-def test_learn_without_torch_says_what_to_run(tmp_path):
+def test_learn_without_torch_says_which_command_to_run(tmp_path):
     folder = checkout(tmp_path)
     scene = ("--config", "scenes=[object_learn]", "rigs=all", "preset=full")
     result = snakemake(folder, "learn", *scene)
@@ -69,5 +69,5 @@ def test_learn_without_torch_says_what_to_run(tmp_path):
     (error,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert "make -C . .venv-consumers/complete" in error
     assert "Traceback" not in result.stderr
-    # Before the first job.
+    # It fails before the first job.
     assert not list(folder.rglob("*.blend"))

@@ -1,4 +1,4 @@
-"""The ledger with many jobs: what they have in common is looked at once."""
+"""The ledger with many jobs: a file that many jobs share is read once."""
 
 import os
 
@@ -7,7 +7,7 @@ from lightfield.dataset import ledger
 from lightfield.dataset.ledger import Job, Ledger, Stamp
 
 
-def test_a_file_that_no_job_made_is_read_once_for_all_that_read_it(tmp_path, monkeypatch):
+def test_a_source_file_is_read_once_for_all_its_readers(tmp_path, monkeypatch):
     scene = tmp_path / "scene.blend"
     scene.write_bytes(b"scene")
     reads = []
@@ -22,7 +22,7 @@ def test_a_file_that_no_job_made_is_read_once_for_all_that_read_it(tmp_path, mon
     assert stamp.sha256 == sha256(scene)
 
 
-def test_a_touched_file_is_read_once_for_all_that_was_made_from_it(tmp_path, monkeypatch):
+def test_a_touched_file_is_read_once_for_all_jobs_that_read_it(tmp_path, monkeypatch):
     scene = tmp_path / "scene.blend"
     scene.write_bytes(b"scene")
     made = Ledger(tmp_path / "ledger.txt")
@@ -35,6 +35,6 @@ def test_a_touched_file_is_read_once_for_all_that_was_made_from_it(tmp_path, mon
     planned = Ledger(tmp_path / "ledger.txt")
     assert [planned.changed_input(output) for output in outputs] == [None] * 20
     assert len(reads) == 1
-    # Other bytes are seen in the same process, too.
+    # The same process notices other bytes too.
     scene.write_bytes(b"another")
     assert {planned.changed_input(output) for output in outputs} == {str(scene)}

@@ -1,4 +1,4 @@
-"""Lens maps: geometry against closed forms, and the file."""
+"""Lens maps: geometry compared with closed forms, and the file."""
 
 import copy
 import json
@@ -43,7 +43,7 @@ def test_rotations_turn_left_down_and_clockwise(angles, forward, up):
 
 
 def test_rotation_is_the_published_tools():
-    # R_y(pan) R_x(pitch) R_z(roll) in a frame whose y points down.
+    # R_y(pan) R_x(pitch) R_z(roll), in a frame with Y down.
     pan, pitch, roll = 31.0, -17.0, 58.0
     published = Rotation.from_euler("YXZ", [pan, pitch, roll], degrees=True).as_matrix()
     flip = np.diag([1, -1, 1])
@@ -54,7 +54,7 @@ def test_a_pixel_of_a_perspective_view_finds_its_place_in_the_fisheye():
     made = lens_map.compute(FISHEYE, rectilinear(64), IDENTITY)
     centers = full_centers(made)
     for column, row in ((0, 0), (40, 7), (63, 32)):
-        x, y = (column + 0.5 - 32) / 32, (row + 0.5 - 32) / 32  # f = half the width
+        x, y = (column + 0.5 - 32) / 32, (row + 0.5 - 32) / 32  # half the width
         angle = math.atan(math.hypot(x, y))
         radius = angle / (math.pi / 2) * 50.5 / math.hypot(x, y)
         assert np.allclose(centers[row, column], [50.5 + radius * x, 50.5 + radius * y], atol=1e-4)
@@ -84,7 +84,7 @@ def test_a_lens_maps_onto_itself():
         (30, "--samples 4 helps"),
     ],
 )
-def test_magnification_of_a_plain_change_of_size(size, expected):
+def test_the_magnification_of_a_change_of_size(size, expected):
     made = lens_map.compute(rectilinear(100), rectilinear(size), IDENTITY, "bicubic")
     assert made.summary == pytest.approx(
         {"min": size / 100, "median": size / 100, "max": size / 100, "covered": 1.0}, rel=1e-5
@@ -115,13 +115,13 @@ def test_several_targets_are_reported_as_one(capsys):
     assert said[1:] == ["warning: the source sees nothing of the target image"]
 
 
-def test_a_filter_that_covers_the_pixel_is_not_warned_of_aliasing():
+def test_a_filter_that_covers_the_pixel_gives_no_warning_of_aliasing():
     for name, samples in (("adaptive", 1), ("bicubic", 4)):
         made = lens_map.compute(rectilinear(128), rectilinear(32), IDENTITY, name, samples)
         assert lens_map.warnings(made) == []
 
 
-def test_how_sources_continue():
+def test_sources_continue_beyond_their_borders():
     def topology(lens):
         return lens_map.compute(lens, rectilinear(4), IDENTITY).topology
 
@@ -149,7 +149,7 @@ def test_the_window_holds_all_that_is_read_and_little_more():
     )
 
 
-def test_what_the_source_does_not_see_is_marked():
+def test_pixels_without_a_source_are_marked():
     away = lens_map.rotation_matrix(180, 0, 0)
     made = lens_map.compute(FISHEYE, rectilinear(16), away)
     assert not made.flags.any() and np.isnan(made.centers).all()
@@ -171,7 +171,7 @@ def test_the_smallest_images(size, name):
 
 
 @pytest.mark.parametrize(("name", "samples"), [("adaptive", 1), ("bicubic", 3), ("nearest", 1)])
-def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
+def test_a_saved_map_is_read_back(tmp_path, name, samples):
     path = tmp_path / "map.npy"
     made = lens_map.compute(
         FISHEYE, rectilinear(20), lens_map.rotation_matrix(10, 0, 0), name, samples
@@ -182,9 +182,9 @@ def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
     assert loaded.window == made.window
     for key, value in vars(made).items():
         if isinstance(value, np.ndarray):
-            found = getattr(loaded, key)
-            assert np.array_equal(found, value, equal_nan=True), key
-            assert isinstance(found, np.memmap) and found.flags.aligned, key
+            array = getattr(loaded, key)
+            assert np.array_equal(array, value, equal_nan=True), key
+            assert isinstance(array, np.memmap) and array.flags.aligned, key
     first = path.read_bytes()
     for again in (path, tmp_path / "of another name"):
         lens_map.save(again, made)
@@ -194,7 +194,7 @@ def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
 @pytest.mark.parametrize("target", [rectilinear(20), rectilinear(21), rectilinear(1)])
 @pytest.mark.parametrize("angles", [(0, 0, 0), (90, 0, 0), (0, -40, 0), (180, 0, 0)])
 @pytest.mark.parametrize("source", [FISHEYE, Equirectangular(width=512, height=256)])
-def test_a_map_that_mirrors_itself_is_as_one_computed_whole(monkeypatch, source, target, angles):
+def test_a_mirrored_map_equals_one_computed_completely(monkeypatch, source, target, angles):
     rotation = lens_map.rotation_matrix(*angles)
     assert any(Fold.of_map(source, target, rotation).mirrors)
     folded = lens_map.compute(source, target, rotation)
@@ -203,16 +203,16 @@ def test_a_map_that_mirrors_itself_is_as_one_computed_whole(monkeypatch, source,
     np.testing.assert_allclose(folded.source_cos, cosines, atol=1e-6)
     np.testing.assert_allclose(folded.target_cos, -target.pixel_rays()[..., 2], atol=1e-6)
     monkeypatch.setattr(Fold, "of_map", lambda *_: Fold((target.height, target.width)))
-    whole = lens_map.compute(source, target, rotation)
-    assert folded.window == whole.window and folded.summary == pytest.approx(whole.summary)
-    for name, array in vars(whole).items():
+    complete = lens_map.compute(source, target, rotation)
+    assert folded.window == complete.window and folded.summary == pytest.approx(complete.summary)
+    for name, array in vars(complete).items():
         if isinstance(array, np.ndarray):
-            found = getattr(folded, name)
-            assert np.allclose(found, array, rtol=0, atol=1e-6, equal_nan=True), name
+            computed_array = getattr(folded, name)
+            assert np.allclose(computed_array, array, rtol=0, atol=1e-6, equal_nan=True), name
 
 
 @pytest.mark.parametrize("name", ["nearest", "bicubic"])
-def test_a_cube_maps_faces_go_on_beyond_their_borders(name):
+def test_a_cube_maps_faces_continue_beyond_their_borders(name):
     cube = CubeMap(width=6 * 16, height=16)
     made = lens_map.compute(cube, rectilinear(20), lens_map.rotation_matrix(40, 30, 0), name)
     side = made.strip.shape[0]
@@ -224,11 +224,11 @@ def test_a_cube_maps_faces_go_on_beyond_their_borders(name):
     edge = -ahead[..., 2][np.ix_(*[np.arange(side).clip(border, side - border - 1)] * 2)]
     for index, turn in enumerate(CUBE_FACES.values()):
         columns = slice(index * side, (index + 1) * side)
-        # Where the strip without borders has the ray of a pixel of the plane of this face.
-        found = cube.rays(*np.moveaxis(made.strip[:, columns].astype(float), -1, 0))
-        np.testing.assert_allclose(found, ahead @ turn.T, atol=1e-5)
+        # The place in the strip without borders that has the ray of a pixel in this face's plane.
+        rays_of_cube = cube.rays(*np.moveaxis(made.strip[:, columns].astype(float), -1, 0))
+        np.testing.assert_allclose(rays_of_cube, ahead @ turn.T, atol=1e-5)
         np.testing.assert_allclose(made.source_cos[:, columns], edge, atol=1e-6)
-    # A map's coordinates are of the strip with borders.
+    # A map's coordinates count in the strip with borders.
     rays = rectilinear(20).pixel_rays() @ lens_map.rotation_matrix(40, 30, 0).T
     face = made.centers[..., 0] // side
     plain = made.centers - np.stack([(2 * face + 1) * border, border + 0 * face], axis=-1)
@@ -236,7 +236,7 @@ def test_a_cube_maps_faces_go_on_beyond_their_borders(name):
 
 
 def test_the_magnification_of_a_cube_map_is_that_of_its_faces_across_their_borders():
-    # (cos θ of the source / cos θ of the target)^1.5, of which the least is at the seam ahead.
+    # It is (cos θ of the source / cos θ of the target)^1.5, with its least value at the seam ahead.
     cube = CubeMap(width=6 * 64, height=64)
     made = lens_map.compute(cube, rectilinear(64), lens_map.rotation_matrix(45, 0, 0), "bicubic")
     assert made.summary["min"] == pytest.approx(2**-0.75, rel=0.03)
@@ -244,7 +244,7 @@ def test_the_magnification_of_a_cube_map_is_that_of_its_faces_across_their_borde
 
 
 @pytest.mark.parametrize(("size", "most"), [(100, None), (60, 2), (20, 4)])
-def test_the_adaptive_filter_has_footprints_wherever_it_takes_more_than_one_sample(size, most):
+def test_the_adaptive_filter_has_footprints_if_it_takes_several_samples(size, most):
     made = lens_map.compute(rectilinear(100), rectilinear(size), IDENTITY, "adaptive")
     if most is None:
         assert made.counts is None and made.footprints is None
@@ -260,7 +260,9 @@ def test_samples_are_the_pixels_of_a_finer_target(source):
     finer = lens_map.compute(source, rectilinear(60), rotation, "bicubic")
     assert made.coordinates.shape == (60, 60, 2) and made.centers.shape == (20, 20, 2)
     np.testing.assert_allclose(made.centers, made.coordinates[1::3, 1::3], atol=1e-4)
-    corners = [np.array([one.window[2], one.window[0]]) for one in (made, finer)]
+    corners = [
+        np.array([computed_map.window[2], computed_map.window[0]]) for computed_map in (made, finer)
+    ]
     np.testing.assert_allclose(
         made.coordinates + corners[0], finer.coordinates + corners[1], atol=1e-4
     )
@@ -270,7 +272,7 @@ def test_samples_are_the_pixels_of_a_finer_target(source):
     ("name", "reach"), [("nearest", 0), ("bilinear", 1), ("bicubic", 2), ("lanczos", 3)]
 )
 def test_a_window_reaches_as_far_as_its_filter(name, reach):
-    # Half of the tangents, so pixels from 25.25 to 74.75 of 100.
+    # Half of the tangents: the pixels from 25.25 to 74.75 of 100.
     made = lens_map.compute(rectilinear(100), rectilinear(100, 36), IDENTITY, name)
     top, bottom, left, right = made.window
     assert (top, bottom) == (left, right) == (100 - bottom, 100 - top)
@@ -278,7 +280,7 @@ def test_a_window_reaches_as_far_as_its_filter(name, reach):
     assert np.isfinite(made.source_cos).all() and made.source_cos.shape == (bottom - top,) * 2
 
 
-def test_what_does_not_mirror_itself_is_computed_whole():
+def test_a_map_without_mirror_symmetry_is_computed_completely():
     lens, cube = rectilinear(20), CubeMap(width=96, height=16)
     shifted = Rectilinear(width=20, height=20, focal_length=18, principal_point=(9, 10))
     turned = lens_map.rotation_matrix(10, 20, 30)
@@ -287,11 +289,11 @@ def test_what_does_not_mirror_itself_is_computed_whole():
     assert Fold.of_map(cube, lens, IDENTITY).mirrors == (False, False)
 
 
-def test_a_file_of_before_with_more_in_it_is_read(tmp_path):
+def test_an_older_file_with_more_arrays_is_read(tmp_path):
     path = tmp_path / "map.npy"
     made = lens_map.compute(FISHEYE, rectilinear(4), IDENTITY)
     older = copy.copy(made)
-    # An array that a map no longer has is written like its others.
+    # An array that maps no longer have is written like the others.
     object.__setattr__(older, "magnification", made.target_cos)
     lens_map.save(path, older)
     assert "magnification" in np.load(path).dtype.names
@@ -301,8 +303,8 @@ def test_a_file_of_before_with_more_in_it_is_read(tmp_path):
 def test_maps_of_other_lenses_rotations_filters_or_samples_have_other_settings():
     asked = (FISHEYE, rectilinear(20), IDENTITY, "bicubic", 1)
     others = (rectilinear(9), rectilinear(21), -IDENTITY, "nearest", 2)
-    found = [asked, *(asked[:i] + others[i : i + 1] + asked[i + 1 :] for i in range(5))]
-    settings = [json.dumps(lens_map.settings(*arguments)) for arguments in found]
+    other_settings = [asked, *(asked[:i] + others[i : i + 1] + asked[i + 1 :] for i in range(5))]
+    settings = [json.dumps(lens_map.settings(*arguments)) for arguments in other_settings]
     assert len(set(settings)) == 6
     assert lens_map.compute(*asked).settings == lens_map.settings(*asked)
 
@@ -318,19 +320,19 @@ def test_any_other_file_is_refused(tmp_path):
         lens_map.load(path)
 
 
-def test_a_number_that_was_moved_is_found(tmp_path):
+def test_a_changed_number_is_found(tmp_path):
     path = tmp_path / "map.npy"
     made = lens_map.compute(FISHEYE, rectilinear(20), IDENTITY)
     lens_map.save(path, made)
-    whole = path.read_bytes()
-    first = whole.index(made.centers.tobytes())
-    for place in (first, first + made.centers.nbytes // 2, len(whole) - 1):
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    content = path.read_bytes()
+    first = content.index(made.centers.tobytes())
+    for place in (first, first + made.centers.nbytes // 2, len(content) - 1):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
         with pytest.raises(UserError, match=r"map\.npy: is not .*: it is damaged: its checksum"):
             lens_map.load(path)
 
 
-def test_settings_that_make_no_sense_are_refused():
+def test_senseless_settings_are_refused():
     with pytest.raises(UserError, match="samples"):
         lens_map.compute(FISHEYE, rectilinear(4), IDENTITY, "bicubic", 0)
     with pytest.raises(UserError, match="covers the whole pixel"):

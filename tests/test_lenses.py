@@ -1,4 +1,4 @@
-"""The lenses against Cycles, OpenCV, mpmath and SILVR's files, and against their own inverses."""
+"""The lenses, compared with Cycles, OpenCV, mpmath, SILVR's files, and their own inverses."""
 
 import json
 import math
@@ -88,7 +88,7 @@ CAMERAS: dict[str, Lens] = {
     "equirectangular": Equirectangular(**LANDSCAPE),
     "equirectangular part": Equirectangular(**LANDSCAPE, longitude=(-1, 2), latitude=(-0.5, 1)),
 }
-# Blender's shift_x and shift_y of the cameras that are shifted.
+# Blender's shift_x and shift_y of the shifted cameras.
 SHIFTS = {
     "perspective shifted": (0.1, -0.07),
     "equidistant shifted": (0.1, -0.06),
@@ -97,13 +97,13 @@ SHIFTS = {
 
 
 def blender_camera(name: str) -> dict[str, object]:
-    """Return the attributes of Blender's camera: lightfield.json has their names."""
+    """Return the attributes of Blender's camera, which lightfield.json names."""
     camera = CAMERAS[name].to_lightfield()["camera"]
     for key in camera.keys() & {"projection_matrix", "principal_point"}:
         del camera[key]
     if camera["type"] == "PERSP":
         camera["lens"] = camera.pop("focal_length")
-    # The settings that the lenses fix: the sensor's width counts, wide or high.
+    # Settings that the lenses fix: the sensor's width counts in images of any shape.
     camera |= {"sensor_fit": "HORIZONTAL", "sensor_width": 36}
     return camera | dict(zip(("shift_x", "shift_y"), SHIFTS.get(name, (0, 0)), strict=True))
 
@@ -112,12 +112,12 @@ both = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angle between unit rays, accurate however small."""
+    """Return the angle between unit rays, accurate even for tiny angles."""
     return 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
 def grid(lens: Lens, dtype: type, steps: int = 129) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of the whole frame: its edges, its exact centre, and the odd ones between."""
+    """Return points of the whole frame: its edges, its exact centre, and odd points between."""
     x = np.linspace(0, lens.width, steps).astype(dtype)
     y = np.linspace(0, lens.height, steps).astype(dtype)
     return np.meshgrid(x, y)
@@ -125,7 +125,7 @@ def grid(lens: Lens, dtype: type, steps: int = 129) -> tuple[np.ndarray, np.ndar
 
 @pytest.fixture(scope="module")
 def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
-    """What Cycles' cameras see, by the name in `CAMERAS`."""
+    """What Cycles' cameras see, by their names in `CAMERAS`."""
     output = tmp_path_factory.mktemp("cycles") / "positions.npz"
     cases = [
         {"name": name, "resolution": [lens.width, lens.height], "camera": blender_camera(name)}
@@ -149,7 +149,7 @@ def test_rays_and_pixels_are_those_of_cycles(name: str, cycles: dict[str, np.nda
     rays = lens.pixel_rays()
     seen = np.isfinite(rays).all(axis=-1)
     np.testing.assert_array_equal(seen, np.isfinite(hit).all(axis=-1))
-    # Positions are float32: a few 1e-7 in the median, some 1e-6 where a surface is grazed.
+    # Positions are float32: errors are a few 1e-7 in the median, some 1e-6 at grazing angles.
     difference = angle(rays, hit)[seen]
     assert np.median(difference) < 1e-6
     assert difference.max() < 2e-5
@@ -202,9 +202,9 @@ def test_kannala_brandt_is_opencvs_fisheye() -> None:
 def test_pixels_undo_rays_and_rays_undo_pixels_over_the_whole_frame(name: str, dtype: type) -> None:
     lens = EXAMPLES[name]
     exact, tolerance = dtype == np.float64, 4 * np.finfo(dtype).eps
-    for whole in (True, False):
+    for in_whole_frame in (True, False):
         x, y = grid(lens, dtype)
-        if not whole:
+        if not in_whole_frame:
             x, y = x[1:-1, 1:-1] + dtype(0.25), y[1:-1, 1:-1] + dtype(0.25)
         rays = lens.rays(x, y)
         seen = np.isfinite(rays[..., 0])
@@ -214,14 +214,14 @@ def test_pixels_undo_rays_and_rays_undo_pixels_over_the_whole_frame(name: str, d
         assert rays.dtype == pixels.dtype == dtype
         again = lens.rays(*pixels[seen].T)
         assert angle(again, rays[seen]).max() < (1e-9 if exact else 2e-5)
-        # Pixels on a border between faces, at a pole or on the seam have a twin of the same ray.
-        if not whole or not isinstance(lens, CubeMap | Equirectangular):
+        # A pixel on a border between faces, at a pole or on the seam shares its ray with another.
+        if not in_whole_frame or not isinstance(lens, CubeMap | Equirectangular):
             error = np.abs(pixels - np.stack([x, y], axis=-1))[seen]
             assert error.max() < (1e-9 if exact else 0.01)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_lightfield_json_brings_the_lens_back(name: str) -> None:
+def test_lightfield_json_restores_the_lens(name: str) -> None:
     lens = EXAMPLES[name]
     text = json.dumps(lens.to_lightfield(), allow_nan=False)
     assert from_lightfield(json.loads(text)) == replace(lens, sensor_size=lens.sensor)
@@ -271,13 +271,13 @@ def test_z_depth_is_for_lenses_within_180_degrees(name: str) -> None:
     cos = -lens.rays(*grid(lens, np.float64))[..., 2]
     if lens.has_z_depth:
         assert np.nanmin(cos) > -1e-6
-    # A lens that says no may still have a frame that stops earlier.
+    # A lens without Z-depth may still have a frame that ends earlier.
     elif "kannala" not in name and "polynomial" not in name:
         assert np.nanmin(cos) < 0
 
 
 def fisheyes(fov: float) -> list[Lens]:
-    """Return one of every fisheye of at least 180 degrees, all of which is in the frame."""
+    """Return one of every fisheye of at least 180 degrees, completely in the frame."""
     size = {"width": 64, "height": 48, "fov": fov}
     known: dict[str, Any] = {"focal_length": 4, "coefficients": (0.0,) * 4}
     return [
@@ -289,11 +289,11 @@ def fisheyes(fov: float) -> list[Lens]:
     ]
 
 
-def test_depth_is_along_the_axis_up_to_exactly_180_degrees_and_beyond_along_the_ray() -> None:
+def test_depth_is_z_up_to_exactly_180_degrees_and_distance_beyond() -> None:
     half, beyond = math.pi / 2, math.radians(90.01)
     for lens in (*fisheyes(math.pi), Orthographic(width=64, height=48, fov=math.pi)):
         assert lens.usual_depth == "z"
-        # The ray at 90 degrees is on the rim, and seen.
+        # The ray at 90 degrees is on the rim, and the lens sees it.
         for ray in ([1.0, 0, 0], [0, -1.0, 0]):
             np.testing.assert_allclose(lens.rays(*lens.pixels(np.array(ray))), ray, atol=1e-7)
     for lens in fisheyes(2 * beyond):
@@ -309,7 +309,7 @@ def test_depth_is_along_the_axis_up_to_exactly_180_degrees_and_beyond_along_the_
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_what_a_lens_says_of_its_mirrors_holds_and_nothing_else_does(name: str) -> None:
+def test_a_lens_has_exactly_the_mirrors_that_it_declares(name: str) -> None:
     lens = EXAMPLES[name]
     x, y = grid(lens, np.float64, 30)
     rays = lens.rays(x, y)
@@ -320,7 +320,7 @@ def test_what_a_lens_says_of_its_mirrors_holds_and_nothing_else_does(name: str) 
         assert np.allclose(mirrored * axis, rays, atol=1e-9, equal_nan=True) == mirrors
 
 
-def test_a_frame_without_an_image_circle_is_seen_to_its_edges_and_a_sphere_ends_there() -> None:
+def test_a_frame_without_an_image_circle_is_seen_to_its_edges() -> None:
     for name, lens in EXAMPLES.items():
         if isinstance(lens, CubeMap | Equirectangular | Rectilinear):
             assert np.isfinite(lens.rays(*grid(lens, np.float64))).all(), name
@@ -363,7 +363,7 @@ def test_beyond_the_field_of_view_is_nan() -> None:
         (Equirectangular(**size), 180),
         (CubeMap(width=96, height=16), 180),
     ):
-        # Just inside and just outside, and everywhere up to the backward axis.
+        # Just inside and just outside, and further out to the backward axis.
         degrees = np.array([*np.linspace(0, 180, 361), limit - 1e-4, limit + 1e-4])
         degrees = degrees[(degrees <= 180) & (degrees != limit)]
         theta = np.radians(degrees)
@@ -384,7 +384,7 @@ def test_image_circle_of_a_non_square_fisheye_touches_all_four_edges() -> None:
 
 
 @pytest.mark.parametrize("turning", [(0.1, -1e-3), (0.05, -5e-4)])
-def test_polynomial_ends_at_its_turning_point(turning: tuple[float, float]) -> None:
+def test_a_polynomial_ends_at_its_turning_point(turning: tuple[float, float]) -> None:
     # θ = a r + b r³ turns at r = √(−a / 3b).
     a, b = turning
     radius = math.sqrt(-a / (3 * b))
@@ -403,7 +403,7 @@ def test_polynomial_ends_at_its_turning_point(turning: tuple[float, float]) -> N
             assert math.isclose((pixel[0] - 100) / millimetre, expected, rel_tol=1e-9)
 
 
-def test_a_polynomial_that_falls_and_rises_again_ends_where_it_first_turns() -> None:
+def test_a_polynomial_that_turns_twice_ends_at_its_first_turning_point() -> None:
     # t³ / 3 − 7 t² / 2 + 12 t turns at 3 and at 4.
     rising = IncreasingPolynomial((0, 12, -3.5, 1 / 3), math.inf)
     assert math.isclose(rising.end, 3)
@@ -426,7 +426,7 @@ def test_kannala_brandt_ends_at_its_turning_point() -> None:
 
 
 def test_hole_of_a_polynomial_lens() -> None:
-    # θ = 0.01 + 0.1 r leaves a hole; one across which lies less than a pixel belongs to the centre.
+    # θ = 0.01 + 0.1 r leaves a hole. A hole narrower than a pixel belongs to the centre.
     axis = np.array([0.0, 0, -1])
     for width, height, closed in (
         (100, 100, True),
@@ -456,13 +456,13 @@ def test_hole_of_a_polynomial_lens() -> None:
         ((-0.01, -0.1, 0, 0, 0), 4.9),
         # Turned by 180 degrees.
         ((-0.01, 0.1, 0, 0, 0), -5.1),
-        # All that it sees is within 0.4 mm: 0.1 r + 10 r² is 0.5.
+        # The lens sees only within 0.4 mm: 0.1 r + 10 r² is 0.5.
         ((0, -0.1, -10, 0, 0), (math.sqrt(0.01 + 20) - 0.1) / 20),
         ((0, 0, -2, 0, 0), 0.5),
         ((0, 0, 0, -4, 0), 0.5),
     ],
 )
-def test_a_polynomial_has_a_ray_where_its_equation_says(
+def test_a_polynomials_rays_solve_its_equation(
     coefficients: tuple[float, ...], radius: float
 ) -> None:
     lens = Polynomial(width=360, height=360, coefficients=coefficients, fov=math.pi)
@@ -473,8 +473,8 @@ def test_a_polynomial_has_a_ray_where_its_equation_says(
     assert np.isnan(lens.pixels(np.array([1.0, 0, 0.01]))).all()
 
 
-def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
-    # 1e-6 rad from the backward axis, in float32, where θ alone would be 10 % off.
+def test_wide_lenses_are_precise_near_the_rim() -> None:
+    # At 1e-6 rad from the backward axis, θ alone would be 10 % off in float32.
     gap = np.float32(1e-6)
     ray = np.array([gap, 0, 1], np.float32)
     with mpmath.workdps(30):
@@ -498,7 +498,7 @@ def test_backward_axis_is_on_the_rim_of_a_lens_of_360_degrees(dtype: type) -> No
         (Polynomial(**size, coefficients=(0, -0.25, 0, 0, 0)), 4 * math.pi / 36 * 200),
     ):
         pixel = lens.pixels(np.array([0, 0, 1], dtype))
-        # Any azimuth is right, the lens's centre is not.
+        # Any azimuth is right, but the lens's centre is not.
         np.testing.assert_allclose(pixel, [100, 50 - radius], atol=1e-4)
         np.testing.assert_allclose(lens.rays(*pixel), [0, 0, 1], atol=1e-6)
 
@@ -517,7 +517,7 @@ def test_equirectangular_poles_and_seam() -> None:
 
 
 def test_cube_faces_are_turned_as_the_sides_of_a_cuboid_rig() -> None:
-    # Blender's XYZ Euler angles of each side, as SILVR's cuboid has them.
+    # Blender's XYZ Euler angles of each side of SILVR's cuboid.
     half = math.pi / 2
     sides = {
         "f": (half, 0, 0),
@@ -558,7 +558,7 @@ README = {"resolution": [2048, 2048], "sensor_size": [36.0, 36.0]}
 
 
 def test_reads_silvrs_documented_files() -> None:
-    # The README of https://github.com/IDLabMedia/image-lens-reproject, its three examples.
+    # The three examples in the README of https://github.com/IDLabMedia/image-lens-reproject.
     size = {"width": 2048, "height": 2048, "sensor_size": (36.0, 36.0)}
     fov = 3.1415927410125732
     rectilinear = {
@@ -584,8 +584,8 @@ def test_reads_silvrs_documented_files() -> None:
     assert from_lightfield(README | {"camera": equisolid}) == expected
 
 
-def test_reads_what_silvrs_tools_write() -> None:
-    # The addon's config.py, the reprojection tool's config.cpp.
+def test_reads_files_of_silvrs_tools() -> None:
+    # Source: config.py of the addon, config.cpp of the reprojection tool.
     equisolid = {"panorama_type": "FISHEYE_EQUISOLID", "fisheye_lens": 10.5, "fisheye_fov": 3.0}
     lens = from_lightfield({"resolution": [64, 64], "camera": {"type": "PANO", **equisolid}})
     assert lens == Equisolid(width=64, height=64, focal_length=10.5, fov=3.0)
@@ -595,7 +595,7 @@ def test_reads_what_silvrs_tools_write() -> None:
         lens = from_lightfield({"resolution": [64, 32], "camera": camera})
         expected = Equirectangular(width=64, height=32, longitude=(-2, 2), latitude=(-1, 1))
         assert lens == expected
-    # Blender's own matrix of a 50 mm lens on 36 mm, shift (0.1, −0.07), 96 × 64.
+    # Blender's own matrix of a 50 mm lens on 36 mm, shift (0.1, −0.07), 96 × 64 pixels.
     matrix = [[2.7777777, 0, 0.2, 0], [0, 4.1666665, -0.21, 0], [0, 0, -1, -0.2], [0, 0, -1, 0]]
     for unit in ({"lens_unit": "MILLIMETERS", "focal_length": 50.0}, {"lens_unit": "FOV"}):
         camera = {"type": "PERSP", "projection_matrix": matrix, **unit}
@@ -677,7 +677,7 @@ def test_scene_yaml(keys: str, expected: Lens) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name != "cube map"])
-def test_a_scene_yaml_can_have_every_lens(name: str) -> None:
+def test_a_scene_yaml_may_have_every_lens(name: str) -> None:
     lens = EXAMPLES[name]
     again = from_camera(lens.settings())
     assert type(again) is type(lens)
@@ -685,7 +685,7 @@ def test_a_scene_yaml_can_have_every_lens(name: str) -> None:
     np.testing.assert_allclose(again.rays(x, y), lens.rays(x, y), atol=1e-9)
 
 
-def test_angles_in_a_scene_yaml_are_as_round_as_they_are_meant() -> None:
+def test_angles_in_a_scene_yaml_become_round() -> None:
     camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
     for fov, degrees in (
         *((np.float32(math.radians(round_one)), round_one) for round_one in (180, 170.125)),
@@ -695,15 +695,15 @@ def test_angles_in_a_scene_yaml_are_as_round_as_they_are_meant() -> None:
         assert from_lightfield(image).settings()["fov"] == degrees
 
 
-def test_each_lens_of_the_registry_is_an_example_and_a_camera_if_cycles_has_it() -> None:
+def test_the_registry_has_an_example_of_each_lens() -> None:
     assert {lens.name for lens in EXAMPLES.values()} == LENSES.keys()
     of_cycles = {name for name, lens in LENSES.items() if lens.in_cycles}
     assert {lens.name for lens in CAMERAS.values()} == of_cycles
 
 
-def test_cycles_has_lenses_of_blenders_cameras() -> None:
-    known = {name for name, lens in LENSES.items() if lens.in_cycles}
-    assert known == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}
+def test_cycles_lenses_exist_as_blenders_cameras() -> None:
+    names = {name for name, lens in LENSES.items() if lens.in_cycles}
+    assert names == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -718,7 +718,7 @@ def test_cycles_has_lenses_of_blenders_cameras() -> None:
         ({"principal_point": (math.nan, 1)}, "must be finite pixels"),
     ],
 )
-def test_every_lens_refuses_an_image_that_is_none(
+def test_every_lens_refuses_an_invalid_image(
     change: dict[str, Any], message: str, name: str
 ) -> None:
     with pytest.raises(UserError, match=message):
@@ -733,14 +733,14 @@ def test_a_focal_length_is_positive_and_finite(name: str, bad: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["equisolid 180°", "polynomial", "kannala_brandt"])
-def test_no_fisheye_sees_more_than_everything(name: str) -> None:
+def test_no_fisheye_sees_more_than_a_full_sphere(name: str) -> None:
     assert replace(EXAMPLES[name], fov=2 * math.pi)
     with pytest.raises(UserError, match=r"fov: 360\.001 degrees is not within"):
         replace(EXAMPLES[name], fov=math.radians(360.001))
 
 
 @pytest.mark.parametrize("name", ["polynomial", "kannala_brandt"])
-def test_coefficients_are_all_there_and_finite(name: str) -> None:
+def test_coefficients_are_complete_and_finite(name: str) -> None:
     right = EXAMPLES[name].coefficients
     ends = (math.nan, math.inf, 1e150, 1e-310)
     for wrong in (right[1:], (*right, 0.0), *((*right[1:], end) for end in ends)):
@@ -782,7 +782,7 @@ def test_the_smallest_image(name: str) -> None:
         ({"lens": "equidistant", "fov": 180, "sensor_size": 0}, "sensor_size"),
     ],
 )
-def test_a_lens_that_cannot_be_is_refused(camera: dict[str, object], message: str) -> None:
+def test_an_impossible_lens_is_refused(camera: dict[str, object], message: str) -> None:
     with pytest.raises(UserError, match=message):
         from_camera({"resolution": [96, 64], **camera})
 
@@ -811,7 +811,7 @@ EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectili
         ({"lens": "equirectangular"}, "latitude", [[-90, 90]], [[-90.5, 0], [0, 90.5]]),
     ],
 )
-def test_the_limits_of_what_a_scene_yaml_may_say(
+def test_the_limits_of_a_scene_yamls_keys(
     camera: dict[str, Any], key: str, allowed: list[Any], refused: list[Any]
 ) -> None:
     for value in allowed:
@@ -821,7 +821,7 @@ def test_the_limits_of_what_a_scene_yaml_may_say(
             from_camera({"resolution": [96, 64], **camera, key: value})
 
 
-def test_what_a_scene_yaml_leaves_out() -> None:
+def test_defaults_of_a_scene_yamls_camera() -> None:
     size = {"resolution": [96, 64]}
     assert from_camera(OF_OPENCV | size) == KannalaBrandt(
         **LANDSCAPE, focal_length=9, coefficients=(0, 0, 0, 0), fov=2 * math.pi
@@ -831,7 +831,7 @@ def test_what_a_scene_yaml_leaves_out() -> None:
 
 
 @pytest.mark.parametrize("name", ["rectilinear", "rectilinear shifted"])
-def test_a_projection_matrix_puts_points_where_the_lens_does(name: str) -> None:
+def test_a_projection_matrix_projects_like_the_lens(name: str) -> None:
     lens = EXAMPLES[name]
     matrix = np.array(lens.to_lightfield()["camera"]["projection_matrix"])
     x, y = grid(lens, np.float64, 9)
@@ -840,27 +840,29 @@ def test_a_projection_matrix_puts_points_where_the_lens_does(name: str) -> None:
     for z, expected in ((0.1, -1), (1000, 1)):
         points = np.concatenate([rays * z / -rays[..., 2:], np.ones((9, 9, 1))], axis=-1)
         clip = points @ matrix.T
-        found = clip[..., :3] / clip[..., 3:]
-        np.testing.assert_allclose(found[..., 0], 2 * x / lens.width - 1, atol=1e-9)
-        np.testing.assert_allclose(found[..., 1], 1 - 2 * y / lens.height, atol=1e-9)
-        np.testing.assert_allclose(found[..., 2], expected, atol=1e-9)
+        projected = clip[..., :3] / clip[..., 3:]
+        np.testing.assert_allclose(projected[..., 0], 2 * x / lens.width - 1, atol=1e-9)
+        np.testing.assert_allclose(projected[..., 1], 1 - 2 * y / lens.height, atol=1e-9)
+        np.testing.assert_allclose(projected[..., 2], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", sorted(LENSES.keys() - {"cube_map"}))
-def test_what_an_editor_learns_of_a_lens(name: str) -> None:
+def test_the_schema_describes_a_lens(name: str) -> None:
     schema = TypeAdapter(CameraSettings).json_schema()
     assert name in schema["discriminator"]["mapping"]
-    own = schema["$defs"][schema["discriminator"]["mapping"][name].rsplit("/", 1)[-1]]
-    assert own["properties"]["lens"]["const"] == name
-    assert {"lens", "resolution"} <= set(own["required"])
-    assert all("description" in part for key, part in own["properties"].items() if key != "lens")
+    own_schema = schema["$defs"][schema["discriminator"]["mapping"][name].rsplit("/", 1)[-1]]
+    assert own_schema["properties"]["lens"]["const"] == name
+    assert {"lens", "resolution"} <= set(own_schema["required"])
+    assert all(
+        "description" in part for key, part in own_schema["properties"].items() if key != "lens"
+    )
 
 
 @pytest.mark.parametrize(
     ("lens", "largest"),
     [(Equidistant, 360), (Stereographic, 359.9999), (Orthographic, 180)],
 )
-def test_a_field_of_view_has_one_limit_wherever_it_is_read(
+def test_all_readers_have_the_same_limit_for_a_field_of_view(
     lens: type[Equidistant], largest: float
 ) -> None:
     for make in (
@@ -918,7 +920,7 @@ def test_flags(text: str, lens: Lens) -> None:
         ({"latitude": (0, 1.6)}, "latitude: 0 to 91.6732 degrees is not a range"),
     ],
 )
-def test_a_panorama_has_no_place_twice(ranges: dict[str, Any], message: str) -> None:
+def test_a_panorama_shows_no_place_twice(ranges: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         Equirectangular(**SIZE, **ranges)
     assert not Equirectangular(**SIZE, longitude=(-4, 2)).is_full
@@ -939,7 +941,7 @@ def test_a_cube_map_is_six_squares_wide() -> None:
         ("equirectangular", "equirectangular panorama"),
     ],
 )
-def test_a_lens_in_words(lens: str, description: str) -> None:
+def test_a_lens_is_described_in_words(lens: str, description: str) -> None:
     assert EXAMPLES[lens].description == description
 
 
@@ -950,14 +952,14 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
     rays = lens.pixel_rays(dtype)
     assert rays.dtype == dtype
     np.testing.assert_array_equal(rays, lens.rays(x, y))
-    # Of two types the wider one is kept.
+    # Of two types, the wider one is kept.
     assert lens.rays(x, y.astype(np.float64)).dtype == lens.rays(1, y).dtype == np.float64
 
 
 USE_IT = """
 import argparse, math
 from lightfield.geometry import lenses
-from lightfield.reprojection import flags
+from lightfield.reprojection import flag_settings, flags
 from lightfield.reprojection.geometry import Geometry
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
@@ -967,8 +969,8 @@ flags.add_configuration_flags(parser)
 flags.add_lens_map_flags(parser)
 words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
 arguments = parser.parse_args(words)
-source = flags.read_source(arguments)[1]
-geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
+source = flag_settings.read_source(arguments)[1]
+geometry = Geometry.of(flag_settings.lens_map_settings(arguments, source), source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 
@@ -1004,6 +1006,6 @@ OF_EQUIDISTANT = {"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTA
         (OF_EQUIDISTANT | {"resolution": [math.inf, 9]}, "camera, resolution or"),
     ],
 )
-def test_a_bad_lightfield_json_names_its_key(change: dict[str, object], message: str) -> None:
+def test_a_wrong_lightfield_json_names_its_key(change: dict[str, object], message: str) -> None:
     with pytest.raises(UserError, match=message):
         from_lightfield(README | {"camera": {"type": "PANO"}} | change)

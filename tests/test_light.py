@@ -1,4 +1,4 @@
-"""A scene without light is refused before it is rendered, and one that Cycles lights is not."""
+"""A scene without light is refused before it is rendered. One that Cycles lights is not."""
 
 import json
 from pathlib import Path
@@ -42,7 +42,7 @@ LIT = [
 
 @pytest.fixture(scope="module")
 def folder(run_program, tmp_path_factory):
-    """A folder with a .blend of each case, and what Cycles rendered of it."""
+    """A folder with a .blend of each case, and the result of its render."""
     folder = tmp_path_factory.mktemp("light")
     run_program(Path(__file__).with_name("light_renders.py"), folder)
     return folder

@@ -1,4 +1,4 @@
-"""lightfield.json: written as it was, read strictly, and what it says resolved in one place."""
+"""lightfield.json: written unchanged, read strictly, and its meaning resolved in one place."""
 
 import hashlib
 import json
@@ -36,7 +36,7 @@ def read(tmp_path: Path, held: Any) -> LightField:
     return LightField.read(tmp_path / "lightfield.json")
 
 
-def test_it_holds_what_silvrs_readers_read() -> None:
+def test_it_has_the_keys_that_silvrs_readers_read() -> None:
     held = LightField.from_rig(CUBOID, FISHEYE, depth="z", frame=3).to_json()
     held = json.loads(json.dumps(held, allow_nan=False))
     keys = ["camera", "lf_type", "resolution", "sensor_size", "depth", "frame", "frames"]
@@ -57,7 +57,7 @@ def test_it_holds_what_silvrs_readers_read() -> None:
         assert frame["split"] == ("test" if number % 2 else "train")
 
 
-def test_what_is_read_is_written_again_byte_for_byte(tmp_path: Path) -> None:
+def test_a_file_is_written_again_byte_for_byte(tmp_path: Path) -> None:
     for rig in (CUBOID, PLANE):
         first, second = tmp_path / "first.json", tmp_path / "second.json"
         made = LightField.from_rig(rig, FISHEYE, depth="z", render={"samples": 4})
@@ -70,14 +70,14 @@ def test_what_is_read_is_written_again_byte_for_byte(tmp_path: Path) -> None:
         ]
 
 
-def test_keys_of_others_are_kept(tmp_path: Path) -> None:
+def test_unknown_keys_are_kept(tmp_path: Path) -> None:
     held = content(note="kept")
     held["frames"][1]["timestamp"] = 7
     assert read(tmp_path, held).to_json() == held
 
 
 def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None:
-    whole = read(tmp_path, content())
+    complete = read(tmp_path, content())
     held = content()
     for frame in held["frames"]:
         del frame["position"], frame["rotation"]
@@ -86,24 +86,24 @@ def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None
     for frame in held["frames"]:
         del frame["world_matrix"]
     by_angles = read(tmp_path, held)
-    for found in (by_matrix, by_angles):
-        np.testing.assert_allclose(found.matrices, whole.matrices, atol=1e-11)
-        for view, same in zip(found.views, whole.views, strict=True):
+    for placed in (by_matrix, by_angles):
+        np.testing.assert_allclose(placed.matrices, complete.matrices, atol=1e-11)
+        for view, same in zip(placed.views, complete.views, strict=True):
             assert view.position.shape == view.rotation.shape == (3,)
             np.testing.assert_allclose(view.position, same.position, atol=1e-11)
             np.testing.assert_allclose(view.rotation, same.rotation, atol=1e-11)
-    view = View.placed("x", whole.views[1].matrix, {"split": "test"})
+    view = View.placed("x", complete.views[1].matrix, {"split": "test"})
     assert (view.position.shape, view.split) == ((3,), "test")
-    np.testing.assert_allclose(view.position, whole.views[1].position, atol=1e-11)
-    np.testing.assert_allclose(view.rotation, whole.views[1].rotation, atol=1e-11)
+    np.testing.assert_allclose(view.position, complete.views[1].position, atol=1e-11)
+    np.testing.assert_allclose(view.rotation, complete.views[1].rotation, atol=1e-11)
     assert View.placed("x", view.matrix).split is None
-    # Both there: the matrix decides.
+    # With both, the matrix decides.
     held = content()
     held["frames"][0]["world_matrix"][0][3] = 5
     assert read(tmp_path, held).views[0].matrix[0, 3] == 5
 
 
-def test_the_matrix_looks_where_the_rig_points() -> None:
+def test_the_matrix_looks_in_the_rigs_direction() -> None:
     """A level plane's cameras look along +Y with +Z up."""
     view = LightField.from_rig({"type": "plane", "cameras": [1, 1]}, FISHEYE).views[0]
     np.testing.assert_array_equal(
@@ -120,7 +120,7 @@ def test_the_matrix_looks_where_the_rig_points() -> None:
         (PANORAMA, "distance", "z"),
     ],
 )
-def test_what_depth_means_follows_from_the_key_and_the_lens(
+def test_the_kind_of_depth_follows_from_the_key_and_the_lens(
     lens: lenses.Lens, absent: str, impossible: str
 ) -> None:
     rig = {"type": "plane", "cameras": [1, 1]}
@@ -131,7 +131,7 @@ def test_what_depth_means_follows_from_the_key_and_the_lens(
         LightField.from_rig(rig, lens, depth=impossible)
 
 
-def test_a_changed_copy_has_another_lens_other_views_and_other_keys(tmp_path: Path) -> None:
+def test_a_copy_can_have_another_lens_other_views_and_other_keys(tmp_path: Path) -> None:
     first = read(tmp_path, content(render={"samples": 4}, frame=2, scene={"name": "x"}))
     assert (first.render, first.frame, first.scene) == ({"samples": 4}, 2, {"name": "x"})
     changed = first.changed(lens=WIDE, views=first.views[1:], render={"samples": 8})
@@ -145,7 +145,7 @@ def test_a_changed_copy_has_another_lens_other_views_and_other_keys(tmp_path: Pa
 
 
 @pytest.mark.parametrize("key", ["render", "frame", "scene"])
-def test_a_key_of_ours_that_another_tool_did_not_write_is_named(key: str) -> None:
+def test_a_missing_key_of_another_tools_file_is_named(key: str) -> None:
     with pytest.raises(UserError, match=f"^lightfield.json: {key}: is missing; .*make_lightfield"):
         getattr(LightField.from_rig(PLANE, FISHEYE), key)
     if key != "render":
@@ -165,7 +165,7 @@ BROKEN = {
     "a text for settings": (content(render="cycles"), "render: must be a mapping"),
     "no list of passes": (content(passes=3), "passes: must be of normal, object"),
     "a pass that there is not": (content(render={"passes": ["x"]}), "passes: must be of normal"),
-    "frame is no mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
+    "frame is not a mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }
 BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {
     "no name": ({"name": GONE}, NO_NAME + "None"),
@@ -194,7 +194,7 @@ for case, (changes, message) in BROKEN_FRAMES.items():
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_what_is_wrong_with_a_file_is_said_in_one_line(case: str, tmp_path: Path) -> None:
+def test_an_invalid_file_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
     held, message = BROKEN[case]
     path = tmp_path / "lightfield.json"
     path.write_text(json.dumps(held))
@@ -204,7 +204,7 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(case: str, tmp_path: Path
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_missing_or_no_json_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_or_one_without_json_is_named(tmp_path: Path) -> None:
     path = tmp_path / "lightfield.json"
     with pytest.raises(UserError, match=f"{path}: cannot be read"):
         LightField.read(path)
@@ -229,11 +229,11 @@ def test_cube_map_refuses_a_lens_that_is_not_90_degrees() -> None:
 # ---- the key of a view's pixels ---------------------------------------------------------------
 
 
-def test_a_views_key_changes_with_all_that_its_pixels_depend_on() -> None:
+def test_a_views_key_changes_with_everything_that_its_pixels_depend_on() -> None:
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", render={"samples": 4}, frame=1)
     view = first.views[0]
     moved = view.matrix + 1e-12 * np.eye(4)[[3, 1, 2, 0]]
-    found = [
+    view_keys = [
         keys.render_key(first, view),
         keys.render_key(first, View.placed("other", view.matrix)),
         keys.render_key(first, View.placed(view.name, moved)),
@@ -244,8 +244,8 @@ def test_a_views_key_changes_with_all_that_its_pixels_depend_on() -> None:
         keys.render_key(first.changed(frame=2), view),
         keys.render_key(first.changed(scene={"fingerprint": "0"}), view),
     ]
-    assert len(set(found)) == len(found)
-    assert all(len(key) == 64 for key in found)
+    assert len(set(view_keys)) == len(view_keys)
+    assert all(len(key) == 64 for key in view_keys)
 
 
 def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
@@ -257,11 +257,11 @@ def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
     assert keys.render_key(first.changed(views=first.views[:1]), first.views[0]) == key
     other_split = View.placed(first.views[0].name, first.views[0].matrix, {"split": "test"})
     assert keys.render_key(first, other_split) == key
-    # What is resumed on another machine is not rendered once more for its last digits.
+    # A view resumed on another machine is not rendered again for its last digits.
     assert keys.render_key(first.changed(machine="another"), first.views[0]) == key
 
 
-def test_a_views_seed_is_its_own_and_stays_what_it_was() -> None:
+def test_a_views_seed_follows_from_its_name_and_never_changes() -> None:
     seeds = [keys.view_seed(seed, name) for seed in (0, 1) for name in ("a", "b")]
     assert len(set(seeds)) == 4
     assert all(0 <= keys.view_seed(0, str(number)) < 2**31 for number in range(200))
@@ -270,7 +270,7 @@ def test_a_views_seed_is_its_own_and_stays_what_it_was() -> None:
     assert keys.view_seed(5, "view_0001f") == int(digest, 16) >> (256 - 32) & (2**31 - 1)
 
 
-def test_a_scenes_fingerprint_is_its_files_or_its_builders(
+def test_a_scenes_fingerprint_follows_from_its_files_or_its_builder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     blend = SceneSource(blend="a.blend", sha256="ab" * 32)
@@ -278,35 +278,39 @@ def test_a_scenes_fingerprint_is_its_files_or_its_builders(
     with pytest.raises(UserError, match=r"a.blend: its sha256 is not known"):
         keys.scene_fingerprint(blend.model_copy(update={"sha256": None}))
     monkeypatch.setattr(keys, "BUILDERS", tmp_path)
-    found = set()
-    for common, own, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
-        for folder, text in (("library", common), ("room", own)):
+    fingerprints = set()
+    for common, builder_text, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
+        for folder, text in (("library", common), ("room", builder_text)):
             (tmp_path / folder).mkdir(exist_ok=True)
             (tmp_path / folder / "__init__.py").write_text(text)
-        found.add(keys.scene_fingerprint(SceneSource(builder="room", parameters={"seed": seed})))
-    assert len(found) == 4 and all(len(key) == 64 for key in found)
+        fingerprints.add(
+            keys.scene_fingerprint(SceneSource(builder="room", parameters={"seed": seed}))
+        )
+    assert len(fingerprints) == 4 and all(len(key) == 64 for key in fingerprints)
 
 
 def test_the_key_of_a_flow_changes_with_lens_poses_and_views(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     first = LightField.from_rig(PLANE, FISHEYE, depth="z")
-    one, other = first.views
-    found = [
-        keys.flow_key(first, one, other, ["a", "b"]),
-        keys.flow_key(first, other, one, ["a", "b"]),
-        keys.flow_key(first, one, one, ["a", "b"]),
-        keys.flow_key(first, other, other, ["a", "b"]),
-        keys.flow_key(first, one, other, ["b", "a"]),
-        keys.flow_key(first.changed(lens=WIDE, depth="distance"), one, other, ["a", "b"]),
+    first_view, second_view = first.views
+    flow_keys = [
+        keys.flow_key(first, first_view, second_view, ["a", "b"]),
+        keys.flow_key(first, second_view, first_view, ["a", "b"]),
+        keys.flow_key(first, first_view, first_view, ["a", "b"]),
+        keys.flow_key(first, second_view, second_view, ["a", "b"]),
+        keys.flow_key(first, first_view, second_view, ["b", "a"]),
+        keys.flow_key(
+            first.changed(lens=WIDE, depth="distance"), first_view, second_view, ["a", "b"]
+        ),
     ]
     monkeypatch.setattr(keys, "FLOW_VERSION", 2)
-    found.append(keys.flow_key(first, one, other, ["a", "b"]))
-    assert len(set(found)) == len(found)
+    flow_keys.append(keys.flow_key(first, first_view, second_view, ["a", "b"]))
+    assert len(set(flow_keys)) == len(flow_keys)
 
 
-def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A view that is finished under these keys is not rendered again by another version of ours."""
+def test_keys_never_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another version of the program must not render views again that have these keys."""
     monkeypatch.setattr(keys, "version", lambda _: "5.0.1")
     monkeypatch.setattr(keys, "BUILDERS", tmp_path)
     for name in ("library/shapes.py", "room/__init__.py"):
@@ -315,13 +319,13 @@ def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     scene, render = {"name": "a"}, {"samples": 4, "seed": 0}
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", frame=1, scene=scene, render=render)
     blend = SceneSource(blend="a.blend", sha256="ab" * 32)
-    found = [
+    all_keys = [
         keys.render_key(first, first.views[1]),
         keys.names_key(first),
         keys.scene_fingerprint(SceneSource(builder="room")),
         keys.scene_fingerprint(blend, [("a.png", "cd" * 32), ("b.png", None)]),
     ]
-    assert [key[:12] for key in found] == [
+    assert [key[:12] for key in all_keys] == [
         "690b6266f822",
         "6a816a6ab618",
         "5cba495d5265",

@@ -1,4 +1,4 @@
-"""What of a machine changes bytes: named in lightfield.json and in each view's header."""
+"""Properties of a machine that change bytes: lightfield.json and each view's header name them."""
 
 import ctypes
 import subprocess
@@ -19,7 +19,7 @@ LIBRARY.restype = ctypes.c_char_p
 CPUINFO = (
     "processor\t: 0\nvendor_id\t: {}\nflags\t\t: fpu sse4_2 {}\n\nprocessor\t: 1\nflags\t: none\n"
 )
-# All that Cycles asks of a processor for the fast one of its kernels.
+# All that Cycles requires of a processor for its fast kernels.
 FAST = "avx f16c avx2 fma bmi1 bmi2"
 FASTEST = FAST + " avx512f avx512dq avx512cd avx512bw avx512vl"
 
@@ -30,12 +30,12 @@ FASTEST = FAST + " avx512f avx512dq avx512cd avx512bw avx512vl"
         ("GenuineIntel", FAST, False, "GenuineIntel AVX2"),
         ("GenuineIntel", FAST, True, "GenuineIntel AVX2"),
         ("AuthenticAMD", FASTEST, False, "AuthenticAMD AVX2"),
-        # The denoiser alone makes use of these.
+        # Only the denoiser uses these.
         ("AuthenticAMD", FASTEST, True, "AuthenticAMD AVX-512"),
         ("AuthenticAMD", FAST.replace("fma ", ""), True, "AuthenticAMD SSE4.2"),
     ],
 )
-def test_a_machine_is_its_processors_maker_and_instructions_and_its_c_library(
+def test_a_machine_is_described_by_processor_maker_instructions_and_c_library(
     maker, flags, denoise, described, tmp_path
 ):
     file = tmp_path / "cpuinfo"
@@ -43,7 +43,7 @@ def test_a_machine_is_its_processors_maker_and_instructions_and_its_c_library(
     assert machine.describe(denoise, file) == f"{described}, glibc {LIBRARY().decode()}"
 
 
-def test_a_machine_that_does_not_describe_its_processor_has_the_name_of_its_kind(tmp_path):
+def test_an_unknown_processor_has_the_name_of_its_kind(tmp_path):
     described = machine.describe(False, tmp_path / "missing")
     assert described == f"x86_64, glibc {LIBRARY().decode()}"
 
@@ -60,13 +60,13 @@ def test_lightfield_and_views_name_the_machine_with_cycles_own_instructions(
     settings = tmp_path / "settings.json"
     write_json(settings, LightfieldSettings.of_capture(dataset).as_json())
     run_program("make_lightfield.py", "--settings", settings, "--output", written)
-    words = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
-    run_program("render_shard.py", *words, "--output", tmp_path / "exr")
+    arguments = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
+    run_program("render_shard.py", *arguments, "--output", tmp_path / "exr")
     (view,) = (tmp_path / "exr").iterdir()
     described = LightField.read(written).content["machine"]
     assert images.attribute(view, "plenoforge:machine") == described
 
     asked = [sys.executable, "-c", ASK_CYCLES]
-    told = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
-    (capabilities,) = (line for line in told.splitlines() if "capabilities" in line)
+    output = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    (capabilities,) = (line for line in output.splitlines() if "capabilities" in line)
     assert ("AVX2" in capabilities) == ("AVX2" in described)

@@ -1,4 +1,4 @@
-"""What rendering takes of memory: measured, asked for, shared between jobs, and refused in time."""
+"""The memory of rendering: measured, requested, shared between jobs, and refused in time."""
 
 import json
 
@@ -29,30 +29,30 @@ GB = 10**9
         (1, 0, GB, 25 * GB, 1),
     ],
 )
-def test_what_runs_at_once_fits_into_memory(cores, shards, need, available, expected):
+def test_simultaneous_jobs_fit_into_memory(cores, shards, need, available, expected):
     threads = memory.threads(cores, shards, need, available)
     assert threads == expected
     assert cores // threads * need <= available or threads == cores
 
 
 def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
-    found = machine.available()
-    assert 0 < machine.peak() < found
+    available = machine.available()
+    assert 0 < machine.peak() < available
     monkeypatch.setattr(machine, "CONTROL_GROUPS", tmp_path)
     monkeypatch.setattr(machine, "OWN_GROUPS", tmp_path / "own")
-    assert machine.available() >= found
+    assert machine.available() >= available
 
 
 @pytest.mark.parametrize(
-    ("own", "limits"),
+    ("group", "limits"),
     [
-        # The second version of control groups: a batch system limits a job, and not its steps.
+        # The second version of control groups: a batch system limits a job, but not its steps.
         (
             "0::/batch/job_7/step_0",
             {"batch/job_7/memory.max": "1000000", "batch/job_7/step_0/memory.max": "max"},
         ),
         ("0::/batch/job_7", {"memory.max": "max", "batch/job_7/memory.max": "1000000"}),
-        # The first version, whose limit of the whole machine is a huge number.
+        # The first version: the machine's own limit is a huge number.
         (
             "5:cpu:/batch\n9:memory:/batch/job_7",
             {
@@ -64,8 +64,8 @@ def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
         ),
     ],
 )
-def test_of_nested_limits_of_memory_the_tightest_counts(own, limits, tmp_path, monkeypatch):
-    (tmp_path / "own").write_text(f"{own}\n")
+def test_the_tightest_of_nested_memory_limits_counts(group, limits, tmp_path, monkeypatch):
+    (tmp_path / "own").write_text(f"{group}\n")
     for name, limit in limits.items():
         path = tmp_path / "groups" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,7 +75,7 @@ def test_of_nested_limits_of_memory_the_tightest_counts(own, limits, tmp_path, m
     assert machine.available() == 1_000_000
 
 
-def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
+def test_a_job_requests_the_measured_memory_of_the_scene(tmp_path):
     content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * memory.PIXEL_BYTES
@@ -83,13 +83,13 @@ def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
     (tmp_path / "garden").mkdir()
     (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
     assert dataset.estimate.view_memory_bytes == 2.4 * GB + pixels
-    # Four pixels for each of a view's, up to 4096 by 2048.
+    # Four pixels for each pixel of a view, up to 4096 × 2048.
     assert dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
 
 
 def test_a_scene_is_measured_in_a_process_of_its_own(room):
-    found = scene_memory.measure(room, {"left_out": [], "fullest_frame": 1}, {})
-    assert 100e6 < found < 1e9
+    measured = scene_memory.measure(room, {"left_out": [], "fullest_frame": 1}, {})
+    assert 100e6 < measured < 1e9
 
 
 def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):

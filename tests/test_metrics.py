@@ -1,4 +1,4 @@
-"""Errors of images against known noise, other programs, and pencil and paper."""
+"""Errors of images, compared with known noise, other programs, and calculations by hand."""
 
 import cv2
 import flip_evaluator
@@ -15,7 +15,7 @@ MASK = np.hypot(*(np.mgrid[:SIZE, :SIZE] + 0.5 - SIZE / 2)) < SIZE / 2
 
 
 def scene():
-    """A smooth picture around middle grey, in which each channel differs."""
+    """Return a smooth picture around middle grey, with different channels."""
     y, x = np.mgrid[:SIZE, :SIZE] / SIZE
     return np.stack([0.1 + 0.3 * x, 0.2 + 0.2 * y, 0.3 - 0.2 * x * y], axis=-1)
 
@@ -31,41 +31,41 @@ def reference(truth, deviation, renders, depths=None):
 
 
 def expected(truth, deviation, exposure):
-    """The integral that relative MSE estimates, for noise of one deviation everywhere."""
+    """Return the exact relative MSE for noise of one deviation everywhere."""
     gain = 4**exposure
     return float((gain * deviation**2 / (gain * truth[MASK] ** 2 + 0.01)).mean())
 
 
-def test_two_seeds_tell_how_wrong_their_mean_is():
+def test_two_seeds_give_the_error_of_their_mean():
     truth, deviation = scene(), 0.02
-    found = reference(truth, deviation, 2)
+    estimate = reference(truth, deviation, 2)
     # The variance of a mean of two is half that of one.
-    wanted = expected(truth, deviation, found.exposure) / 2
-    # A standard deviation of √(2/n) over n values, and the worst thousandth of squares is missing.
-    assert found.own_error == pytest.approx(wanted, rel=0.05)
-    # It is no estimate of spread alone: the mean is that far from the truth, which tests know.
-    actual = float((((found.colour - truth)[MASK] ** 2) * found.weights).mean())
-    assert found.own_error == pytest.approx(actual, rel=0.06)
+    wanted = expected(truth, deviation, estimate.exposure) / 2
+    # The estimate deviates by √(2/n) for n values, and lacks the worst thousandth of squares.
+    assert estimate.own_error == pytest.approx(wanted, rel=0.05)
+    # The estimate also holds against the truth, which only a test knows.
+    actual = float((((estimate.colour - truth)[MASK] ** 2) * estimate.weights).mean())
+    assert estimate.own_error == pytest.approx(actual, rel=0.06)
 
 
 @pytest.mark.parametrize("renders", [2, 8])
 def test_the_references_own_error_is_not_counted(renders):
     truth = scene()
-    found = reference(truth, 0.02, renders)
-    # An image with half the noise of one of the reference's renders.
+    estimate = reference(truth, 0.02, renders)
+    # The image has half the noise of one of the reference's renders.
     image = noisy(truth, 0.01, 7)
-    wanted = expected(truth, 0.01, found.exposure)
-    assert metrics.relative_mse(image, found) == pytest.approx(wanted, rel=0.08)
+    wanted = expected(truth, 0.01, estimate.exposure)
+    assert metrics.relative_mse(image, estimate) == pytest.approx(wanted, rel=0.08)
 
 
 def test_the_exposure_puts_the_typical_pixel_at_middle_grey():
-    found = metrics.make_reference(
+    estimate = metrics.make_reference(
         [np.full((8, 8, 3), 0.72, np.float32)] * 2, None, MASK[28:36, 28:36]
     )
-    assert found.exposure == pytest.approx(-2)
+    assert estimate.exposure == pytest.approx(-2)
     # (0.72 · ¼)² + 0.01 under an error of 0.072 · ¼.
     image = np.full((8, 8, 3), 0.792, np.float32)
-    assert metrics.relative_mse(image, found) == pytest.approx(0.018**2 / 0.0424, rel=1e-5)
+    assert metrics.relative_mse(image, estimate) == pytest.approx(0.018**2 / 0.0424, rel=1e-5)
 
 
 def test_brightness_of_a_scene_does_not_change_its_error():
@@ -82,35 +82,35 @@ def test_brightness_of_a_scene_does_not_change_its_error():
     assert dim == pytest.approx(bright, rel=1e-4)
 
 
-def test_a_few_fireflies_do_not_decide_and_many_do():
+def test_a_few_fireflies_do_not_decide_but_many_do():
     truth = scene()
-    found = reference(truth, 1e-4, 4)
+    estimate = reference(truth, 1e-4, 4)
     image = noisy(truth, 0.02, 5)
-    calm = metrics.relative_mse(image, found)
+    calm = metrics.relative_mse(image, estimate)
     few, many = image.copy(), image.copy()
     few[32, 30:32] = 50
     many[32, 16:48] = 50
-    assert metrics.relative_mse(few, found) == pytest.approx(calm, rel=0.02)
-    assert metrics.relative_mse(many, found) > 100 * calm
-    # They do decide where all pixels count.
-    assert metrics.relative_mse(few, found, left_out=0) > 100 * calm
+    assert metrics.relative_mse(few, estimate) == pytest.approx(calm, rel=0.02)
+    assert metrics.relative_mse(many, estimate) > 100 * calm
+    # They do decide if all pixels count.
+    assert metrics.relative_mse(few, estimate, left_out=0) > 100 * calm
 
 
-def test_what_lies_outside_the_image_circle_does_not_count():
+def test_pixels_outside_the_image_circle_do_not_count():
     truth = scene()
-    found = reference(truth, 0.01, 4)
+    estimate = reference(truth, 0.01, 4)
     image = noisy(truth, 0.03, 5)
     spoilt = np.where(MASK[..., None], image, np.float32(9))
-    assert metrics.compare(spoilt, None, found) == metrics.compare(image, None, found)
+    assert metrics.compare(spoilt, None, estimate) == metrics.compare(image, None, estimate)
 
 
 def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     truth = scene()
-    whole = np.ones_like(MASK)
-    found = metrics.make_reference([truth.astype(np.float32)] * 2, None, whole)
+    all_pixels = np.ones_like(MASK)
+    estimate = metrics.make_reference([truth.astype(np.float32)] * 2, None, all_pixels)
     image = noisy(truth, 0.03, 5)
-    errors = metrics.compare(image, None, found)
-    shown, wanted = metrics.developed(image, found), metrics.developed(truth, found)
+    errors = metrics.compare(image, None, estimate)
+    shown, wanted = metrics.developed(image, estimate), metrics.developed(truth, estimate)
     assert errors.psnr == pytest.approx(cv2.PSNR(wanted, shown, R=1.0), abs=1e-6)
     # Its own mean leaves out the border.
     similarity = structural_similarity(
@@ -124,33 +124,35 @@ def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     assert errors.ssim == pytest.approx(similarity, abs=0.01)
     mean = flip_evaluator.evaluate(*(x.astype(np.float32) for x in (wanted, shown)), "LDR")[1]
     assert errors.flip == pytest.approx(mean, rel=1e-5)
-    same = metrics.compare(truth.astype(np.float32), None, found)
+    same = metrics.compare(truth.astype(np.float32), None, estimate)
     assert (same.psnr, same.ssim, same.flip) == (np.inf, pytest.approx(1), 0)
 
 
-def test_others_metrics_are_of_light_as_it_is():
-    truth, whole = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
-    found = metrics.make_reference([truth] * 2, None, whole)
-    errors = metrics.compare(truth + np.float32(0.1), None, found)
+def test_common_metrics_use_unexposed_light():
+    truth, all_pixels = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
+    estimate = metrics.make_reference([truth] * 2, None, all_pixels)
+    errors = metrics.compare(truth + np.float32(0.1), None, estimate)
     assert errors.relative_mse_unexposed == pytest.approx(0.01 / 0.26, rel=1e-5)
     assert errors.mrse == pytest.approx(0.01 / 0.51**2, rel=1e-5)
 
 
-def test_bias_and_variance_are_told_apart_and_add_up():
+def test_bias_and_variance_are_separated_and_add_up():
     truth = scene()
-    found = reference(truth, 0.01, 8)
+    estimate = reference(truth, 0.01, 8)
     renders = [noisy(truth + 0.05, 0.03, seed) for seed in range(12)]
-    bias, variance = metrics.bias_and_variance(renders, found)
-    assert bias == pytest.approx(expected(truth, 0.05, found.exposure), rel=0.05)
-    assert variance == pytest.approx(expected(truth, 0.03, found.exposure), rel=0.05)
-    whole = np.mean([metrics.relative_mse(render, found, left_out=0) for render in renders])
-    assert bias + variance == pytest.approx(whole, rel=1e-9)
-    none, _ = metrics.bias_and_variance([noisy(truth, 0.03, seed) for seed in range(12)], found)
+    bias, variance = metrics.bias_and_variance(renders, estimate)
+    assert bias == pytest.approx(expected(truth, 0.05, estimate.exposure), rel=0.05)
+    assert variance == pytest.approx(expected(truth, 0.03, estimate.exposure), rel=0.05)
+    error_of_all_pixels = np.mean(
+        [metrics.relative_mse(render, estimate, left_out=0) for render in renders]
+    )
+    assert bias + variance == pytest.approx(error_of_all_pixels, rel=1e-9)
+    none, _ = metrics.bias_and_variance([noisy(truth, 0.03, seed) for seed in range(12)], estimate)
     assert abs(none) < variance / 12
 
 
 @pytest.mark.parametrize(("sign", "correlation"), [(1, 1), (-1, -1), (0, None)])
-def test_biases_of_neighbouring_views_agree_as_far_as_they_do(sign, correlation):
+def test_biases_of_neighbouring_views_correlate(sign, correlation):
     truth = scene()
     pair = reference(truth, 1e-3, 8), reference(truth, 1e-3, 8)
     everywhere = np.flatnonzero(MASK)
@@ -159,11 +161,11 @@ def test_biases_of_neighbouring_views_agree_as_far_as_they_do(sign, correlation)
         for first, bias in ((0, 0.05 * abs(sign)), (50, 0.05 * sign))
     ]
     agreed = metrics.bias_correlation(tuple(renders), pair, (everywhere, everywhere))
-    # Without a bias it would be noise over noise: none is found.
+    # Without a bias there is only noise, so there is no correlation.
     assert agreed == (correlation and pytest.approx(correlation, abs=0.05))
 
 
-def test_between_points_there_is_a_power_law_and_beyond_them_nothing():
+def test_interpolation_is_a_power_law_between_points_only():
     points = [(4, 1 / 4), (1, 1), (16, 1 / 16)]
     assert metrics.interpolated(2, points) == pytest.approx(1 / 2)
     assert metrics.interpolated(16, points) == pytest.approx(1 / 16)
@@ -176,13 +178,13 @@ def test_depth_counts_misses():
     assert metrics.depth_error(depth, truth) == pytest.approx((0.1 + 0 + 0 + 1 + 1 + 1) / 6)
 
 
-def test_a_power_law_is_found_and_its_slopes_error_is_that_of_linear_regression():
+def test_a_power_law_is_fitted_with_its_slopes_standard_error():
     x = [1, 2, 4, 8, 16]
     line = metrics.fit(x, [3 / value for value in x])
     assert (line.slope, line.factor) == (pytest.approx(-1), pytest.approx(3))
     assert line.at(32) == pytest.approx(3 / 32)
     assert line.inverse(3 / 32) == pytest.approx(32)
-    # A denoiser's error may hardly fall, and then no number of samples is enough.
+    # A denoiser's error may hardly fall. Then no number of samples is enough.
     assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == metrics.Line(0, 0, 1.0).inverse(1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
     wanted = linregress(np.log(x), np.log(y))
@@ -193,26 +195,26 @@ def test_a_power_law_is_found_and_its_slopes_error_is_that_of_linear_regression(
     assert metrics.fit([0, 1, 2], [1, 2, 3]) is metrics.fit([1, 2, 3], [1, 2, 0]) is None
 
 
-def test_the_pareto_front_holds_what_nothing_beats():
+def test_the_pareto_front_holds_the_points_that_none_beats():
     cost, error = [1, 2, 2, 3, 4, 5], [9, 5, 4, 6, 4, 1]
     assert metrics.pareto(cost, error) == [0, 2, 5]
 
 
 def test_independent_errors_disagree_fully_and_common_ones_not_at_all():
     truth = scene()
-    one, other = reference(truth, 1e-4, 4), reference(truth * 1.1, 1e-4, 4)
+    first, second = reference(truth, 1e-4, 4), reference(truth * 1.1, 1e-4, 4)
     everywhere = np.flatnonzero(MASK)
     common = np.random.default_rng(3).normal(0, 0.03, truth.shape)
     bias = [(picture + common).astype(np.float32) for picture in (truth, truth * 1.1)]
     noise = [noisy(truth, 0.03, 11), noisy(truth * 1.1, 0.03, 12)]
-    alike = metrics.disagreement(tuple(bias), (one, other), (everywhere, everywhere))
-    apart = metrics.disagreement(tuple(noise), (one, other), (everywhere, everywhere))
+    alike = metrics.disagreement(tuple(bias), (first, second), (everywhere, everywhere))
+    apart = metrics.disagreement(tuple(noise), (first, second), (everywhere, everywhere))
     assert alike.share == pytest.approx(0, abs=0.01)
     assert apart.share == pytest.approx(1, abs=0.05)
-    # A tenth of each pixel, over a denominator that the 0.01 makes larger.
+    # The error is a tenth of each pixel. The 0.01 in the denominator makes it smaller.
     assert 0.05 < apart.floor < 0.1
     assert apart.floor == pytest.approx(alike.floor, rel=0.01)
-    assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, one.exposure), rel=0.1)
+    assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, first.exposure), rel=0.1)
     assert apart.total**2 == pytest.approx(apart.added**2 + apart.floor**2, rel=0.05)
     assert alike.total == pytest.approx(alike.floor, rel=1e-3)
 
@@ -232,7 +234,7 @@ def test_pixels_have_the_solid_angles_of_their_lens():
     assert angles[100, 166] / angles[100, 100] == pytest.approx(expected, rel=0.02)
 
 
-def test_ws_psnr_counts_the_sphere_and_not_the_picture():
+def test_ws_psnr_weights_by_solid_angle():
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     truth = np.full((32, 64, 3), 0.5)
     angles = metrics.solid_angles(lens)
@@ -241,7 +243,7 @@ def test_ws_psnr_counts_the_sphere_and_not_the_picture():
     equator[15:17] += 0.1
     everywhere = truth + 0.1
     assert metrics.ws_psnr(truth, everywhere, angles) == pytest.approx(20)
-    # A sixteenth of the rows is 1 − sin(90° · 14/16) of a hemisphere's height at a pole.
+    # A sixteenth of the rows has 1 − sin(90° · 14/16) of a hemisphere's height at a pole.
     part = (1 - np.sin(np.pi / 2 * 14 / 16)) / 2
     assert metrics.ws_psnr(truth, pole, angles) == pytest.approx(20 - 10 * np.log10(part), abs=0.05)
     part = np.sin(np.pi / 32)
@@ -250,7 +252,7 @@ def test_ws_psnr_counts_the_sphere_and_not_the_picture():
     )
 
 
-def test_iv_psnr_forgives_two_pixels_and_a_hundredth_and_no_more():
+def test_iv_psnr_forgives_exactly_two_pixels_and_a_hundredth():
     random = np.random.default_rng(2)
     truth = random.uniform(0.2, 0.8, (40, 40, 3))
     counted = np.zeros((40, 40), bool)
@@ -263,7 +265,7 @@ def test_iv_psnr_forgives_two_pixels_and_a_hundredth_and_no_more():
     assert measured(np.roll(truth, (2, -1), (0, 1))) > 50
     assert measured(np.roll(truth, 3, 0)) < 40
     assert measured(truth + 0.01) > 90
-    # Of a hundredth and 0.02, the hundredth is forgiven; grey has no colour differences.
+    # Of the 0.02, a hundredth is forgiven. Grey has no colour differences.
     grey = np.full((40, 40, 3), 0.5)
     luma = -10 * np.log10(0.02**2)
     expected = (4 * luma + 2 * 100) / 6

@@ -1,4 +1,4 @@
-"""Mistakes of the table: each is refused in one line, before anything is made."""
+"""The table's mistakes: each is refused in one line, before anything is made."""
 
 import json
 import re
@@ -29,7 +29,7 @@ SETTINGS = {
 }
 
 
-def read(mistake, file):
+def read_with_mistake(mistake, file):
     """Write a file with its mistake, and read it as a program does."""
     value = mistake.value
     if not mistake.key and isinstance(value, (str, bytes)):
@@ -59,19 +59,19 @@ def test_a_mistake_is_refused_in_one_line_with_file_and_key(mistake, tmp_path, m
     monkeypatch.chdir(tmp_path)
     file = tmp_path / mistake.file
     with pytest.raises(UserError) as caught:
-        read(mistake, file)
+        read_with_mistake(mistake, file)
     message = str(caught.value)
     assert message.isprintable() and len(message) <= 2001
-    # Nobody is shown a regular expression.
+    # A user must not see a regular expression.
     assert not re.search(r"\^[\[\\\w]|\]\*?\$", message), message
-    # The command line may have given what is said of config.yaml: its folder is not named.
+    # Settings of config.yaml may come from the command line, so its folder may be missing.
     named = file if mistake.file != "config.yaml" or str(file) in message else file.name
     assert message.startswith(f"{named}: {mistake.said}")
     assert mistake.allowed in message
 
 
-# Runs a command and prints the most memory that it had. In a process of its own: Linux counts what
-# the starting process had, which is pytest's.
+# Runs a command and prints its peak memory. In a process of its own, because Linux counts the
+# memory of the starting process too, which would be pytest's.
 MEASURED = """
 import resource, subprocess, sys
 status = subprocess.run(sys.argv[1:], stdout=sys.stderr).returncode
@@ -84,7 +84,7 @@ CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "own", "arguments"),
+    ("text", "config_text", "arguments"),
     [
         ("a0: &a0 [x]\n" + BOMB + "rigs: *a11\n", CHOICE, []),
         (yaml.safe_dump(RIGHT), CHOICE, ["work=a;id"]),
@@ -93,13 +93,15 @@ CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
     ],
 )
 @pytest.mark.slow
-def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, arguments, tmp_path):
-    """In a user's own folder, where config.yaml is the user's."""
+def test_a_hostile_plan_ends_with_one_line_and_little_memory(
+    text, config_text, arguments, tmp_path
+):
+    """The user's own folder has the user's config.yaml."""
     (tmp_path / "configs/scenes").mkdir(parents=True)
     (tmp_path / "configs/scenes/hostile.yaml").write_text(text)
-    (tmp_path / "config.yaml").write_text(own)
-    words = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
-    command = [SNAKEMAKE, *words, *(["--config", *arguments] if arguments else [])]
+    (tmp_path / "config.yaml").write_text(config_text)
+    command_line = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
+    command = [SNAKEMAKE, *command_line, *(["--config", *arguments] if arguments else [])]
     run = subprocess.run(
         [sys.executable, "-c", MEASURED, *map(str, command)],
         cwd=tmp_path,
@@ -112,7 +114,7 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, argument
     header = ("host: ", "Using workflow specific profile ", "Config file ")
     assert [line for line in lines if not line.startswith(header)] == [lines[-1]]
     assert lines[-1].startswith("error: ")
-    # In KiB, but for macOS.
+    # The figure is in KiB, except on macOS.
     assert int(largest) * (1 if sys.platform == "darwin" else 1024) < 500e6
     assert not (tmp_path / "results").exists() and not (tmp_path / "work").exists()
 
@@ -125,7 +127,7 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, argument
         (None, "cannot be read as YAML"),
     ],
 )
-def test_what_is_wrong_with_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
+def test_a_fault_in_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
     folder = checkout(tmp_path)
     if text is None:
         (folder / "config.yaml").unlink()

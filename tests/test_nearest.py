@@ -1,4 +1,4 @@
-"""The nearest cameras are those that comparing every camera with every other would find."""
+"""The nearest cameras: the same as from comparing every camera with every other."""
 
 import numpy as np
 import pytest
@@ -21,27 +21,27 @@ def scattered(count, scale=1.0, seed=1):
 
 
 PLACES = {
-    # Many cameras are equally far, but for rounding.
+    # Many cameras are equally far, except for rounding.
     "a grid": GRID,
     "a turned grid": turned(GRID),
     "a grid far away": GRID + 1e5,
     "anywhere": scattered(300),
     # Six views at each place, as of a cube.
     "six at each": np.repeat(scattered(40), 6, axis=0),
-    # More at each place than are asked for.
+    # There are more at each place than a query asks for.
     "two places": np.tile([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (60, 1)),
     "clusters": np.repeat(scattered(20), 10, axis=0) + scattered(200, 1e-6, seed=2),
 }
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_no_camera_is_nearer_than_those_that_are_returned(name):
+def test_no_other_camera_is_nearer(name):
     positions, count, tie = PLACES[name], 12, 1e-6
     cameras = Cameras(positions)
     for camera, position in enumerate(positions):
         nearest = cameras.nearest(camera, count, tie)
         away = np.linalg.norm(positions - position, axis=1)
-        # By rounded distance, and of equally far ones in their order.
+        # By rounded distance. Equally far ones keep their order.
         order = np.lexsort([np.arange(len(positions)), np.round(away, 6)])
         expected = order[order != camera][:count]
         assert camera not in nearest
@@ -50,7 +50,7 @@ def test_no_camera_is_nearer_than_those_that_are_returned(name):
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_flow_leads_to_the_nearest_view_elsewhere_that_looks_most_alike(name):
+def test_flow_leads_to_the_nearest_view_elsewhere_with_the_most_similar_direction(name):
     positions = PLACES[name]
     matrices = np.tile(np.eye(4), (len(positions), 1, 1))
     matrices[:, :3, :3] = Rotation.random(len(positions), random_state=1).as_matrix()

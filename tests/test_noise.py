@@ -1,4 +1,4 @@
-"""Noise that is estimated from a picture alone, against noise and patterns that are known."""
+"""Noise estimated from a picture alone, compared with known noise and patterns."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from lightfield.measurement import noise
 
 
-def test_noise_is_measured_and_what_is_smooth_is_none():
+def test_noise_is_measured_and_smooth_light_has_none():
     random = np.random.default_rng(2)
     y, x = np.mgrid[:256, :256]
     smooth = 2.0 + 0.01 * x + 0.02 * y
@@ -22,7 +22,7 @@ def test_noise_is_measured_and_what_is_smooth_is_none():
 @pytest.mark.parametrize(
     "pattern, expected",
     [
-        # The mask passes what changes along x and along y at once, 16 times its amplitude here.
+        # The mask passes changes along x and y at once. Here they have 16 times the amplitude.
         (lambda x, y: (-1) ** (x + y), 16 / 6 / 0.6745),
         (lambda x, y: (-1) ** x, 0),
         (lambda x, y: (-1) ** y, 0),
@@ -49,7 +49,7 @@ def test_noise_is_relative_to_the_light_of_its_own_block():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_block_with_a_value_that_is_no_number_has_no_noise(bad):
+def test_a_block_with_a_value_that_is_not_a_number_has_no_noise(bad):
     light = np.ones((18, 34))
     light[4, 5] = bad
     measured = noise.relative_noise(light)
@@ -57,12 +57,12 @@ def test_a_block_with_a_value_that_is_no_number_has_no_noise(bad):
     np.testing.assert_array_equal(measured[:, 2:], 0)
 
 
-def test_only_whole_blocks_within_the_border_count():
-    # The border of one pixel has no answer, so 8 × 8 blocks need 10 × 10 pixels.
+def test_only_complete_blocks_within_the_border_count():
+    # The border of one pixel has no estimate, so 8 × 8 blocks need 10 × 10 pixels.
     assert noise.relative_noise(np.ones((10, 17))).shape == (1, 1)
     assert noise.relative_noise(np.ones((26, 18))).shape == (3, 2)
     assert np.isnan(noise.relative_noise(np.full((10, 10), -0.5))).all()
-    # Neither has a block whose light is none in the mean.
+    # A block whose mean light is 0 has none either.
     assert np.isnan(noise.relative_noise(np.zeros((10, 10)))).all()
     assert np.isnan(noise.relative_noise(np.indices((10, 10)).sum(axis=0) % 2 * 2 - 1)).all()
 
@@ -71,6 +71,6 @@ def test_the_light_of_a_block_is_that_of_its_own_pixels():
     y, x = np.mgrid[:18, :26]
     plane = 1.0 + 10 * y + 3 * x
     measured = noise.relative_noise(plane + 0.1 * (-1) ** (x + y))
-    # The border has no answer, so the first block begins at the second row and column.
+    # The border has no estimate, so the first block begins at the second row and column.
     light = plane[1:17, 1:25].reshape(2, 8, 3, 8).mean(axis=(1, 3))
     np.testing.assert_allclose(measured, 0.1 * 16 / 6 / 0.6745 / light)

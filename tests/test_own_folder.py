@@ -19,7 +19,7 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 report: {panorama: false}
 """
-# As docs/how-to/keep-your-own-folder.md has it.
+# The example of docs/how-to/keep-your-own-folder.md.
 WORKFLOW = f"""
 module plenoforge:
     snakefile: "{ROOT}/Snakefile"
@@ -48,32 +48,34 @@ def folder(tmp_path):
     return tmp_path
 
 
-def snakemake(*words, cwd="/"):
-    found = subprocess.run(
-        [Path(sys.executable).with_name("snakemake"), *words],
+def snakemake(*arguments, cwd="/"):
+    result = subprocess.run(
+        [Path(sys.executable).with_name("snakemake"), *arguments],
         cwd=cwd,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         check=False,
     )
-    return found.returncode, found.stdout
+    return result.returncode, result.stdout
 
 
 @pytest.mark.slow
 def test_scenes_poses_results_and_work_are_in_the_users_folder(folder):
     before = set(ROOT.rglob("*.json"))
     (folder / "our tools").symlink_to(ROOT)
-    own = ("--snakefile", folder / "our tools/Snakefile", "--directory", folder)
+    folder_arguments = ("--snakefile", folder / "our tools/Snakefile", "--directory", folder)
     chosen = ("--config", "scenes=mine", "preset=full")
-    code, said = snakemake(*own, "--cores", "1", "results/mine/LFOwn/lightfield.json", *chosen)
+    code, said = snakemake(
+        *folder_arguments, "--cores", "1", "results/mine/LFOwn/lightfield.json", *chosen
+    )
     assert code == 0, said
     content = json.loads((folder / "results/mine/LFOwn/lightfield.json").read_text())
     assert [frame["position"] for frame in content["frames"]] == [[0, 0, 1.3]]
     assert (folder / "work/logs/mine/LFOwn/lightfield.log").is_file()
-    # Without --cores, and chosen as there: all rigs of these scenes.
+    # Without --cores, and with the choice of that page: all rigs of these scenes.
     (folder / "config.yaml").write_text("scenes: [mine]\npreset: full\n")
-    code, said = snakemake(*own, "verify", "rig_tables")
+    code, said = snakemake(*folder_arguments, "verify", "rig_tables")
     assert code == 0, said
     assert "| mine | LFOwn |" in said
     assert "no fault in results/mine/LFOwn\n" in said
@@ -83,7 +85,7 @@ def test_scenes_poses_results_and_work_are_in_the_users_folder(folder):
 @pytest.mark.slow
 def test_as_a_module_of_the_users_own_workflow(folder):
     (folder / "Snakefile").write_text(WORKFLOW)
-    # Of the user's workflow, and no settings of Plenoforge.
+    # The module has the user's own workflow, but no settings of Plenoforge.
     (folder / "config.yaml").write_text("epochs: 3\n")
     code, said = snakemake("--cores", "2", cwd=folder)
     assert code == 0, said
@@ -93,7 +95,7 @@ def test_as_a_module_of_the_users_own_workflow(folder):
     assert "Nothing to be done" in said
     code, said = snakemake("--cores", "1", "plenoforge_verify", cwd=folder)
     assert (code, "no fault in lightfields/mine/LFOwn" in said) == (0, True), said
-    # What a failure says last is said here, too.
+    # The last message of a failure appears here too.
     (folder / "poses/mine.csv").write_text("name,x,y,z,rx,ry,rz\none,0,0,0,0,0,0\n")
     code, said = snakemake("--cores", "1", cwd=folder)
     assert code == 1

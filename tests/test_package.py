@@ -1,4 +1,4 @@
-"""Packages: the same bytes again, in parts, with a card, and whole when they are unfolded."""
+"""Packages: reproducible bytes, parts, a card, and a complete dataset when unpacked."""
 
 import json
 import os
@@ -54,21 +54,21 @@ def packed(folder, target, most=None):
     return package.pack(folder, card, target, most)
 
 
-def test_the_same_files_give_the_same_bytes_whoever_packs_them_and_when(folder, tmp_path):
-    (one,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
+def test_a_package_has_the_same_bytes_whoever_packs_it_and_when(folder, tmp_path):
+    (first_archive,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
     for path in folder.rglob("*"):
         path.chmod(0o777)
         os.utime(path, (1, 1))
     (two,) = packed(folder, tmp_path / "two" / f"{NAME}.tar")
-    assert one.read_bytes() == two.read_bytes()
-    with tarfile.open(one) as archive:
+    assert first_archive.read_bytes() == two.read_bytes()
+    with tarfile.open(first_archive) as archive:
         for entry in archive:
             assert (entry.mtime, entry.uid, entry.gid, entry.uname) == (0, 0, 0, "")
             assert entry.name.startswith(f"{NAME}/")
             assert "report" not in entry.name
 
 
-def test_parts_of_a_size_unfold_to_a_whole_dataset(folder, tmp_path):
+def test_parts_of_a_size_unpack_to_a_complete_dataset(folder, tmp_path):
     target = tmp_path / f"{NAME}.tar"
     (target.with_name(f"{NAME}.9.tar")).write_text("of an earlier package")
     other = target.with_name(f"{NAME}.b.tar")
@@ -90,7 +90,7 @@ def test_parts_of_a_size_unfold_to_a_whole_dataset(folder, tmp_path):
     assert [part["sha256"] for part in listed] == [sha256(path) for path in parts]
 
 
-def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_path):
+def test_the_card_describes_loading_and_citing(folder, tmp_path):
     (path,) = packed(folder, tmp_path / f"{NAME}.tar")
     with tarfile.open(path) as archive:
         card = json.load(archive.extractfile(f"{NAME}/card.json"))
@@ -106,10 +106,12 @@ def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_pat
         "Reconstruction('perspective/exports/colmap/sparse/0')"
     )
     assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
-    # nerfstudio's file is not for it.
-    found = {path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")}
-    assert found == {"perspective/transforms.json"}
-    assert transforms(folder) == [folder / path for path in found]
+    # This reader does not use nerfstudio's file.
+    instant_ngp_files = {
+        path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")
+    }
+    assert instant_ngp_files == {"perspective/transforms.json"}
+    assert transforms(folder) == [folder / path for path in instant_ngp_files]
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
     assert "licence of the scene | not stated" in readme
     credited = load_scene("lone_monk_original")
@@ -117,7 +119,7 @@ def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_pat
     assert again["cite"][1] == credited.credit == "Lone Monk, by Carlo Bergonzini (Monorender)"
 
 
-def test_a_folder_may_be_called_as_the_exports_are_and_must_hold_a_dataset(folder, tmp_path):
+def test_a_folder_may_have_any_name_but_must_hold_a_dataset(folder, tmp_path):
     elsewhere = tmp_path / "exports" / "smoke"
     shutil.copytree(folder, elsewhere)
     cards = [package.card(path, NAME, load_scene("smoke")) for path in (folder, elsewhere)]
@@ -131,7 +133,7 @@ def test_every_export_has_a_loader():
     assert package.LOADERS.keys() == {"exr", *Exports.model_fields}
 
 
-def test_an_export_in_a_folder_of_another_name_is_known_by_its_list(folder, tmp_path):
+def test_an_export_in_a_folder_with_another_name_is_recognised_by_its_list(folder, tmp_path):
     dataset = shutil.copytree(folder, tmp_path / "dataset")
     write_json(dataset / "perspective/exports/mine/export.json", {"format": "miv"})
     card = package.card(dataset, NAME, load_scene("smoke"))

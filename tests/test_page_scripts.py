@@ -23,7 +23,7 @@ def test_modules_share_a_scope_without_giving_a_name_twice():
 @pytest.mark.parametrize(
     "module", MODULES, ids=lambda module: f"{module.parent.name}/{module.name}"
 )
-def test_what_is_imported_is_exported(module):
+def test_every_imported_name_is_exported(module):
     for names, path in IMPORTED.findall(module.read_text("utf-8")):
         imported = (module.parent / path).read_text("utf-8")
         exported = {name for export, name in DECLARED.findall(imported) if export}
@@ -31,7 +31,7 @@ def test_what_is_imported_is_exported(module):
 
 
 def test_every_module_is_in_the_page():
-    entries = [page.TEMPLATES / "page/main.js", page.TEMPLATES / "walk/main.js"]
+    entries = [page.TEMPLATES / f"{name}/main.js" for name in ("page", "walk", "index")]
     assert {module for entry in entries for module in scripts.modules(entry)} == set(MODULES)
 
 

@@ -1,4 +1,4 @@
-"""The passes: against surfaces that are known, ray casts, and the colour that they add up to."""
+"""The passes, compared with known surfaces, ray casts, and the colour that they add up to."""
 
 import filecmp
 import json
@@ -37,7 +37,7 @@ def made(tmp_path_factory, run_program):
 
 
 def read(folder, name, view="view_0000f"):
-    """Return a pass's pixels (h, w, channels), or the colour's."""
+    """Return the pixels (h, w, channels) of a pass, or of the colour."""
     if name == "exr":
         return images.read_image(folder / "exr" / f"{view}.exr").colour
     channels = images.read_image(PASSES[name].path(folder, view)).channels
@@ -48,7 +48,7 @@ def read(folder, name, view="view_0000f"):
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_objects_are_those_of_ray_casts_under_the_same_numbers_everywhere(lens, made):
+def test_objects_are_those_of_ray_casts_with_common_numbers(lens, made):
     numbers = read_json(made / lens / "object" / "names.json")
     assert list(numbers.values()) == list(range(1, len(numbers) + 1))
     assert list(numbers) == sorted(numbers) and "a hidden one" not in numbers
@@ -58,17 +58,17 @@ def test_objects_are_those_of_ray_casts_under_the_same_numbers_everywhere(lens, 
     expected = np.vectorize(lambda name: numbers.get(name, 0))(cast)
     np.testing.assert_array_equal(read(made / lens, "object")[..., 0], expected)
     materials = read_json(made / lens / "material" / "names.json")
-    found = read(made / lens, "material")[..., 0]
+    material_numbers = read(made / lens, "material")[..., 0]
     painted = {"floor": "grey", "wall": "red", "ball": "glass", "twin": "glow"}
-    for thing, surface in painted.items():
-        assert set(found[cast == thing]) == {materials[surface]}
+    for object_name, surface in painted.items():
+        assert set(material_numbers[cast == object_name]) == {materials[surface]}
 
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_normals_are_those_of_the_planes_in_world_space(lens, made):
     cast, normal = np.load(made / "objects.npz")[lens], read(made / lens, "normal")
-    for thing, known in {"floor": (0, 0, 1), "wall": (0, -1, 0)}.items():
-        angle = np.linalg.norm(normal[cast == thing] - known, axis=-1)
+    for object_name, expected_normal in {"floor": (0, 0, 1), "wall": (0, -1, 0)}.items():
+        angle = np.linalg.norm(normal[cast == object_name] - expected_normal, axis=-1)
         assert angle.max() < 1e-5
     lengths = np.linalg.norm(normal, axis=-1)
     np.testing.assert_allclose(lengths[cast != ""], 1, atol=1e-5)
@@ -76,20 +76,20 @@ def test_normals_are_those_of_the_planes_in_world_space(lens, made):
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_motion_is_where_the_lens_sees_the_wall_before_and_after(lens, made):
+def test_motion_is_the_walls_movement_through_the_lens(lens, made):
     content = LightField.read(made / lens / "lightfield.json")
     cast, motion = np.load(made / "objects.npz")[lens], read(made / lens, "motion")
     view, on_wall = content.views[0], cast == "wall"
     rays = content.lens.pixel_rays()[on_wall] @ view.matrix[:3, :3].T
     points = rays * ((WALL[1][1] - view.position[1]) / rays[:, 1:2])
-    for frame, found in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
+    for frame, wall_motion in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
         moved = points + np.subtract(WALL[frame], WALL[1])
         truth = content.lens.pixels(moved @ view.matrix[:3, :3])
         truth -= content.lens.pixels(points @ view.matrix[:3, :3])
         if lens == "panorama":
             truth[:, 0] -= 2 * SIZE * np.rint(truth[:, 0] / (2 * SIZE))
         assert np.abs(truth).max() > 0.3
-        np.testing.assert_allclose(found, truth, atol=1e-3)
+        np.testing.assert_allclose(wall_motion, truth, atol=1e-3)
     assert not motion[~on_wall].any()
 
 
@@ -100,24 +100,24 @@ def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
     assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
 
 
-def test_light_beyond_what_halves_hold_is_clamped_and_counted():
+def test_light_beyond_the_half_limit_is_clamped_and_counted():
     colour = np.array([[[70_000, -70_000, 65_504], [1, -1, 0]]], np.float32)
     channels, attributes = shard.colour_channels(colour)
     assert attributes[images.CLAMPED_ATTRIBUTE] == 2
     assert [channels[name][0, 0] for name in "RGB"] == [65_504, -65_504, 65_504]
 
 
-def test_what_is_not_a_number_is_counted_and_becomes_0():
+def test_values_that_are_not_numbers_are_counted_and_become_0():
     wrong = np.array([[[np.nan, np.nan, np.nan], [0, 0, 1]]], np.float32)
     lens = lenses.from_camera(LENSES["panorama"])
     for name in ("normal", "diffuse_light"):
-        found = SimpleNamespace(normal=wrong, passes={name: wrong})
-        channels, attributes = shard.pass_channels(PASSES[name], found, found, lens)
+        geometry = SimpleNamespace(normal=wrong, passes={name: wrong})
+        channels, attributes = shard.pass_channels(PASSES[name], geometry, geometry, lens)
         assert attributes[images.NAN_ATTRIBUTE] == 3
         assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
 
 
-# The same whatever the process, the machine, and the version of Blender.
+# They are the same on any process, machine and version of Blender.
 INSTANCES = {
     "bare": 2,
     "floor": 4,
@@ -135,7 +135,7 @@ INSTANCES = {
 
 
 @pytest.mark.parametrize("lens", ["fisheye", "perspective"])
-def test_instances_are_apart_also_behind_what_is_cut_out(lens, made):
+def test_instances_are_told_apart_behind_invisible_surfaces(lens, made):
     folder = made / f"instances_{lens}"
     assert read_json(folder / "instance" / "names.json") == INSTANCES
     cast = np.load(made / f"instances_{lens}.npy")
@@ -145,14 +145,14 @@ def test_instances_are_apart_also_behind_what_is_cut_out(lens, made):
     np.testing.assert_array_equal(read(folder, "instance")[..., 0], expected)
 
 
-def test_instances_are_nothing_to_the_colour(made):
+def test_instances_do_not_change_the_colour(made):
     colour, plain = (read(made / f"instances_{name}", "exr") for name in ("perspective", "plain"))
     np.testing.assert_array_equal(colour, plain)
 
 
 @pytest.mark.parametrize("lens", ["fisheye", "perspective"])
-def test_a_bump_has_no_normal_at_the_rim_of_an_image_circle_and_validation_says_so(lens, made):
-    """Cycles bumps by the rays of the neighbouring pixels, of which some see nothing there."""
+def test_bumps_have_no_normal_at_the_rim_and_validation_warns(lens, made):
+    """Cycles computes bumps from neighbouring pixels' rays, and some of these see nothing there."""
     folder = made / f"instances_{lens}"
     hit = read(folder, "instance")[..., 0] > 0
     lost = hit & ~read(folder, "normal").any(axis=-1)
@@ -167,25 +167,25 @@ def test_a_bump_has_no_normal_at_the_rim_of_an_image_circle_and_validation_says_
 
 
 @pytest.mark.parametrize("eye", [0, 1])
-def test_the_eyes_of_an_omnidirectional_pair_go_round_their_place(eye, made):
-    """Cycles' rays start where those of Ishiguro et al. 1992 do, on a circle that they touch."""
+def test_the_eyes_of_an_omnidirectional_pair_circle_their_centre(eye, made):
+    """The rays start on a circle that they touch, as in Ishiguro et al. 1992."""
     view = f"view_0000f_{('left', 'right')[eye]}"
     numbers, casts = read_json(made / "eyes/object/names.json"), np.load(made / "objects.npz")
     expected = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {eye}"])
-    found = read(made / "eyes", "object", view)[..., 0]
-    assert (found == expected).mean() > 0.998
+    numbers_in_pass = read(made / "eyes", "object", view)[..., 0]
+    assert (numbers_in_pass == expected).mean() > 0.998
     centre = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {1 - eye}"])
-    assert (found == centre).mean() < 0.97
+    assert (numbers_in_pass == centre).mean() < 0.97
     assert "Z" not in images.read_header(made / f"eyes/exr/{view}.exr").channels
 
 
 def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path, run_program):
     source = made / "eyes"
-    words = ("--input-cfg", source / "lightfield.json")
+    arguments = ("--input-cfg", source / "lightfield.json")
     folders = ("--input-dir", source / "exr", "--output-dir", tmp_path)
     for program in (
-        ("reproject.py", *words, *folders, "--png", "--rectilinear", "18,36"),
-        ("export_instant_ngp.py", *words, "--output", tmp_path / "transforms.json"),
+        ("reproject.py", *arguments, *folders, "--png", "--rectilinear", "18,36"),
+        ("export_instant_ngp.py", *arguments, "--output", tmp_path / "transforms.json"),
     ):
         refused = run_program(*program, check=False)
         assert refused.returncode == 1
@@ -196,7 +196,7 @@ def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path,
 
 
 def mattes(folder):
-    """Return the part (h, w) that each object covers of each pixel, by name."""
+    """Return the part (h, w) of each pixel that each object covers, by the object's name."""
     channels = read(folder, "cryptomatte")
     header = images.read_header(PASSES["cryptomatte"].path(folder, "view_0000f")).attributes
     manifest = json.loads(header["cryptomatte/3ae39a5/manifest"])
@@ -213,35 +213,35 @@ def seen_by_fisheye(made):
 
 
 def in_fog(folder):
-    """Return the pixels in which a path may have met the fog."""
+    """Return the pixels (h, w) in which a path may have met the fog."""
     return binary_dilation(read(folder, "volume_light").any(axis=-1), iterations=2)
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_a_matte_is_the_part_of_the_samples_that_saw_the_object(lens, made):
-    found, cast = mattes(made / lens), np.load(made / "objects.npz")[lens]
+def test_a_matte_is_the_part_of_samples_that_hit_the_object(lens, made):
+    part_of, cast = mattes(made / lens), np.load(made / "objects.npz")[lens]
     clear = ~in_fog(made / lens)
     for name in ("floor", "wall", "ball", "metal"):
-        samples = found[name][clear] * RENDER["samples"]
+        samples = part_of[name][clear] * RENDER["samples"]
         np.testing.assert_allclose(samples, np.rint(samples), atol=1e-5)
-        # Where it also is all around there is nothing else in the pixel.
+        # Inside the object, the pixel shows nothing else.
         inside = clear & binary_erosion(cast == name, np.ones((5, 5)))
-        assert (found[name][inside] == 1).all()
-        assert found[name][cast == name].mean() > 0.7
-    covered = sum(found.values())
+        assert (part_of[name][inside] == 1).all()
+        assert part_of[name][cast == name].mean() > 0.7
+    covered = sum(part_of.values())
     np.testing.assert_array_less(covered[clear], 1 + 1e-6)
-    edges = (found["wall"] > 0) & (found["wall"] < 1) & clear
+    edges = (part_of["wall"] > 0) & (part_of["wall"] < 1) & clear
     assert edges.sum() > 20
 
 
-def test_alpha_is_what_mattes_cover_and_other_programs_read_them(made):
+def test_alpha_is_the_sum_of_the_mattes_and_other_programs_read_them(made):
     alpha = images.read_image(made / "transparent/exr/view_0000f.exr").channels["A"]
-    found = mattes(made / "transparent")
-    # Of glass, too, alpha is less; and Cycles calls opaque what the lens does not see.
-    solid = binary_erosion(seen_by_fisheye(made), iterations=2) & (found["ball"] == 0)
+    part_of = mattes(made / "transparent")
+    # Glass has less alpha. Outside the image circle, Cycles' alpha is opaque.
+    solid = binary_erosion(seen_by_fisheye(made), iterations=2) & (part_of["ball"] == 0)
     solid &= ~in_fog(made / "transparent")
-    np.testing.assert_allclose(sum(found.values())[solid], alpha[solid], atol=1e-3)
-    # Blender's compositor, by the hash of the name.
+    np.testing.assert_allclose(sum(part_of.values())[solid], alpha[solid], atol=1e-3)
+    # Blender's compositor finds the object by the hash of its name.
     read_there = images.read_image(made / "matte.exr", ["R"]).channels["R"]
     wall = mattes(made / "perspective")["wall"]
     np.testing.assert_array_equal(read_there, wall)
@@ -257,7 +257,7 @@ def test_the_parts_of_light_add_up_to_the_colour(lens, made):
     assert parts["volume_light"].max() > 0.01
     assert parts["emission"][cast == "twin"].mean() > 0.3
     assert np.median(parts["environment"][cast == "wall"]) == 0
-    # Seven values are rounded to a half's 11 bits, none of the parts greater than the colour.
+    # Seven values are rounded to a half's 11 bits. No part is greater than the colour.
     colour = read(made / lens, "exr")
     np.testing.assert_allclose(sum(parts.values()), colour, rtol=2**-10, atol=1e-6)
     red = read(made / lens, "albedo")[cast == "wall"]
@@ -267,21 +267,21 @@ def test_the_parts_of_light_add_up_to_the_colour(lens, made):
 @pytest.mark.parametrize("view", ["view_0000f", "view_0001f"])
 def test_geometry_is_the_same_beside_a_denoised_colour(view, made):
     for name in ("normal", "object", "material"):
-        found = read(made / "denoised", name, view)
-        np.testing.assert_array_equal(found, read(made / "perspective", name, view))
+        denoised = read(made / "denoised", name, view)
+        np.testing.assert_array_equal(denoised, read(made / "perspective", name, view))
 
 
 def test_colour_and_depth_are_the_same_without_passes(made):
-    one, other = (
+    plain, with_passes = (
         images.read_image(made / name / "exr" / "view_0000f.exr").channels
         for name in ("perspective", "plain")
     )
     for channel in "RGBZ":
-        np.testing.assert_array_equal(one[channel], other[channel])
+        np.testing.assert_array_equal(plain[channel], with_passes[channel])
     assert {path.name for path in (made / "plain").iterdir()} == {"exr", "lightfield.json"}
 
 
-def test_a_transparent_view_has_alpha_where_another_has_the_world(made):
+def test_transparent_views_have_alpha_in_place_of_the_world(made):
     image = images.read_image(made / "transparent" / "exr" / "view_0000f.exr")
     alpha, opaque = image.channels["A"], read(made / "fisheye", "exr")
     assert alpha.dtype == np.float16
@@ -290,14 +290,14 @@ def test_a_transparent_view_has_alpha_where_another_has_the_world(made):
     assert not alpha[~seen].any() and np.median(alpha[cast == "wall"]) == 1
     assert np.median(alpha[seen & (cast == "")]) == 0
     assert ((alpha > 0) & (alpha < 1)).sum() > 20
-    # Associated: over the world it is the opaque view.
+    # Alpha is associated: composited over the world, it is the opaque view.
     parts = {name: read(made / "transparent", name).astype(np.float64) for name in PARTS_OF_LIGHT}
     world = parts.pop("environment")
     np.testing.assert_allclose(image.colour + world, opaque, rtol=2**-9, atol=1e-6)
     np.testing.assert_allclose(sum(parts.values()), image.colour, rtol=2**-10, atol=1e-6)
 
 
-def test_a_view_is_finished_when_all_of_its_files_are(made):
+def test_a_view_without_one_of_its_files_is_rendered_again(made):
     lines = map(json.loads, (made / "perspective.jsonl").read_text().splitlines())
     rendered = [line["view"] for line in lines if "view" in line]
     assert rendered == ["view_0000f", "view_0001f", "view_0001f"]
@@ -309,7 +309,7 @@ def test_a_view_is_finished_when_all_of_its_files_are(made):
 
 
 def shard_command(made, folder, views, threads):
-    """Return the command that renders the views of the scene with everything, as a job has it."""
+    """Return the command that renders the views of the scene with everything, as a job does."""
     return [
         *(sys.executable, SCRIPTS / "render_shard.py", "--blend", made / "everything.blend"),
         *("--lightfield", made / "perspective/lightfield.json", "--views", views),
@@ -318,7 +318,7 @@ def shard_command(made, folder, views, threads):
     ]
 
 
-def test_a_shard_that_is_killed_goes_on_and_threads_and_shards_change_no_byte(made, tmp_path):
+def test_kills_threads_and_shards_change_no_byte(made, tmp_path):
     killed, parts = tmp_path / "killed", tmp_path / "parts"
     process = subprocess.Popen(shard_command(made, killed, ":", 1), stderr=subprocess.DEVNULL)
     while not (killed / "dataset/environment/view_0000f.exr").exists():
@@ -366,7 +366,7 @@ SPOILED = {
         "albedo/view_0001f.exr: is missing",
     ),
     "ids": (spoil_ids, "object/view_0000f.exr: has [99], which object/names.json does not have"),
-    "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are no unit vectors"),
+    "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are not unit vectors"),
     "light": (spoil_light, "emission/view_0001f.exr: 3072 values are not finite"),
     "matte": (
         spoil_matte,
@@ -380,7 +380,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("what", SPOILED)
-def test_validation_knows_what_a_pass_must_hold(what, made, tmp_path):
+def test_validation_checks_each_pass(what, made, tmp_path):
     folder = tmp_path / "perspective"
     shutil.copytree(made / "perspective", folder)
     spoil, problem = SPOILED[what]
@@ -397,8 +397,8 @@ def test_validation_knows_what_a_pass_must_hold(what, made, tmp_path):
         }
 
 
-def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp_path, run_program):
-    """A perspective view made of the fisheye's, against the one that was rendered."""
+def test_reprojected_passes_keep_their_meaning(made, tmp_path, run_program):
+    """A perspective view reprojected from the fisheye's, compared with the rendered one."""
     names = [name for name in PASSES if name != "motion"]
     source, target = made / "fisheye", tmp_path / "perspective"
     settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
@@ -410,26 +410,26 @@ def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp
         *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
     )
     content = LightField.read(target / "lightfield.json")
-    assert [found.name for found in content.passes] == names
+    assert [render_pass.name for render_pass in content.passes] == names
     files = read_json(tmp_path / "record.json")["files"]
     assert len(files) == 2 * (1 + len(names))
     assert "perspective/normal/view_0000f.exr" in files
     numbers = read_json(source / "object" / "names.json")
     ids, truth = (read(folder, "object")[..., 0] for folder in (target, made / "perspective"))
     assert set(np.unique(ids)) <= set(np.unique(read(source, "object")))
-    # A source pixel is three of these wide, and where it has an edge they differ.
+    # A source pixel is three of these wide. At its edges they differ.
     assert (ids == truth).mean() > 0.85
     matte, original = (read(folder, "cryptomatte") for folder in (target, source))
     pairs = {tuple(pair) for pair in original.reshape(-1, 12)[:, :2].tolist()}
     assert {tuple(pair) for pair in matte.reshape(-1, 12)[:, :2].tolist()} - pairs == set()
     assert mattes(target)["wall"][truth == numbers["wall"]].mean() > 0.9
-    normal, known = read(target, "normal"), read(made / "perspective", "normal")
+    normal, expected_normal = read(target, "normal"), read(made / "perspective", "normal")
     np.testing.assert_allclose(np.linalg.norm(normal, axis=-1)[truth > 0], 1, atol=1e-5)
-    cosine = np.sum(normal * known, axis=-1)
+    cosine = np.sum(normal * expected_normal, axis=-1)
     assert np.median(cosine[truth > 0]) > 1 - 1e-6
     total = sum(read(target, name).astype(np.float64) for name in PARTS_OF_LIGHT)
-    # Filters with negative lobes keep each part from becoming negative, and so the sum is another.
-    # All values are rounded before and after.
+    # The bilinear filter has no negative lobes, which would change the sum of clamped parts. All
+    # values are rounded before and after.
     colour = images.read_image(target / "view_0000f.exr").colour
     np.testing.assert_allclose(total, colour, rtol=2**-9, atol=1e-6)
 
@@ -459,7 +459,7 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
         ),
     ],
 )
-def test_what_needs_a_centre_goes_without_an_omnidirectional_pair(lens, more, problem):
+def test_omnidirectional_pairs_refuse_settings_that_need_a_centre(lens, more, problem):
     rig = {"type": "lattice", "cameras": [1, 1, 1], "camera": LENSES[lens], **EYES}
     content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": {"one": rig}}
     with pytest.raises(ValueError, match=re.escape(problem)):
@@ -489,12 +489,12 @@ def scene(**render):
         ({"passes": ["motion"], "again": ["motion"]}, "other.passes: motion is in pixels of"),
     ],
 )
-def test_passes_that_cannot_be_are_refused(wrong, problem):
+def test_impossible_passes_are_refused(wrong, problem):
     with pytest.raises(ValueError, match=problem):
         Scene.model_validate(scene(**wrong))
 
 
-def test_passes_keep_the_tables_order_and_what_asks_for_none_is_as_before():
+def test_passes_keep_the_tables_order_and_their_absence_changes_nothing():
     content = Scene.model_validate(scene(passes=["emission", "normal"], again=["normal"]))
     assert content.render.passes == ["normal", "emission"]
     assert content.reprojections["other"].settings.passes == ["normal"]

@@ -1,4 +1,4 @@
-"""What is told before anything is rendered: the number of views, time and disk space."""
+"""The plan before anything is rendered: the number of views, time and disk space."""
 
 import json
 import re
@@ -21,7 +21,7 @@ from lightfield.rendering import probe as probing
 SILVR = ("garden", "lone_monk", "barbershop")
 
 
-def test_the_rigs_are_those_that_silvr_published():
+def test_the_rigs_are_silvrs_published_ones():
     counts = {
         (dataset.scene_folder, dataset.rig_folder): (
             dataset.view_count,
@@ -52,7 +52,7 @@ def test_the_rigs_are_those_that_silvr_published():
 
 
 @pytest.mark.parametrize("scene", SILVR)
-def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
+def test_a_spheres_name_has_its_elevation_and_diameter_in_centimetres(scene):
     spheres = [d for d in scene_datasets(scene) if "LFSphere" in d.rig_name]
     assert len(spheres) == 2
     for dataset in spheres:
@@ -66,9 +66,9 @@ def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
 
 @pytest.fixture
 def sphere(tmp_path):
-    """The garden's sphere of 642 views at full size, 6442 s each until a probe says otherwise."""
-    (found,) = (d for d in scene_datasets("garden") if d.rig_name == "LFSphere_e100cm_d170cm")
-    return replace(found, work_root=str(tmp_path))
+    """The garden's sphere of 642 views at full size, with 6442 s each unless a probe tells more."""
+    (dataset,) = (d for d in scene_datasets("garden") if d.rig_name == "LFSphere_e100cm_d170cm")
+    return replace(dataset, work_root=str(tmp_path))
 
 
 def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
@@ -76,22 +76,22 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
         return len(replace(sphere, **settings).shards)
 
     assert count() == 64
-    # Jobs of 16 cores for 20 minutes: three of them render a view.
+    # Jobs of 16 cores run for 20 minutes: three of them render a view.
     assert count(cluster=Cluster(jobs=100, cores=16)) == 216
     assert count(cluster=Cluster(jobs=300, cores=16)) == 300
     assert count(cluster=Cluster(jobs=100, cores=1)) == 642
-    # Jobs of 1000 cores would do with fewer than 100, but 100 run at once.
+    # Jobs of 1000 cores would need fewer than 100, but 100 run at once.
     assert count(cluster=Cluster(jobs=100, cores=1000)) == 100
     probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
     write_json(
         Path(sphere.work, "probe.json"), probe | {"view_seconds": [6.0], "view_bytes": [1e7]}
     )
-    # Ten views are the shortest for which start-up is a small part.
+    # Ten views are the fewest for which the start is a small part.
     assert count(cluster=Cluster(jobs=100, cores=16)) == 65
     assert count(cluster=Cluster(jobs=50, cores=16)) == 64
 
 
-def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
+def test_a_dataset_in_progress_keeps_its_shards(sphere):
     shard_counts.note(sphere.work_root, {sphere.name: (642, 400), "other/rig": (10, 3)})
     begun = replace(sphere, cluster=Cluster(jobs=100, cores=1000))
     assert len(begun.shards) == 400
@@ -100,7 +100,7 @@ def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
     shard_counts.note(sphere.work_root, {sphere.name: (641, 400)})
     assert len(replace(begun).shards) == 100
     notes = Path(sphere.work_root, shard_counts.NAME)
-    # Another digit at the same size, and what is no JSON.
+    # One digit differs at the same size, and one file is not JSON.
     for damaged in (notes.read_text().replace("641", "642"), "{"):
         notes.write_text(damaged)
         assert len(replace(begun).shards) == 100
@@ -109,23 +109,23 @@ def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
 
 
 @pytest.mark.slow
-def test_what_a_cluster_has_begun_goes_on_with_the_same_shards_wherever_it_is_planned(tmp_path):
+def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     folder = checkout(tmp_path)
-    words = ("--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
+    arguments = ("--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
     cluster = ("--executor", "cluster-generic", "--cluster-generic-submit-cmd", "sh")
     # One core each for 20 minutes is less than a view takes.
-    assert planned(folder, "--jobs", "100", *cluster, *words)["render"] == 642
+    assert planned(folder, "--jobs", "100", *cluster, *arguments)["render"] == 642
     shard_counts.note(str(folder / "work"), {"garden/LFSphere_e100cm_d170cm": (642, 300)})
-    assert planned(folder, *words)["render"] == 300
+    assert planned(folder, *arguments)["render"] == 300
 
 
-def test_the_table_adds_up_what_the_probes_measured():
+def test_the_table_adds_up_the_probes_measurements():
     fisheye = {"resolution": [2048, 2048], "samples": 256, "device": "CPU"}
     fisheye |= {"views": 100, "view_seconds": [30.0, 36.0, 42.0], "view_bytes": [1e7, 1.2e7]}
     panoramas = fisheye | {"views": 8, "resolution": [4096, 2048], "view_seconds": [90.0]}
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
     text = plan.table(datasets, {})
-    # 300 views of 36 ± 12/√12 s are 3 h, and of 11 MB 3.3 GB.
+    # 300 views of 36 ± 12/√12 s take 3 h, and of 11 MB 3.3 GB.
     assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h | — | — | 3.3 GB |" in text
     assert (
         "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 12 min | — | — | 88 MB |"
@@ -139,25 +139,27 @@ def test_the_table_adds_up_what_the_probes_measured():
     )
 
 
-def test_denoised_and_calibrated_times_stand_beside_the_plain_ones():
-    """Path tracing has 1 / N, denoised renders half of it at once, and cost three samples more."""
+def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
+    """Path tracing has the error 1 / N. Denoised renders have half, and cost three samples more."""
     unchanged = {
-        way: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
-        for way, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
+        method: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
+        for method, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
     }
     advice = {"own": {"samples": 256, "denoise": False}, "unchanged": unchanged}
     denoised, calibrated = plan.cheaper_parts(256, advice)
     assert denoised == pytest.approx((128 + 3) / 256)
     assert calibrated == pytest.approx((50 + 3) / 256)
-    # A denoiser's error that hardly falls is never as small as that of plain path tracing.
+    # A denoiser's error that hardly falls never reaches that of plain path tracing.
     biased = [
         {**point, "error": 0.1 * point["samples"] ** -0.001} for point in unchanged["denoised"]
     ]
     biased_advice = advice | {"unchanged": unchanged | {"denoised": biased}}
     assert plan.cheaper_parts(256, biased_advice) == (None, pytest.approx(100 / 256))
-    # Without noise, or without a time, nothing can be said.
+    # Without noise, or without a time, no estimate is possible.
     for figures in ({"error": 0.0}, {"seconds": 0.0}):
-        still = {way: [point | figures for point in points] for way, points in unchanged.items()}
+        still = {
+            method: [point | figures for point in points] for method, points in unchanged.items()
+        }
         assert plan.cheaper_parts(256, advice | {"unchanged": still}) == (None, None)
     assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
     probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
@@ -166,7 +168,7 @@ def test_denoised_and_calibrated_times_stand_beside_the_plain_ones():
     assert "| 100 h | 51 h | 21 h | 100 GB |" in text
 
 
-def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
+def test_a_probe_estimates_the_size_of_the_views(run_program, room, tmp_path):
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [128, 128]})
     rig = {"type": "sphere", "subdivisions": 1, "center": [0, 0, 1.5]}
     render = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
@@ -183,9 +185,9 @@ def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
     run_program("render_shard.py", *shared, "--output", tmp_path / "exr", "--threads", "1")
     sizes = [path.stat().st_size for path in (tmp_path / "exr").glob("*.exr")]
     foretold = sum(probe["view_bytes"]) / 3
-    # An upper estimate: small views compress worse.
+    # This is an upper estimate: small views compress worse.
     assert 1 <= foretold / (sum(sizes) / 12) < 1.4
-    # It follows what is asked for.
+    # It follows the requested size.
     other = render | {"depth_precision": "half"}
     LightField.from_rig(rig, lens, depth="z", frame=1, render=other).write(lightfield)
     run_program("probe.py", *shared, "--size", "64", "--output", tmp_path / "probe.json")
@@ -193,7 +195,7 @@ def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
     assert sum(smaller["view_bytes"]) / 3 < 0.9 * foretold
 
 
-def test_a_rig_of_one_view_is_probed_by_that(tmp_path, monkeypatch):
+def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
     def render(probes, views, folder, journal, **_):
         folder.mkdir()
         log = Journal(journal)
@@ -208,6 +210,6 @@ def test_a_rig_of_one_view_is_probed_by_that(tmp_path, monkeypatch):
     lightfield = LightField.from_rig(
         {"type": "plane", "cameras": [1, 1]}, lens, render={"samples": 4}
     )
-    found = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
-    assert (found["view_seconds"], found["view_bytes"]) == ([8.0], [16.0])
-    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, found)], {})
+    probe = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
+    assert (probe["view_seconds"], probe["view_bytes"]) == ([8.0], [16.0])
+    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, probe)], {})

@@ -1,4 +1,4 @@
-"""A library sees fewer processors while it is imported; the process uses all of its own later."""
+"""A library sees fewer processors during its import. Later the process uses all of its own."""
 
 import os
 import threading
@@ -16,14 +16,16 @@ def test_every_thread_may_use_all_processors_again():
         assert processors.available() == 1
         thread = threading.Thread(target=done.wait)
         thread.start()
-    found = [os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()]
+    processors_of_threads = [
+        os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()
+    ]
     done.set()
     thread.join()
-    assert all(affinity == allowed for affinity in found)
+    assert all(affinity == allowed for affinity in processors_of_threads)
     assert processors.available() == len(allowed)
 
 
-def test_more_than_there_are_is_all_of_them():
+def test_more_processors_than_exist_means_all():
     allowed = os.sched_getaffinity(0)
     with processors.only(10**6):
         assert os.sched_getaffinity(0) == allowed
@@ -45,7 +47,7 @@ with processors.only(1):
 """
 
 
-def test_a_system_that_lets_nobody_choose_processors_uses_all(run_program, tmp_path):
+def test_a_system_without_processor_affinity_uses_all(run_program, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(WITHOUT_AFFINITY)
     assert int(run_program(program).stdout) == os.cpu_count()

@@ -1,4 +1,4 @@
-"""The cluster profiles: what each job asks a cluster for, planned by Snakemake itself."""
+"""The cluster profiles: the resources that each job requests, planned by Snakemake itself."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from checkouts import ROOT, snakemake
 
 STATUS = ROOT / "profiles/cluster-generic/status.sh"
 PROFILES = ["slurm", "cluster-generic"]
-# The rules whose jobs go to the cluster; all others are a matter of seconds.
+# The rules whose jobs go to the cluster. All others take seconds.
 SUBMITTED = {
     "build_scene",
     "check_cameras",
@@ -32,7 +32,7 @@ def settings(profile):
 
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
-    """Return a function that plans the smoke build and returns its jobs, by profile and device."""
+    """Return a function that plans the smoke build, by profile and device. It returns the jobs."""
 
     @cache
     def plan(profile, device):
@@ -46,7 +46,7 @@ def planned(tmp_path_factory):
                 *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
             ],
             cwd=ROOT,
-            # Where Snakemake finds the logger plugin.
+            # Snakemake finds the logger plugin here.
             env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
             capture_output=True,
             text=True,
@@ -58,7 +58,7 @@ def planned(tmp_path_factory):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_every_job_says_what_it_needs(planned, profile):
+def test_every_job_declares_its_resources(planned, profile):
     jobs = planned(profile, "cpu")
     assert {job["rule"] for job in jobs} >= SUBMITTED
     for job in jobs:
@@ -68,13 +68,13 @@ def test_every_job_says_what_it_needs(planned, profile):
         assert job["gpu"] == 0, job
 
 
-def test_renders_take_every_cpu_that_a_job_may_have(planned):
+def test_renders_take_every_cpu_of_a_job(planned):
     for job in planned("slurm", "cpu"):
         if job["rule"] in ("render", "render_panorama"):
             assert job["cpus"] == settings("slurm")["cores"]
 
 
-def test_renders_alone_ask_for_a_gpu_where_the_device_is_one(planned):
+def test_only_renders_request_a_gpu_and_only_for_a_gpu_device(planned):
     gpus = {(job["rule"], job["gpu"]) for job in planned("slurm", "optix")}
     assert {rule for rule, count in gpus if count} == {"render", "render_panorama"}
     assert max(count for _, count in gpus) == 1
@@ -86,14 +86,14 @@ def test_a_profile_names_rules_that_exist(planned, profile):
     assert {*settings(profile)["groups"], *settings(profile)["set-threads"]} <= rules
 
 
-def test_the_profiles_differ_in_their_executor_alone():
+def test_the_profiles_differ_only_in_their_executor():
     slurm, generic = (settings(profile) for profile in PROFILES)
     shared = slurm.keys() & generic.keys() - {"executor"}
     assert {"jobs", "cores", "retries", "default-resources", "groups"} <= shared
     assert {key: slurm[key] for key in shared} == {key: generic[key] for key in shared}
 
 
-def test_on_kubernetes_pods_see_one_volume_and_a_gpu_only_where_it_is_asked_for():
+def test_kubernetes_pods_share_a_volume_and_request_a_gpu_on_demand():
     kubernetes, slurm = settings("kubernetes"), settings("slurm")
     shared = {key for key in kubernetes.keys() & slurm.keys() if "default" not in key}
     assert {key: kubernetes[key] for key in shared - {"executor"}} == {
@@ -101,11 +101,11 @@ def test_on_kubernetes_pods_see_one_volume_and_a_gpu_only_where_it_is_asked_for(
     }
     _, mounted = kubernetes["kubernetes-persistent-volumes"].split(":")
     assert kubernetes["default-storage-prefix"] == mounted
-    # The executor asks for the number that is given, and no node has 0 of what it does not have.
+    # The executor requests the given number, and no node offers 0 of an unknown resource.
     assert kubernetes["default-resources"].keys() == slurm["default-resources"].keys() - {"gpu"}
 
 
-def test_the_submit_command_asks_for_all_four_resources():
+def test_the_submit_command_requests_all_four_resources():
     command = settings("cluster-generic")["cluster-generic-submit-cmd"]
     for part in ("{threads}", "{resources.mem_mb}M", "{resources.runtime}", "{resources.gpu}"):
         assert part in command

@@ -1,6 +1,6 @@
-"""Every file knows what it was made from: what changes is planned again without Snakemake's notes.
+"""Every file knows its inputs: a change is planned again without Snakemake's own metadata.
 
-Snakemake's own notes lie in .snakemake, which a fresh clone beside an old build lacks.
+That metadata lies in .snakemake. A fresh clone beside an old build does not have it.
 """
 
 import csv
@@ -20,14 +20,14 @@ CUBOID = "LFCuboid_1x1x1"
 
 @pytest.fixture(scope="module")
 def built(smoke, tmp_path_factory):
-    """A fresh clone beside the old folders of results and work."""
+    """A fresh clone with the old folders of results and work."""
     return copy_of(smoke, tmp_path_factory.mktemp("provenance"))
 
 
 def copy_of(built, parent):
     folder = checkout(parent / "plenoforge")
     for name in ("results", "work"):
-        # With its times.
+        # The copy keeps the files' times.
         shutil.copytree(built / name, folder / name)
     return folder
 
@@ -63,8 +63,8 @@ def test_a_fresh_clone_beside_an_old_build_has_nothing_to_do(built):
     assert "Nothing to be done" in result.stdout + result.stderr
 
 
-def test_views_of_an_old_scene_are_not_taken_for_those_of_a_new_one(folder):
-    """A real run: another colour of the sphere is another picture."""
+def test_views_of_an_old_scene_are_rendered_again_for_a_new_one(folder):
+    """A real run: another colour of the sphere makes another picture."""
     record = f"work/smoke/{CUBOID}/render/0-6.json"
     view = "exr/view_r0000f.exr"
     before = json.loads((folder / record).read_text())["files"][view]
@@ -76,7 +76,7 @@ def test_views_of_an_old_scene_are_not_taken_for_those_of_a_new_one(folder):
     assert before != json.loads((folder / record).read_text())["files"][view]
     again = snakemake(folder, "--dry-run", record)
     assert "Nothing to be done" in again.stdout + again.stderr
-    # What is published follows.
+    # The published files follow.
     assert {"reproject", "validate", "checksums"} <= planned(folder, "smoke").keys()
 
 
@@ -90,7 +90,7 @@ def test_a_plan_between_two_builds_hides_no_change(folder):
     assert planned(folder, "smoke").keys() >= VIEWS
 
 
-def test_what_the_ledger_lacks_is_made_again(folder):
+def test_files_missing_from_the_ledger_are_made_again(folder):
     path = folder / "work/ledger.txt"
     lines = path.read_text().splitlines(keepends=True)
     kept = [
@@ -102,7 +102,7 @@ def test_what_the_ledger_lacks_is_made_again(folder):
 
 
 def test_the_ledger_has_every_file_that_a_job_reads(smoke):
-    """What an input is not noted of may change unseen, as that of one that is ``ancient``."""
+    """An input without a note could change unnoticed, like an ``ancient`` one."""
     summary = snakemake(smoke, "--detailed-summary", "--", "smoke").stdout.splitlines()
     read_by_snakemake = {
         row["output_file"]: set(row["input-file(s)"].split(","))
@@ -121,7 +121,7 @@ def test_the_ledger_has_every_file_that_a_job_reads(smoke):
 
 
 def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
-    """Two builds beside each other: an export that was made while its light field was replaced."""
+    """Two builds run beside each other: an export is made while its light field is replaced."""
     folder = copy_of(smoke, tmp_path)
     path = folder / "work/ledger.txt"
     lines = path.read_text().splitlines()
@@ -137,8 +137,8 @@ def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
     assert "export" in planned(folder, "smoke")
 
 
-def test_damage_gets_no_checksum_of_its_own(folder):
-    """A digit that changes after the plan, at the same size, is found before it is summed."""
+def test_damage_is_found_before_its_checksum_is_published(folder):
+    """After the plan a digit changes at the same size. It is found before checksums are made."""
     transforms = folder / f"results/smoke/{CUBOID}/perspective/transforms.json"
     text = transforms.read_text()
     transforms.write_text(text.replace("0.", "1.", 1))

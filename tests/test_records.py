@@ -1,4 +1,4 @@
-"""Shards' records: which file is finished, and what a record says of it."""
+"""Shards' records: which files are finished, and what a record holds of them."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.shard_files import read_record
 
 
-def test_a_file_is_finished_with_its_key_and_bytes_whichever_shard_made_it(tmp_path: Path) -> None:
+def test_a_file_with_its_key_and_bytes_is_finished_whichever_shard_made_it(tmp_path: Path) -> None:
     folder = tmp_path / "exr"
     folder.mkdir()
     files = [folder / name for name in ("a.exr", "b.exr")]
@@ -23,7 +23,7 @@ def test_a_file_is_finished_with_its_key_and_bytes_whichever_shard_made_it(tmp_p
     assert not other_bounds.is_finished(folder / "gone.exr", "key")
 
 
-def test_a_record_lists_files_that_were_not_looked_at_too(tmp_path: Path) -> None:
+def test_a_record_lists_unchecked_files_too(tmp_path: Path) -> None:
     file = tmp_path / "exr" / "a.exr"
     file.parent.mkdir()
     file.write_bytes(b"12345")
@@ -34,13 +34,13 @@ def test_a_record_lists_files_that_were_not_looked_at_too(tmp_path: Path) -> Non
     assert read_record(path) == {"exr/a.exr": (entry["bytes"], entry["sha256"])}
 
 
-def test_a_view_made_by_other_settings_is_not_looked_for_in_other_logs(tmp_path: Path) -> None:
+def test_a_view_of_other_settings_is_not_sought_in_other_logs(tmp_path: Path) -> None:
     folder = tmp_path / "exr"
     folder.mkdir()
     view = folder / "view_0000f.exr"
     view.write_bytes(b"view")
     ShardRecord(tmp_path / "render/0-1.json", folder).add(view, "old")
-    # Reading it would be an error.
+    # Reading this log would be an error.
     (tmp_path / "render/1-2.sums.jsonl").mkdir()
     assert not ShardRecord(tmp_path / "render/0-1.json", folder).is_finished(view, "new")
     assert ShardRecord(tmp_path / "render/0-1.json", folder).is_finished(view, "old")

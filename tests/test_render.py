@@ -1,4 +1,4 @@
-"""Rendered views: where each pixel looks, what its depth is, and what is kept and made anew."""
+"""Rendered views: where each pixel looks, its depth, and which views are kept or rendered again."""
 
 import json
 from importlib.metadata import version
@@ -85,7 +85,7 @@ def rendered(tmp_path_factory, run_program, room):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_pixels_look_where_cycles_looked(name, rendered):
-    """Our pose and lens against the points that Cycles itself says it hit."""
+    """Compares our pose and lens with the points that Cycles reports as hit."""
     lens = lenses.from_camera(CAMERAS[name])
     content = lightfield(CAMERAS[name], RENDER)
     world = content.views[0].matrix
@@ -98,7 +98,7 @@ def test_pixels_look_where_cycles_looked(name, rendered):
 
     angle = 2 * np.arcsin(np.linalg.norm(rays - hit, axis=-1) / 2)
     assert np.median(angle[seen]) < 1e-4
-    # The rim of a 180 degree lens aside, where Z-depth has no digits left.
+    # Leave out the rim of a 180 degree lens, where Z-depth has no digits left.
     usable = seen & (-hit[..., 2] > 0.01) if content.depth == "z" else seen
     truth = -hit[..., 2] * distance if content.depth == "z" else distance
     error = np.abs(rendered[f"{name}.z"] / truth - 1)[usable]
@@ -109,7 +109,7 @@ def test_pixels_look_where_cycles_looked(name, rendered):
 
 @pytest.fixture
 def shard(tmp_path, run_program, room):
-    """A rig of four views and what renders it."""
+    """A rig of four views, and functions that render it."""
     camera = {"lens": "equidistant", "fov": 180, "resolution": [32, 32]}
     rig = RIG | {"type": "plane", "cameras": [2, 2], "size": 0.5}
     content = lightfield(camera, RENDER | {"samples": 2}, rig).to_json()
@@ -134,7 +134,7 @@ def shard(tmp_path, run_program, room):
     return render
 
 
-def test_a_view_is_rendered_once_and_again_only_if_it_must(shard):
+def test_a_view_is_rendered_again_only_if_necessary(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
     first = {path.name: sha256(path) for path in shard.views.iterdir()}
@@ -151,7 +151,7 @@ def test_a_view_is_rendered_once_and_again_only_if_it_must(shard):
     assert shard.journalled() == [*names, names[1], names[2]]
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == first
 
-    # Another sample count is another dataset.
+    # Another number of samples makes another dataset.
     shard.content["render"]["samples"] = 3
     shard.file.write_text(json.dumps(shard.content))
     shard("--views", "0:1")
@@ -160,7 +160,7 @@ def test_a_view_is_rendered_once_and_again_only_if_it_must(shard):
     assert list(json.loads(shard.record.read_text())["files"]) == [f"exr/{names[0]}.exr"]
 
 
-def test_only_the_bytes_that_were_made_are_kept(shard):
+def test_damaged_views_are_rendered_again(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
     made = {path.name: sha256(path) for path in shard.views.iterdir()}
@@ -184,13 +184,13 @@ def test_only_the_bytes_that_were_made_are_kept(shard):
     }
 
 
-def test_a_view_whose_checksum_was_not_logged_is_made_once_more(shard):
+def test_a_view_without_a_logged_checksum_is_rendered_again(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
     log = shard.record.with_name("record.sums.jsonl")
     lines = log.read_text().splitlines(keepends=True)
     assert len(lines) == len(names)
-    # A kill while the last line was being written.
+    # The kill came while the last line was being written.
     log.write_text("".join(lines)[:-20])
     shard()
     assert shard.journalled() == [*names, names[-1]]
@@ -198,7 +198,7 @@ def test_a_view_whose_checksum_was_not_logged_is_made_once_more(shard):
     assert shard.journalled() == [*names, names[-1]]
 
 
-def test_shards_of_other_bounds_keep_what_there_is(shard):
+def test_shards_with_other_bounds_keep_finished_views(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
     shard("--views", "1:3", "--record", shard.record.with_name("1-3.json"))
@@ -215,25 +215,25 @@ def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == together
 
 
-def test_views_that_another_bpy_rendered_are_rendered_again_and_reported(shard):
+def test_views_of_another_bpy_are_rendered_again_and_reported(shard):
     shard("--views", "0:2")
     first, second = sorted(shard.views.iterdir())
     right = sha256(first)
     image = images.read_image(first)
     others = {images.KEY_ATTRIBUTE: "another", images.BPY_ATTRIBUTE: "4.2.0"}
     images.write_exr(first, image.channels, others)
-    # Other settings alone are no reason for it.
+    # Other settings alone are no reason for the report.
     image = images.read_image(second)
     others[images.BPY_ATTRIBUTE] = version("bpy")
     images.write_exr(second, image.channels, others)
-    told = shard("--views", "0:2").stderr.splitlines()
-    assert [line for line in told if line.startswith("warning: ")] == [
+    lines = shard("--views", "0:2").stderr.splitlines()
+    assert [line for line in lines if line.startswith("warning: ")] == [
         f"warning: views rendered by bpy 4.2.0, which bpy {version('bpy')} renders again: 1"
     ]
     assert sha256(first) == right
 
 
-def test_views_hold_what_design_asks_for(shard):
+def test_views_have_the_documented_content(shard):
     render = shard.content["render"] | {"compression": "htj2k", "depth_precision": "rounded"}
     shard.file.write_text(json.dumps(shard.content | {"render": render}))
     shard("--views", "0:1")
@@ -271,15 +271,15 @@ def test_depth_in_half_keeps_its_misses():
     assert np.isposinf(z[0, 1])
 
 
-def test_a_device_that_is_not_there_is_an_error(shard):
-    # No machine has both Metal, which is Apple's, and the Debian libraries that the tests need.
+def test_a_missing_device_is_an_error(shard):
+    # No machine has both Apple's Metal and the Debian libraries that the tests need.
     device = "metal"
     result = shard("--device", device, check=False)
     assert result.returncode == 1
-    told = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
-    assert told == [
+    errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert errors == [
         f"error: device: this machine has no {device} device that Cycles can use; "
-        "use device=cpu, or device=auto to take what there is"
+        "use device=cpu, or device=auto to use the best device here"
     ]
     assert not shard.views.exists()
 
@@ -294,7 +294,7 @@ for name, colour in (("ACEScg", (0.4, 0.2, 0.1)), ("Linear Rec.709", sys.argv[2:
     background.inputs["Color"].default_value = (*map(float, colour), 1)
     bpy.ops.wm.save_as_mainfile(filepath=f"{sys.argv[1]}/{name}.blend")
 """
-# From AP1 with the white of ACES, adapted by Bradford's matrix.
+# From AP1 with the white of ACES, adapted with Bradford's matrix.
 ACES_TO_REC_709 = [
     [1.70505, -0.62179, -0.08326],
     [-0.13026, 1.14080, -0.01055],
@@ -302,21 +302,21 @@ ACES_TO_REC_709 = [
 ]
 
 
-def test_colours_are_those_of_rec_709_whatever_space_a_blend_works_in(run_program, tmp_path):
+def test_colours_are_rec_709_whatever_space_a_blend_works_in(run_program, tmp_path):
     (tmp_path / "make.py").write_text(WORLDS)
     expected = np.array(ACES_TO_REC_709) @ (0.4, 0.2, 0.1)
     run_program(tmp_path / "make.py", tmp_path, *expected)
     camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
     content = lightfield(camera, RENDER | {"passes": ["environment"]})
     content.write(tmp_path / "lightfield.json")
-    found = []
+    colours = []
     for name in ("ACEScg", "Linear Rec.709"):
-        words = ("--blend", tmp_path / f"{name}.blend", "--output", tmp_path / name / "exr")
-        run_program("render_shard.py", *words, "--lightfield", tmp_path / "lightfield.json")
+        arguments = ("--blend", tmp_path / f"{name}.blend", "--output", tmp_path / name / "exr")
+        run_program("render_shard.py", *arguments, "--lightfield", tmp_path / "lightfield.json")
         for folder in ("exr", "environment"):
             (path,) = (tmp_path / name / folder).iterdir()
-            found.append(images.read_image(path, "RGB").colour)
-    for colour in found:
+            colours.append(images.read_image(path, "RGB").colour)
+    for colour in colours:
         parts = colour / colour.sum(axis=-1, keepdims=True)
         assert np.abs(parts - expected / expected.sum()).max() < 1e-3
-        np.testing.assert_allclose(colour, found[-1], rtol=2e-3)
+        np.testing.assert_allclose(colour, colours[-1], rtol=2e-3)

@@ -1,4 +1,4 @@
-"""A dataset's page, in a real browser: it loads, shows what the files hold, and can be used."""
+"""A dataset's page in a real browser: it loads, shows the content of the files, and can be used."""
 
 import base64
 import io
@@ -47,7 +47,7 @@ HOSTILE = "<img src=x onerror=\"document.title='broken'\"></script><script>docum
 
 
 def write_dataset(folder, rig, depth="z", names=()):
-    """Write the views of a rig in a sphere, as the renderer writes them."""
+    """Write the views of a rig in a sphere, as the renderer does."""
     lens = lenses.from_camera(rig["camera"])
     keys = {"depth": depth, "frame": 7, "scene": {"name": "ball"}}
     keys["render"] = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
@@ -82,7 +82,7 @@ def draw(folder, rig, output, panorama=None):
 
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory):
-    """The page of a sphere of cameras with all that a page can have; and its lightfield.json."""
+    """The page of a sphere of cameras with every section, and its lightfield.json."""
     folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
     panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [128, 64]})
@@ -124,7 +124,7 @@ def sphere(tmp_path_factory):
     return SimpleNamespace(page=page, lightfield=lightfield, folder=folder)
 
 
-# Of a copy, for the page's own canvases are drawn on and not read.
+# Read a copy, because the page's own canvases are made for drawing.
 COPY = """
 (name) => {
   const canvas = document.getElementById(name);
@@ -140,7 +140,7 @@ COPY = """
 
 
 def pixels(tab, canvas):
-    """Return the pixels (height, width, 4) of a canvas, once it has been drawn."""
+    """Return the pixels (height, width, 4) of a canvas after it was drawn."""
     tab.wait_for_function(COPY, arg=canvas)
     tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
     _, _, encoded = tab.evaluate(COPY, canvas).partition(",")
@@ -148,14 +148,14 @@ def pixels(tab, canvas):
 
 
 def frame_of(tab, canvas):
-    """Return where a canvas is in the window, scrolled so that all of it is there."""
+    """Scroll until all of a canvas is in the window. Return its place."""
     tab.evaluate(
         "(name) => document.getElementById(name).scrollIntoView({block: 'center'})", canvas
     )
     return tab.locator(f"#{canvas}").bounding_box()
 
 
-def test_the_page_loads_whole_from_one_file(sphere, show):
+def test_the_page_loads_completely_from_one_file(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
     widths = tab.eval_on_selector_all("img", "all => all.map((image) => image.naturalWidth)")
@@ -164,17 +164,17 @@ def test_the_page_loads_whole_from_one_file(sphere, show):
     text = tab.inner_text("main")
     for part in ("not valid", "equidistant fisheye, 180°", "12 of 12 images", "snakemake"):
         assert part in text
-    # What things cost, in words, and what it would at full size, in no more digits than are known.
+    # The costs are in words, also those at full size, with no more digits than are known.
     for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h"):
         assert part in text
     assert "±" not in text
     for part in ("180° × 180°", "Frame\n7", "Depth that is inf\n0 %", "snakemake --cores all"):
         assert part in text
-    # Of what was learned, how good it was in the end.
+    # The result of learning is the last figure.
     assert "24.1" in text
     assert "18.5" not in text
     assert YAML.strip() in tab.text_content("#rebuild pre >> nth=1")
-    # The case that is worst, as part of its bound, comes first.
+    # The worst case, as part of its bound, comes first.
     assert text.index("200%") < text.index("50%")
 
 
@@ -210,7 +210,7 @@ def test_the_viewer_steps_exposes_and_shows_depth(sphere, show):
     assert (pixels(tab, "viewer")[lit] != darker[lit]).any()
 
 
-def test_the_readout_says_what_the_file_holds(sphere, show):
+def test_the_readout_shows_the_files_values(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
     frame = frame_of(tab, "viewer")
@@ -223,7 +223,7 @@ def test_the_readout_says_what_the_file_holds(sphere, show):
         sphere.folder / "exr" / f"{tab.inner_text('#view-name')}.exr"
     ).channels
     truth = [float(stored[name][20, 40]) for name in "RGBZ"]
-    # Lossy compression and 8 bits for light; three digits for depth.
+    # Light has lossy compression and 8 bits. Depth has three digits.
     np.testing.assert_allclose([float(word) for word in colour.split()], truth[:3], rtol=0.15)
     assert float(depth.removesuffix(" m")) == pytest.approx(truth[3], rel=0.006)
 
@@ -268,7 +268,7 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
     tab = show(sphere.page, width)
     pixels(tab, "viewer")
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
-    # What scrolls by itself is reached by no key, and shows half a line.
+    # A part that scrolls by itself cannot be reached with keys, and shows half a line.
     scrolls = """all => all.filter((one) => one.scrollWidth > one.clientWidth + 1)
         .filter((one) => /auto|scroll/.test(getComputedStyle(one).overflowX))
         .map((one) => one.outerHTML.slice(0, 80))"""
@@ -285,7 +285,7 @@ def test_names_are_text_whatever_they_hold(show, tmp_path):
     pixels(tab, "viewer")
     assert tab.title() != "broken"
     assert tab.inner_text("#view-name") in names
-    # Without depth, validation, costs, measurements or a row of cameras there is nothing of them.
+    # Without depth, validation, costs, measurements or a row of cameras, there is no section.
     titles = tab.locator("h2, h3").all_inner_texts()
     expected = ["Explore", "Views", "Quality", "Samples and noise", "Rebuild", "Files", "In Python"]
     assert titles == expected
@@ -295,7 +295,7 @@ def test_names_are_text_whatever_they_hold(show, tmp_path):
     assert tab.is_disabled("#show-depth")
 
 
-def test_the_scenes_points_are_drawn_where_the_views_see_them(sphere, show):
+def test_the_scenes_points_are_drawn_in_the_views_directions(sphere, show):
     tab = show(sphere.page)
     shown = pixels(tab, "rig")
     places = tab.evaluate("() => rig.points.map((point) => point.at)")
@@ -313,7 +313,7 @@ def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
     pixels(tab, "viewer")
     assert "15 (8 train, 7 test)" in tab.inner_text("main")
     colours = tab.evaluate("() => DATA.views.map((_, number) => colourOf(number))")
-    # The middle row is one colour, but for its tests.
+    # The middle row has one colour, except for its test views.
     expected = ["--row" if 5 <= number < 10 else "--shown" for number in range(15)]
     assert colours == ["--test" if n % 2 else colour for n, colour in enumerate(expected)]
     assert tab.locator(".keys .dot.test").count() == 1
@@ -329,7 +329,7 @@ def test_each_reprojection_is_shown(show, tmp_path):
     lightfield.changed(lens).write(tmp_path / "small/lightfield.json")
     tab = show(make_page(tmp_path, rig))
     source = tab.get_attribute("img[alt='The views as small']", "src")
-    # Developed already, it is shown as it is.
+    # It is developed already, so it is shown unchanged.
     assert abs(decoded(source)[50, 50].astype(int) - 200).max() <= 2
 
 
@@ -340,7 +340,7 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     render = {**lightfield.render, "passes": shown[:-1]}
     lightfield.changed(render=render).write(tmp_path / "lightfield.json")
     left = (np.indices((lens.height, lens.width))[1] < lens.width / 2).astype(float)
-    # All else is 0.
+    # All other values are 0.
     holds = {
         "normal": {"B": left},
         "object": {"Y": 2 - left},
@@ -350,13 +350,15 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
         "flow": {"X": 1, "V": left},
     }
     for view in lightfield.views:
-        for found in (*(PASSES[name] for name in shown[:-1]), FLOW):
-            name = view.flow if found == FLOW else view.name
+        for render_pass in (*(PASSES[name] for name in shown[:-1]), FLOW):
+            name = view.flow if render_pass == FLOW else view.name
             planes = {
-                channel: (0 * left + holds[found.name].get(channel, 0)).astype(found.dtype)
-                for channel in found.channels
+                channel: (0 * left + holds[render_pass.name].get(channel, 0)).astype(
+                    render_pass.dtype
+                )
+                for channel in render_pass.channels
             }
-            images.write_exr(found.path(tmp_path, name), planes)
+            images.write_exr(render_pass.path(tmp_path, name), planes)
     tab = show(make_page(tmp_path, rig))
     pictures = {
         name: decoded(tab.get_attribute(f"img[alt^='{name} of view']", "src"))[4, [4, -4]].tolist()
@@ -364,8 +366,8 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     }
     assert tab.locator(".passes img").count() == len(shown)
     assert pictures["normal"] == [[128, 128, 255], [0, 0, 0]]
-    one, other = pictures["object"]
-    assert one != other and max(one) > 100 and max(other) > 100
+    first, second = pictures["object"]
+    assert first != second and max(first) > 100 and max(second) > 100
     assert max(pictures["cryptomatte"][0]) > 40 and pictures["cryptomatte"][1] == [0, 0, 0]
     assert pictures["motion"] == [[255, 0, 0], [255, 255, 255]]
     assert pictures["albedo"] == [[255, 0, 0], [0, 0, 0]]
@@ -373,7 +375,7 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     assert "normal/" in tab.locator("#files").inner_text()
 
 
-def test_what_stands_still_is_a_white_picture_of_motion(tmp_path):
+def test_a_scene_at_rest_has_a_white_picture_of_motion(tmp_path):
     lightfield = write_dataset(tmp_path, LINE)
     lightfield = lightfield.changed(render={**lightfield.render, "passes": ["motion"]})
     view, motion = lightfield.views[0], PASSES["motion"]
@@ -394,6 +396,41 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
     assert tab.url == output.as_uri()
 
 
+def write_many(results, count):
+    """Write an index's datasets: fisheyes of one scene, and a panorama of another one."""
+    for number in range(count):
+        folder = results / ("ball" if number else "garden") / f"rig{number}"
+        (folder / "report").mkdir(parents=True)
+        camera = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
+        if not number:
+            camera = {"lens": "equirectangular", "resolution": [16, 8]}
+        rig = {**LINE, "cameras": [1, 1], "camera": camera}
+        write_dataset(folder, rig, depth="z" if number else "distance")
+        (folder / "report/index.html").write_text("")
+
+
+@pytest.mark.parametrize(("count", "has_search"), [(11, False), (12, True)])
+def test_an_index_of_many_datasets_can_be_searched(count, has_search, run_program, show, tmp_path):
+    write_many(tmp_path, count)
+    output = tmp_path / "index.html"
+    run_program("report_index.py", "--results", tmp_path, "--output", output)
+    tab = show(output)
+    cards = tab.locator(".cards li:visible")
+    assert cards.count() == count
+    search = tab.get_by_label("Search")
+    assert search.count() == has_search
+    if not has_search:
+        return
+    search.fill("Ball rig1")
+    assert cards.locator("p:first-of-type").all_inner_texts() == ["rig1", "rig10", "rig11"]
+    search.fill("")
+    tab.get_by_label("Lens").select_option("equirectangular panorama")
+    assert cards.locator("h2").all_inner_texts() == ["garden"]
+    assert tab.inner_text("#count") == "1 of 12 shown"
+    tab.get_by_label("State").select_option("not validated")
+    assert cards.count() == 1
+
+
 @pytest.mark.parametrize(
     ("file", "text", "expected"),
     [
@@ -402,11 +439,11 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: is not what scripts/costs.py writes"),
-        ("report/overview.png", "no", "overview.png: is no image"),
-        ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
+        ("report/overview.png", "no", "overview.png: is not an image"),
+        ("exr/view_0001f.exr", "no", "view_0001f.exr: is not an image"),
     ],
 )
-def test_what_cannot_be_read_is_an_error_of_one_line(tmp_path, file, text, expected):
+def test_an_unreadable_file_is_an_error_of_one_line(tmp_path, file, text, expected):
     rig = {**LINE, "cameras": [2, 1]}
     write_dataset(tmp_path, rig)
     (tmp_path / file).parent.mkdir(exist_ok=True)
@@ -422,10 +459,10 @@ def test_the_programs_make_pictures_and_page(run_program, tmp_path):
     figures, page = (tmp_path / name for name in ("figures.json", "page.json"))
     figures.write_text(json.dumps({"rig": rig}))
     page.write_text(json.dumps({"rig": rig, "yaml": YAML, "command": "make <it>"}))
-    words = ("--dataset", tmp_path, "--settings")
-    run_program("report_figures.py", *words, figures, "--output", tmp_path / "report")
-    words = (*words, page, "--name", "a/b")
-    run_program("report_html.py", *words, "--output", tmp_path / "x.html")
+    arguments = ("--dataset", tmp_path, "--settings")
+    run_program("report_figures.py", *arguments, figures, "--output", tmp_path / "report")
+    arguments = (*arguments, page, "--name", "a/b")
+    run_program("report_html.py", *arguments, "--output", tmp_path / "x.html")
     text = (tmp_path / "x.html").read_text()
     for part in (
         "view_0001f, the view in the middle",
@@ -435,7 +472,7 @@ def test_the_programs_make_pictures_and_page(run_program, tmp_path):
         assert part in text
 
 
-# What the page is made of.
+# These are the inputs of the page.
 
 
 def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
@@ -448,7 +485,7 @@ def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
     first, second = faults.collect(tmp_path, ["a", "b", "c", "missing"])
     assert (first.name, second.name, second.depth) == ("a.exr", "b.png", None)
     colour, depth = decoded(first.colour), decoded(first.depth)
-    # Each pixel stands for 3 × 3.
+    # Each pixel is enlarged to 3 × 3.
     assert colour.shape == depth.shape == (100, 174, 3)
     assert np.argwhere((colour == faults.WRONG).all(axis=-1)).tolist() == [[33, 67]]
     assert np.argwhere((depth == faults.WRONG).all(axis=-1)).tolist() == [[50, 0]]
@@ -456,31 +493,31 @@ def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
 
 
 @pytest.mark.parametrize("size", [(1, 1), (5, 64), (64, 5)])
-def test_the_noise_of_few_pixels_is_not_known(size, tmp_path):
+def test_few_pixels_have_no_estimate_of_noise(size, tmp_path):
     colour, depth = np.full((*size, 3), 0.5, np.float32), np.ones(size, np.float32)
     figures.draw_noise(tmp_path / "noise", figures.Overview(colour, depth, False, "distance"))
     assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
 
 
-def test_a_picture_of_16_bits_is_shown_as_one_of_8(tmp_path):
+def test_a_picture_of_16_bits_is_shown_with_8(tmp_path):
     pixels = np.arange(8 * 8 * 3, dtype=np.uint8).reshape(8, 8, 3)
     images.write_png(tmp_path / "a.png", pixels)
     images.write_png(tmp_path / "b.png", pixels * np.uint16(257))
     for fault in faults.collect(tmp_path, ["a", "b"]):
         assert (decoded(fault.colour) == pixels).all()
-    one, other = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
-    assert (one == pixels).all() and (other == pixels).all()
+    first, second = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
+    assert (first == pixels).all() and (second == pixels).all()
 
 
 @pytest.mark.parametrize(("views", "width", "height"), [(120, 1, 999), (1, 1, 999), (3, 999, 1)])
-def test_a_sheet_of_any_views_is_as_large_as_a_page_can_have(tmp_path, views, width, height):
+def test_a_contact_sheet_never_exceeds_the_page(tmp_path, views, width, height):
     images.write_png(tmp_path / "a.png", np.full((height, width, 3), 200, np.uint8))
     sheet = contact_sheet.sheet([tmp_path / "a.png"] * views, width, height)
     assert max(sheet.shape) <= 2000
     assert (sheet == 200).all(axis=-1).any()
 
 
-def test_pictures_that_are_made_smaller_stay_white_beside_edges(tmp_path):
+def test_shrunk_pictures_stay_white_beside_edges(tmp_path):
     pixels = np.zeros((64, 600, 3), np.uint8)
     pixels[:, 300:] = 255
     images.write_png(tmp_path / "a.png", pixels)
@@ -495,10 +532,10 @@ def decoded(uri):
 
 
 @pytest.mark.parametrize("view", ["view_0001f", "view_0007f"])
-def test_a_view_that_validation_could_not_read_is_no_error_of_the_page(tmp_path, view):
+def test_an_unreadable_view_is_no_error_of_the_page(tmp_path, view):
     write_dataset(tmp_path, LINE)
     (tmp_path / "exr" / f"{view}.exr").write_text("no image")
-    problem = f"exr/{view}.exr: is no image"
+    problem = f"exr/{view}.exr: is not an image"
     check = {"detail": "", "warnings": [], "figures": {}, "problems": [problem]}
     check |= {"name": "images", "passed": False, "views": [view]}
     write_json(tmp_path / "validation.json", {"valid": False, "checks": [check]})
@@ -541,7 +578,7 @@ KEYS = [{"position": [0, 0, 0]}, {"position": [0, 3, 0.5]}]
         ({"type": "path", "count": 9, "keys": KEYS}, PANORAMA, False),
     ],
 )
-def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expected):
+def test_a_panorama_needs_views_that_see_all_round(rig, camera, expected):
     rig = {**rig, "camera": camera, "center": [1, 2, 3]}
     assert overview.sees_all_round(rigs.from_settings(rig)) is expected
 
@@ -551,16 +588,16 @@ def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expe
     [
         ({"type": "plane", "cameras": [5, 3]}, 7),
         ({"type": "hemisphere", "count": 9}, 4),
-        # Of the middle ring, the one that looks ahead.
+        # The camera of the middle ring that looks ahead.
         ({"type": "cylinder", "cameras": [8, 3]}, 8),
         ({**LATTICE, "cameras": [3, 1, 1], "cube_map": True}, 6),
     ],
 )
-def test_the_middle_view_is_of_the_middle_row_or_of_the_order(rig, expected):
+def test_the_middle_view_is_in_the_middle_of_the_row_or_the_order(rig, expected):
     assert overview.middle_view(rigs.from_settings(rig)) == expected
 
 
-def test_a_rig_in_words_has_no_size_that_nobody_gave():
+def test_a_rig_in_words_has_no_size_unless_it_is_given():
     places = np.array([[0, 0, 0], [0, 3, 0.5]])
     path = rigs.from_settings({"type": "path", "count": 2, "keys": KEYS})
     assert dataset_page.rig_text(path, places) == "path, 0 × 3 × 0.5 m"
@@ -577,7 +614,7 @@ def test_without_a_panorama_the_overview_is_the_view_in_the_middle(tmp_path):
     middle = images.read_image(tmp_path / "exr/view_0007f.exr").colour
     shown = images.read_image(tmp_path / "report/overview.png").colour
     np.testing.assert_array_equal(shown, pictures.develop(middle, pictures.exposure_for(middle)))
-    # One that cannot be read is black, as validation will say.
+    # An unreadable view is black. Validation will report it.
     (tmp_path / "exr/view_0007f.exr").write_text("no image")
     draw(tmp_path, LINE, tmp_path / "report")
     assert not images.read_image(tmp_path / "report/overview.png").colour.any()
@@ -597,7 +634,7 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
         light, reach = epipolar.sample(lens, poses[number], colour, z, "z", rays)
         points = poses[number, :3, 3] + reach[:, None] * rays
         hit = np.isfinite(reach)
-        # At the rim of a fisheye, Z-depth is so short that half a pixel is much of it.
+        # At the rim of a fisheye, Z-depth is so short that half a pixel changes it a lot.
         hit &= -(rays @ poses[number, :3, :3])[:, 2] > 0.2 * np.linalg.norm(rays, axis=-1)
         seen += hit.sum()
         np.testing.assert_allclose(np.linalg.norm(points[hit], axis=-1), RADIUS, rtol=0.06)
@@ -613,7 +650,7 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
         ({"type": "plane", "cameras": [5, 3]}, range(5, 10)),
         ({"type": "plane", "cameras": [5, 3], "face_inside": True}, range(5, 10)),
         ({"type": "cuboid", "cameras": [4, 3, 1]}, range(4)),
-        # The left side comes after front and back, each of 2 × 3.
+        # The left side comes after front and back, each of 2 × 3 cameras.
         ({"type": "cuboid", "cameras": [2, 5, 3]}, range(12 + 5, 12 + 10)),
         ({"type": "lattice", "cameras": [3, 1, 1], "cube_map": True}, (0, 6, 12)),
         ({"type": "cylinder", "cameras": [6, 2]}, range(6, 12)),
@@ -629,7 +666,7 @@ def test_the_row_is_the_middle_one(change, expected):
     row = epipolar.find_row(rig, np.array(poses))
     assert (sorted(row.views) if row else None) == (list(expected) if expected else None)
     if row:
-        # The first is the leftmost camera, as the cameras themselves see it.
+        # The first camera is the leftmost, as the cameras themselves see it.
         assert (np.diff(row.places) > 0).all()
     if row and row.kind == "line":
         first, last = (poses[row.views[end]] for end in (0, -1))

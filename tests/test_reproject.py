@@ -1,4 +1,4 @@
-"""The reprojection program as a user runs it, and beside Cycles through the same lenses."""
+"""The reprojection program as a user runs it, compared with Cycles through the same lenses."""
 
 import csv
 import json
@@ -39,7 +39,7 @@ def scene_color(rays):
 
 
 def view_channels(lens, shift=0.0):
-    """Colour, and Z-depth (or distance) of a sphere of 2 m around the camera."""
+    """Return colour, and Z-depth (or distance), of a sphere of 2 m around the camera."""
     rays = lens.pixel_rays()
     color = np.nan_to_num(scene_color(rays) + shift)
     depth = np.where(np.isnan(rays[..., 2]), np.inf, 2 * -rays[..., 2] if lens.has_z_depth else 2)
@@ -75,7 +75,7 @@ def dataset(tmp_path):
 
 @pytest.fixture
 def run(dataset, monkeypatch):
-    """Run the program on the dataset; its output folder is `out`."""
+    """Return a function that runs the program on the dataset. Its output folder is `out`."""
 
     def go(*flags, configs=True, source=True):
         command = ["reproject.py", *flags, "--output-dir", str(dataset / "out")]
@@ -105,12 +105,12 @@ def test_the_papers_command(dataset, run):
     assert names(out) == ["lightfield.json", *(f"view_{i:04d}f.png" for i in range(3))]
     pixels = read_image(out / "view_0000f.png").channels
     assert pixels["R"].shape == (24, 24) and pixels["R"].dtype == np.uint8
-    # The centre looks ahead: what is there, made half as bright, compressed, and encoded.
+    # The centre looks ahead. Its colour is halved, compressed, and encoded.
     light = scene_color(np.array([1 / 24, -1 / 24, -1.0])) / 2
     light = light * (1 + light / 25) / (1 + light)
     expected = 255 * (1.055 * light ** (1 / 2.4) - 0.055)
-    found = [int(pixels[name][12, 12]) for name in "RGB"]
-    assert np.abs(found - expected).max() < 2
+    colour = [int(pixels[name][12, 12]) for name in "RGB"]
+    assert np.abs(colour - expected).max() < 2
     config = json.loads((out / "lightfield.json").read_text())
     assert config["resolution"] == [24, 24] and config["sensor_size"] == [36, 36]
     assert config["camera"]["type"] == "PERSP" and config["camera"]["focal_length"] == 18
@@ -136,13 +136,13 @@ def test_exr_has_depth_along_its_own_axis(dataset, run, precision):
     matrix = np.array(config["frames"][1]["world_matrix"])
     assert np.allclose(matrix[:3, :3], lens_map.rotation_matrix(20, -10, 30))
     assert matrix[:3, 3].tolist() == [1, 0, 1]
-    # What the turned camera sees at its centre is what lies there in the world.
+    # The turned camera's centre shows the point of the world in its direction.
     light = scene_color(matrix[:3, :3] @ [0, 0, -1]) + 0.1
-    found = np.mean([[image.channels[c][11:13, 11:13].mean()] for c in "RGB"], axis=1)
-    assert np.abs(found - light).max() < 0.02
+    colour = np.mean([[image.channels[c][11:13, 11:13].mean()] for c in "RGB"], axis=1)
+    assert np.abs(colour - light).max() < 0.02
 
 
-def test_rotation_is_in_the_frames_euler_angles_too(dataset, run):
+def test_the_rotation_is_also_in_the_frames_euler_angles(dataset, run):
     mathutils_order = np.array(
         json.loads((dataset / "lightfield.json").read_text())["frames"][0]["rotation"]
     )
@@ -163,7 +163,7 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert set(np.unique(rgba["A"])) == {0, 255}
     assert not any(rgba[c][missing].any() for c in "RGB")
     assert np.array_equal(np.isnan(depth.channels["Z"]), missing)
-    # Depth says it: no second mark beside it.
+    # Depth marks it, so there is no second mark.
     assert depth.channels.keys() == {*"RGBZ"}
     assert not depth.channels["G"][missing].any()
     mask = read_image(out / "dynamic_mask_view_0000f.png").channels["Y"]
@@ -174,7 +174,7 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
 
 
-def test_what_is_too_far_for_a_depth_png_has_no_depth_there(dataset, run):
+def test_depth_beyond_the_range_of_a_png_is_missing_there(dataset, run):
     run(*PERSPECTIVE, "--exr", "--depth-png", "40000")
     z = read_image(dataset / "out" / "view_0000f.exr").channels["Z"].astype(float)
     integers = read_image(dataset / "out" / "view_0000f_depth.png").channels["Y"]
@@ -184,19 +184,19 @@ def test_what_is_too_far_for_a_depth_png_has_no_depth_there(dataset, run):
     assert not integers[z > 1.639].any()
 
 
-def test_a_copy_has_no_depth_below_zero_in_a_png_and_no_pixel_that_is_no_number(dataset, run):
+def test_a_copy_as_png_has_no_negative_depth_and_no_nan(dataset, run):
     ones = np.ones((SIZE, SIZE), np.float32)
     channels = {**dict.fromkeys("RGB", ones), "G": ones.copy(), "Z": -ones}
     channels["G"][20, 20] = np.nan
     write_exr(dataset / "a.exr", channels)
-    words = ["--no-reproject", "--png", "--exr", "--depth-png", "1000", "--single"]
-    run(*words, str(dataset / "a.exr"), source=False)
-    found = {
+    arguments = ["--no-reproject", "--png", "--exr", "--depth-png", "1000", "--single"]
+    run(*arguments, str(dataset / "a.exr"), source=False)
+    channels_of = {
         name: read_image(dataset / "out" / name).channels for name in names(dataset / "out")[:3]
     }
-    assert not found["a_depth.png"]["Y"].any()
-    assert [found["a.png"][c][20, 20] for c in "RGBA"] == [0] * 4
-    assert [found["a.exr"][c][20, 20] for c in "RGB"] == [0] * 3
+    assert not channels_of["a_depth.png"]["Y"].any()
+    assert [channels_of["a.png"][c][20, 20] for c in "RGBA"] == [0] * 4
+    assert [channels_of["a.exr"][c][20, 20] for c in "RGB"] == [0] * 3
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
@@ -206,33 +206,33 @@ def test_8_bit_images_are_read_as_srgb(dataset, run, suffix):
     path = dataset / f"gray{suffix}"
     assert cv2.imwrite(str(path), code)
     run("--nn", "--png", *PERSPECTIVE, "--exr", "--single", str(path), source=False)
-    found = read_image(dataset / "out" / "gray.png").channels["G"]
-    assert np.abs(found[:, [2, -3]].astype(int) - [40, 128]).max() <= 1
+    green = read_image(dataset / "out" / "gray.png").channels["G"]
+    assert np.abs(green[:, [2, -3]].astype(int) - [40, 128]).max() <= 1
     linear = read_image(dataset / "out" / "gray.exr").channels
     assert abs(float(linear["G"][12, 20]) - ((128 / 255 + 0.055) / 1.055) ** 2.4) < 5e-3
     assert "Z" not in linear
 
 
-def test_a_png_with_alpha_gives_no_colour_where_it_is_transparent(dataset, run):
+def test_transparent_pixels_of_a_png_give_no_colour(dataset, run):
     pixels = np.full((SIZE, SIZE, 4), 200, np.uint8)
     pixels[:, : SIZE // 2, :3], pixels[:, : SIZE // 2, 3] = 90, 0
     pixels[:, SIZE // 2 :, 3] = 255
     write_png(dataset / "half.png", pixels)
     run("--png", *PERSPECTIVE, "--single", str(dataset / "half.png"), source=False)
-    found = read_image(dataset / "out" / "half.png").channels
-    assert not found["A"][:, :11].any() and (found["A"][:, 13:] == 255).all()
-    assert (found["R"][:, 13:] == 200).all()
+    channels = read_image(dataset / "out" / "half.png").channels
+    assert not channels["A"][:, :11].any() and (channels["A"][:, 13:] == 255).all()
+    assert (channels["R"][:, 13:] == 200).all()
 
 
-def test_a_file_that_cannot_be_read_is_named_and_the_others_are_done(dataset, run, capsys):
+def test_an_unreadable_file_is_named_and_the_others_are_done(dataset, run, capsys):
     (dataset / "exr" / "broken.exr").write_bytes(b"no image")
-    whole = (dataset / "exr" / "view_0001f.exr").read_bytes()
-    (dataset / "exr" / "view_0001f.exr").write_bytes(whole[: len(whole) // 2])
+    content = (dataset / "exr" / "view_0001f.exr").read_bytes()
+    (dataset / "exr" / "view_0001f.exr").write_bytes(content[: len(content) // 2])
     record = dataset / "record.json"
     with pytest.raises(UserError, match=r"2 of 4 views could not be reprojected, as .*broken\.exr"):
         run(*PERSPECTIVE, "--png", "--record", str(record))
-    told = capsys.readouterr().err
-    assert "broken.exr" in told and "view_0001f.exr" in told
+    message = capsys.readouterr().err
+    assert "broken.exr" in message and "view_0001f.exr" in message
     out = dataset / "out"
     assert names(out) == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
     assert not record.exists()
@@ -265,7 +265,7 @@ def test_views_of_one_shard_and_their_record(dataset, run):
     assert record.read_bytes() == first
 
 
-def test_a_source_that_is_not_as_it_was_written_is_not_used(dataset, run, capsys):
+def test_a_damaged_source_is_not_used(dataset, run, capsys):
     sources = sorted((dataset / "exr").iterdir())
     record = dataset / "source.json"
     sums = {f"exr/{path.name}": {"bytes": 1, "sha256": sha256(path)} for path in sources}
@@ -278,12 +278,12 @@ def test_a_source_that_is_not_as_it_was_written_is_not_used(dataset, run, capsys
 
 
 @pytest.mark.parametrize("views", ["3:4", "1:1", "x", "-1:2", "1"])
-def test_views_that_there_are_not(run, views):
+def test_missing_views_are_refused(run, views):
     with pytest.raises(UserError, match="--views"):
         run(*PERSPECTIVE, "--png", f"--views={views}")
 
 
-def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):
+def test_only_missing_or_outdated_files_are_made_again(dataset, run):
     def stamps():
         return {p.name: p.stat().st_mtime_ns for p in out.glob("view*")}
 
@@ -293,15 +293,15 @@ def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):
     out = dataset / "out"
     flags = (*PERSPECTIVE, "--png")
     run(*flags)
-    whole = (out / "view_0001f.png").read_bytes()
+    content = (out / "view_0001f.png").read_bytes()
     before = stamps()
     run(*flags)
     assert changed(before) == set()
     (out / "view_0000f.png").unlink()
-    (out / "view_0001f.png").write_bytes(whole[: len(whole) // 2])
+    (out / "view_0001f.png").write_bytes(content[: len(content) // 2])
     run(*flags)
     assert changed(before) == {"view_0000f.png", "view_0001f.png"}
-    assert (out / "view_0001f.png").read_bytes() == whole
+    assert (out / "view_0001f.png").read_bytes() == content
     before = stamps()
     write_exr(
         dataset / "exr" / "view_0002f.exr", view_channels(FISHEYE), {"plenoforge:key": "another"}
@@ -316,7 +316,7 @@ def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):
     assert changed(before) == set()
 
 
-def test_only_the_bytes_that_were_made_are_kept(dataset, run):
+def test_damaged_outputs_are_made_again(dataset, run):
     out, record = dataset / "out", dataset / "record.json"
     flags = (*PERSPECTIVE, "--png", "--exr", "--record", str(record))
     run(*flags)
@@ -347,8 +347,8 @@ def test_a_saved_lens_map_gives_the_same_bytes(dataset, run, run_program):
         path.unlink()
     file = dataset / "map.npy"
     config = dataset / "lightfield.json"
-    told = run_program("lens_map.py", file, *PERSPECTIVE, "--input-cfg", config).stderr
-    assert "magnification: 0.7" in told and "100.0% of the image" in told
+    message = run_program("lens_map.py", file, *PERSPECTIVE, "--input-cfg", config).stderr
+    assert "magnification: 0.7" in message and "100.0% of the image" in message
     run(*PERSPECTIVE, "--png", "--exr", "--lens-map", str(file))
     assert {path.name: path.read_bytes() for path in out.glob("view*")} == made
     with pytest.raises(UserError, match=r"is a lens map for filter \"adaptive\""):
@@ -368,7 +368,7 @@ def test_prefix_suffix_and_no_configs(dataset, run):
     assert [frame["name"] for frame in config["frames"]] == ["view_0001f"]
 
 
-def test_two_images_of_one_name_are_not_mixed_up(dataset, run):
+def test_two_images_of_one_name_are_not_confused(dataset, run):
     write_png(dataset / "exr" / "view_0001f.png", np.zeros((SIZE, SIZE, 3), np.uint8))
     with pytest.raises(UserError, match=r"view_0001f\.exr and .*view_0001f\.png"):
         run(*PERSPECTIVE, "--png")
@@ -388,8 +388,8 @@ def test_no_reproject_keeps_the_pixels(dataset, run):
 
 
 @pytest.mark.parametrize("config_says", [None, "z"])
-def test_file_and_configuration_agree_on_the_meaning_of_depth(dataset, run, config_says):
-    # What the file says of itself counts.
+def test_file_and_configuration_agree_on_the_kind_of_depth(dataset, run, config_says):
+    # The file's own kind counts.
     name = "view_0000f.exr"
     channels = view_channels(FISHEYE)
     channels["Z"] = np.where(np.isinf(channels["Z"]), channels["Z"], np.float32(2))
@@ -414,16 +414,16 @@ def test_a_cube_map_and_back(dataset, run, monkeypatch):
         f"view_0000f_{face}" for face in CUBE_FACES if face != "b"
     ]
     assert config["resolution"] == [64, 64] and config["depth"] == "z"
-    # The face to the left looks along -X of a camera that looks along -Z.
+    # The left face looks along -X of a camera that looks along -Z.
     assert np.allclose(np.array(config["frames"][1]["world_matrix"])[:3, 2], [1, 0, 0])
     front = read_image(out / "view_0000f_f.exr").channels
     assert np.isfinite(front["Z"]).all()
-    # A fisheye of 180° sees nothing of what is behind it.
+    # A fisheye of 180° sees nothing behind it.
     assert not (out / "view_0000f_b.exr").exists()
     cube = CubeMap(width=384, height=64)
     (dataset / "cube.json").write_text(json.dumps(cube.to_lightfield()))
     for face in "blrud":
-        # Only the front half was seen: fill the rest, so that the cube is a whole one.
+        # The fisheye saw only the front half. Fill the rest, so that the cube is complete.
         path = out / f"view_0000f_{face}.exr"
         x, y = np.meshgrid(
             np.arange(64) + 0.5 + 64 * list(CUBE_FACES).index(face), np.arange(64) + 0.5
@@ -445,7 +445,7 @@ def test_a_cube_map_and_back(dataset, run, monkeypatch):
         assert difference[light[..., i] > 0.05].max() < 5
 
 
-def test_a_pngs_pixels_can_be_taken_back_to_light_by_its_header(dataset, run):
+def test_a_pngs_header_leads_back_to_its_light(dataset, run):
     optics = ("--rectilinear", "18,36", "--scale", "0.5", "--rotation", "10deg,0,5")
     run(*optics, "--png", "--exr", "--exposure", "-1", "--reinhard", "5")
     written = json.loads((dataset / "out/lightfield.json").read_text())["reprojection"]
@@ -460,7 +460,7 @@ def test_a_pngs_pixels_can_be_taken_back_to_light_by_its_header(dataset, run):
     said = {name: image.attributes[f"plenoforge:{name}"] for name in written}
     assert said == {name: str(value) for name, value in written.items()}
     light = read_image(dataset / "out/view_0000f.exr").colour
-    # As docs/reference/files.md has it: of the sRGB value y, with the maximum m.
+    # The formula of docs/reference/files.md, for the sRGB value y and the maximum m.
     y, m = decode_srgb(image.colour / 255), float(said["reinhard"])
     v = m**2 / 2 * (y - 1 + np.sqrt((1 - y) ** 2 + 4 * y / m**2))
     run(*optics, "--exr")
@@ -479,7 +479,7 @@ def test_angles_may_be_given_in_degrees(dataset, run):
             run(*flags, "--png", "--dry-run")
 
 
-def test_a_cube_map_of_a_narrow_lens_has_the_face_ahead_and_is_no_single_file(dataset, run):
+def test_a_cube_map_of_a_narrow_lens_has_the_front_face_alone(dataset, run):
     lens = ["--no-configs", f"{SIZE},{SIZE}", "--i-equidistant", "1deg"]
     run(*lens, "--cubemap", "8", "--png", "--filter-prefix", "view_0000f", configs=False)
     assert names(dataset / "out") == ["view_0000f_f.png"]
@@ -513,7 +513,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
     first = read_image(out / "view_0000f.exr").channels
     seen = np.isfinite(first["Z"])
     assert seen.mean() > 0.2
-    # And back, from what the configuration says: the scene where it was seen twice.
+    # And back, according to the configuration, where the scene was visible both times.
     (out / "exr").mkdir()
     (out / "view_0000f.exr").rename(out / "exr" / "view_0000f.exr")
     config["frames"] = config["frames"][:1]
@@ -531,7 +531,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "message"),
     [
         (("--rectilinear", "18", "--png"), "--rectilinear 18: must have the form FOCAL_LENGTH"),
         (("--equidistant", "180", "--png"), "--equidistant 180: fov"),
@@ -557,10 +557,10 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         ),
     ],
 )
-def test_mistakes_are_named(run, flags, told):
+def test_mistakes_are_named(run, flags, message):
     with pytest.raises(UserError) as error:
         run(*flags)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -598,17 +598,17 @@ def test_a_settings_file_gives_the_bytes_of_the_flags(dataset, run, tmp_path, fl
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "message"),
     [
         ({"bits": 16}, "formats: must be a list of exr, png, or both"),
         ({"formats": ["png"], "passes": ["normal"]}, "passes: is normal; "),
     ],
 )
-def test_settings_that_fit_no_run_are_named(dataset, run, tmp_path, settings, told):
+def test_settings_that_fit_no_run_are_refused(dataset, run, tmp_path, settings, message):
     (tmp_path / "settings.json").write_text(json.dumps(settings))
     with pytest.raises(UserError) as error:
         run("--settings", str(tmp_path / "settings.json"))
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert not (dataset / "out").exists()
 
 
@@ -640,7 +640,7 @@ def test_samples_have_the_published_tools_default_filter(dataset, run):
     assert read_header(dataset / "out" / "view_0000f.png").attributes["plenoforge:key"] == key
 
 
-# Against Cycles
+# Compared with Cycles
 
 
 PLACE, HALF = np.array([1.0, 2.0, -1.5]), 10.0
@@ -683,7 +683,7 @@ LENSES = {
 
 @pytest.fixture(scope="module")
 def renders(tmp_path_factory):
-    """Cycles' views of one room from one place through every lens, twice with other seeds."""
+    """Cycles' views of one room from one place through every lens, twice with different seeds."""
     path = tmp_path_factory.mktemp("lenses") / "renders.npz"
     cases = [
         {
@@ -711,22 +711,22 @@ def renders(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", [name for name in LENSES if name != "fisheye"])
-def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
+def test_a_reprojection_equals_cycles_render_through_that_lens(renders, name):
     lens, _, angles = LENSES[name]
     source = LENSES["fisheye"][0]
     made = lens_map.compute(source, lens, lens_map.rotation_matrix(*angles), "adaptive")
-    # Not the pixels on the rim of an image circle, of which a part has no light.
-    known = (~np.isnan(made.target_cos)).astype(np.uint8)
-    whole = cv2.erode(known, np.ones((3, 3)), borderValue=0) > 0
-    seen = (made.flags == kernels.INSIDE) & whole
+    # Leave out pixels on the rim of an image circle, which are partly dark.
+    has_source = (~np.isnan(made.target_cos)).astype(np.uint8)
+    all_have_source = cv2.erode(has_source, np.ones((3, 3)), borderValue=0) > 0
+    seen = (made.flags == kernels.INSIDE) & all_have_source
     assert seen.mean() > 0.7
     row, end_row, column, end_column = made.window
     window = np.s_[row:end_row, column:end_column]
     color = renders["fisheye.1.color"][window]
-    found = resample_colour(widen(color, color, color), made)[..., 0]
-    one, other = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
-    noise = np.sqrt(np.mean((one - other)[seen] ** 2) / 2)
-    error = (found - (one + other) / 2)[seen]
+    reprojected = resample_colour(widen(color, color, color), made)[..., 0]
+    first, second = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
+    noise = np.sqrt(np.mean((first - second)[seen] ** 2) / 2)
+    error = (reprojected - (first + second) / 2)[seen]
     assert noise < 0.02
     assert np.sqrt(np.mean(error**2)) < 1.5 * noise
     assert abs(error.mean()) < noise / 5
@@ -736,7 +736,7 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     # Cycles' depth is along the axis for a perspective camera, else the distance.
     is_z = isinstance(lens, Rectilinear)
     ours = resample_depth(depth, False, is_z, made)
-    # Away from the room's edges, where two walls meet.
+    # Leave out the room's edges, where two walls meet.
     rays = lens.pixel_rays()
     distance = direct / -rays[..., 2] if is_z else direct
     rotation = AHEAD @ lens_map.rotation_matrix(*angles)
@@ -752,14 +752,14 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
 
 def test_the_benchmark_measures_every_method(tmp_path, run_program):
     program = Path(__file__).parents[1] / "benchmarks" / "reprojection.py"
-    told = run_program(program, tmp_path, "--size", 128, "--repeats", 1).stdout
-    assert "default filter adaptive: " in told
+    output = run_program(program, tmp_path, "--size", 128, "--repeats", 1).stdout
+    assert "default filter adaptive: " in output
     with (tmp_path / "reprojection.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["scenario"] for row in rows} == {"minify by 8", "unity", "magnify by 3"}
     assert {row["method"] for row in rows} >= set(FILTERS) | {"OpenCV"}
     error = {(r["scenario"], r["method"], r["samples"]): float(r["rms_error"]) for r in rows}
-    # What is known of the methods without measuring them.
+    # Facts about the methods that hold without measuring.
     assert error["minify by 8", "adaptive", "1"] < error["minify by 8", "bicubic", "1"] / 5
     assert error["minify by 8", "bicubic", "8"] < error["minify by 8", "bicubic", "2"] / 5
     for scenario in ("unity", "magnify by 3"):

@@ -1,4 +1,4 @@
-"""Resampling against analytic truth, OpenCV and OpenImageIO."""
+"""Resampling, compared with analytic truth, OpenCV and OpenImageIO."""
 
 import itertools
 import math
@@ -45,7 +45,7 @@ class Waves:
         return 1 + waves.mean(axis=-1)
 
     def pixels(self, lens: Lens, rotation=IDENTITY, nodes: int = 3):
-        """The mean over each pixel's area, by Gauss–Legendre quadrature."""
+        """Return the mean over each pixel's area, by Gauss–Legendre quadrature."""
         places, weights = np.polynomial.legendre.leggauss(nodes)
         total = 0
         for y, v in zip(places / 2, weights / 2, strict=True):
@@ -59,7 +59,7 @@ def as_source(gray):
 
 
 def apply(source, made):
-    """Resample a whole image (h, w, 4), of which the map reads a window."""
+    """Resample a whole image (h, w, 4). The map reads a window of it."""
     row, end_row, column, end_column = made.window
     return resample_colour(np.ascontiguousarray(source[row:end_row, column:end_column]), made)
 
@@ -82,7 +82,7 @@ def narrow_lens(size: int, focal_length: float = 18) -> Rectilinear:
 # Colour
 
 
-def test_every_half_is_widened_as_numpy_does():
+def test_halves_become_floats_as_in_numpy():
     halves = np.arange(65536, dtype=np.uint16).view(np.float16).reshape(4, 128, 128)
     expected = np.moveaxis(halves.astype(np.float32), 0, -1)
     assert np.array_equal(widen(*halves), expected, equal_nan=True)
@@ -91,7 +91,7 @@ def test_every_half_is_widened_as_numpy_does():
     assert not mixed[..., 3].any()
 
 
-def test_floats_are_narrowed_as_numpy_does_and_held_in_range():
+def test_floats_become_halves_as_in_numpy_within_the_limits():
     rng = np.random.default_rng(0)
     values = (rng.standard_normal((64, 64, 4)) * 10.0 ** rng.uniform(-9, 4, (64, 64, 4))).astype(
         "f4"
@@ -103,7 +103,7 @@ def test_floats_are_narrowed_as_numpy_does_and_held_in_range():
 
 
 def test_bilinear_equals_opencv_on_the_same_coordinates():
-    # Shifted by multiples of 1/32 pixel, to which OpenCV rounds its coordinates.
+    # Shifted by multiples of 1/32 pixel, because OpenCV rounds its coordinates to these.
     source = narrow_lens(64)
     target = Rectilinear(
         width=32,
@@ -137,8 +137,8 @@ def test_lanczos_weights_are_the_windowed_sinc():
     for t in (0.0, 1e-6, 0.1, 0.5, 0.77, 0.999):
         distance = t + 2 - np.arange(6)
         expected = np.sinc(distance) * np.sinc(distance / 3)
-        found = kernels.lanczos_weights(np.float32(t))
-        assert np.abs(np.array(found) - expected / expected.sum()).max() < 1e-6
+        weights = kernels.lanczos_weights(np.float32(t))
+        assert np.abs(np.array(weights) - expected / expected.sum()).max() < 1e-6
 
 
 def rms(values):
@@ -148,16 +148,16 @@ def rms(values):
 @pytest.mark.parametrize(
     ("size", "focal_length", "bounds"),
     [
-        # Minified by 2.5 to 5: what does not cover the pixel aliases.
+        # Minified by 2.5 to 5: a filter that does not cover the pixel aliases.
         (32, 18, {"bicubic": (2e-2, 1), "adaptive": (0, 8e-4)}),
-        # About unity.
+        # About the same size.
         (160, 18, {"bilinear": (5e-3, 1), "bicubic": (0, 2e-3), "adaptive": (0, 2e-3)}),
         # Magnified by 3: an adaptive filter must not blur.
         (128, 67, {"bilinear": (7e-3, 1), "bicubic": (0, 3.5e-3), "adaptive": (0, 3.5e-3)}),
     ],
 )
 def test_error_against_the_mean_of_an_analytic_function_over_each_pixel(size, focal_length, bounds):
-    # Up to half the source's Nyquist frequency.
+    # The function reaches half the source's Nyquist frequency.
     function = Waves(math.pi / 2 * FISHEYE.width / math.pi)
     source = as_source(function.pixels(FISHEYE, nodes=3))
     rotation = lens_map.rotation_matrix(20, 10, 25)
@@ -170,7 +170,7 @@ def test_error_against_the_mean_of_an_analytic_function_over_each_pixel(size, fo
 
 
 def test_samples_cover_the_whole_pixel():
-    # A source pixel column is brighter the further right it is, and so is its reprojection: the
+    # A source pixel column is brighter the further right it is, and so is its reprojection. The
     # mean of n × n samples of a straight ramp is the ramp at the pixel's centre.
     source, target = narrow_lens(64), narrow_lens(8)
     ramp = as_source(np.tile(np.arange(64) + 0.5, (64, 1)))
@@ -184,7 +184,7 @@ def test_samples_cover_the_whole_pixel():
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_what_lies_outside_the_image_circle_is_marked_and_nothing_is_smeared(name):
+def test_pixels_outside_the_image_circle_are_marked_without_smearing(name):
     source = np.full((256, 256, 4), 0.5, np.float32)
     source[np.isnan(rays_of(FISHEYE)[..., 0])] = 1e4
     target = narrow_lens(64)
@@ -199,7 +199,7 @@ def test_what_lies_outside_the_image_circle_is_marked_and_nothing_is_smeared(nam
 
 @pytest.mark.parametrize("name", FILTERS)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_what_is_no_number_does_not_spread(name, bad):
+def test_a_value_that_is_not_a_number_does_not_spread(name, bad):
     function = Waves(20)
     clean = as_source(function.pixels(FISHEYE, nodes=1))
     clean[~np.isfinite(clean)] = 0
@@ -242,7 +242,7 @@ def test_a_panorama_has_no_seam(name):
 
 @pytest.mark.parametrize("pitch", [-90, 90])
 @pytest.mark.parametrize("size", [24, pytest.param(256, marks=pytest.mark.slow)])
-def test_a_panorama_is_whole_at_its_poles(pitch, size):
+def test_a_panorama_is_complete_at_its_poles(pitch, size):
     function = Waves(25)
     source = as_source(function.pixels(PANORAMA, nodes=3))
     rotation = lens_map.rotation_matrix(17, pitch, 0)
@@ -254,14 +254,14 @@ def test_a_panorama_is_whole_at_its_poles(pitch, size):
     assert rms(error) < 2e-3
 
 
-def test_openimageio_agrees_about_a_rotated_view():
-    # The same rotation through OpenImageIO's own affine warp, about the image's centre.
+def test_openimageio_agrees_on_a_rotated_view():
+    # OpenImageIO's own affine warp turns about the image's centre.
     lens = narrow_lens(128)
     image = as_source(Waves(15).pixels(lens, nodes=1))
     made = lens_map.compute(lens, lens, lens_map.rotation_matrix(0, 0, 30), "bicubic")
     buffer = oiio.ImageBuf(oiio.ImageSpec(128, 128, 4, "float"))
     buffer.set_pixels(oiio.ROI(0, 128, 0, 128, 0, 1, 0, 4), image)
-    # A camera that turns clockwise sees the image turn counterclockwise.
+    # If a camera turns clockwise, its image turns counterclockwise.
     turned = oiio.ImageBufAlgo.rotate(buffer, math.radians(-30), 64.0, 64.0, "cubic", 0.0)
     inner = np.s_[40:88, 40:88, 0]
     difference = apply(image, made)[inner] - np.asarray(turned.get_pixels(oiio.FLOAT))[inner]
@@ -270,7 +270,7 @@ def test_openimageio_agrees_about_a_rotated_view():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (9, 7)])
-def test_no_pair_of_lenses_and_no_value_gives_what_is_no_answer(size):
+def test_every_pair_of_lenses_and_every_value_gives_an_answer(size):
     width, height = size
     rng = np.random.default_rng(width)
     common = {"width": width, "height": height}
@@ -298,8 +298,8 @@ def test_no_pair_of_lenses_and_no_value_gives_what_is_no_answer(size):
             assert not np.isinf(out).any() and not (out < 0).any()
         depth = 10 ** rng.uniform(-6, 9, image.shape[:2])
         depth[0, 0] = np.inf
-        found = apply_depth(depth.astype("f4"), made, False, False)
-        finite = found[np.isfinite(found)]
+        resampled_depth = apply_depth(depth.astype("f4"), made, False, False)
+        finite = resampled_depth[np.isfinite(resampled_depth)]
         assert ((finite > 0.99e-6) & (finite < 1.01e9)).all()
 
 
@@ -314,10 +314,10 @@ def test_a_cube_map_is_as_exact_at_its_faces_borders_as_inside(name, pixels, ang
     rotation = lens_map.rotation_matrix(*angles)
     truth = scene.pixels(target, rotation, 5)
 
-    # The same pixels of a single face, so wide that the edge is in its midst.
+    # The same pixels in a single face, so wide that the edge is in its middle.
     wide = Rectilinear(width=192, height=192, focal_length=6, sensor_size=(36, 36))
     ahead = lens_map.rotation_matrix(*(90 * round(angle / 90 + 0.1) for angle in angles[:2]), 0)
-    # On its side of the edge, up to 3 pixels from it; beyond, the wide face has finer pixels.
+    # On its own side of the edge, within 3 pixels. Beyond, the wide face has finer pixels.
     side = np.abs(rays_of(target) @ (ahead.T @ rotation).T)
     away = (1 - side[..., :2].max(axis=-1) / side[..., 2]) * 32
     near = (away > 0) & (away < 3)
@@ -335,14 +335,14 @@ def test_a_cube_map_is_as_exact_at_its_faces_borders_as_inside(name, pixels, ang
 
 
 def plane_distance(rays, normal, offset):
-    """The distance along each ray to the plane normal · p = offset; inf where it is missed."""
+    """Return the distance along each ray to the plane normal · p = offset, inf for a miss."""
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = offset / (rays @ normal)
     return np.where(distance > 0, distance, np.inf)
 
 
 def sphere_distance(rays, center, radius):
-    """The distance along each ray to a sphere in front of the camera; inf where it is missed."""
+    """Return the distance along each ray to a sphere in front of the camera, inf for a miss."""
     along = rays @ center
     with np.errstate(invalid="ignore"):
         distance = along - np.sqrt(along**2 - center @ center + radius**2)
@@ -378,17 +378,17 @@ def test_the_depth_of_planes_and_a_sphere_is_exact_away_from_edges(source, targe
         lambda rays: sphere_distance(rays, np.array([-0.7, 0.4, -2.5]), 1.5),
     ):
         distance = surface(rays_of(source))
-        found = apply_depth(
+        resampled = apply_depth(
             as_depth(distance, source), made, source.has_z_depth, target.has_z_depth
         )
         expected = surface(rays @ rotation.T)
         seen = ~np.isnan(made.centers[..., 0])
-        assert np.isnan(found[~seen]).all()
+        assert np.isnan(resampled[~seen]).all()
         if target.has_z_depth:
             expected = expected * -rays[..., 2]
-        # Three source pixels from where the surface ends.
+        # Leave out three source pixels around the surface's end.
         hit = np.isfinite(distance) & (distance < 100)
-        # A panorama ends nowhere, neither at its seam nor at its poles.
+        # A panorama has no border, neither at its seam nor at its poles.
         beyond = 1 if isinstance(source, Equirectangular) else 0
         inside = cv2.erode(hit.astype(np.uint8), np.ones((7, 7)), borderValue=beyond) > 0
         row, column = (
@@ -397,7 +397,7 @@ def test_the_depth_of_planes_and_a_sphere_is_exact_away_from_edges(source, targe
         )
         tested = seen & inside[row, column]
         covered += tested.sum()
-        assert np.abs(found[tested] / expected[tested] - 1).max(initial=0) < 1e-4
+        assert np.abs(resampled[tested] / expected[tested] - 1).max(initial=0) < 1e-4
     assert covered > 2000
 
 
@@ -417,45 +417,47 @@ def test_no_depth_lies_between_two_surfaces(dtype):
     assert not np.isnan(depth).any()
 
 
-def test_depth_stays_within_its_neighbourhood_and_missing_values_stay_where_they_are():
+def test_depth_stays_within_its_neighbourhood_and_missing_values_stay_in_place():
     source = Equidistant(width=256, height=256, fov=math.pi)
     rng = np.random.default_rng(3)
     distance = rng.uniform(1, 9, (256, 256))
     distance[60:90, 60:90] = np.inf
     distance[120:150, 60:90] = np.nan
     made = lens_map.compute(source, narrow_lens(200), IDENTITY, "adaptive")
-    found = apply_depth(distance.astype("f4"), made, False, False)
+    resampled = apply_depth(distance.astype("f4"), made, False, False)
     low, high = (morphology(distance, np.ones((3, 3))) for morphology in (cv2.erode, cv2.dilate))
     row, column = (
         np.floor(made.centers[..., i] + made.window[2 * j]).astype(int) for i, j in ((1, 0), (0, 1))
     )
     finite = np.isfinite(low[row, column]) & np.isfinite(high[row, column])
     assert finite.mean() > 0.8
-    assert (found >= low[row, column] * (1 - 1e-6))[finite].all()
-    assert (found <= high[row, column] * (1 + 1e-6))[finite].all()
-    assert np.array_equal(np.isinf(found), np.isinf(distance[row, column]))
-    assert np.array_equal(np.isnan(found), np.isnan(distance[row, column]))
+    assert (resampled >= low[row, column] * (1 - 1e-6))[finite].all()
+    assert (resampled <= high[row, column] * (1 + 1e-6))[finite].all()
+    assert np.array_equal(np.isinf(resampled), np.isinf(distance[row, column]))
+    assert np.array_equal(np.isnan(resampled), np.isnan(distance[row, column]))
 
 
 def test_the_top_of_a_ridge_is_no_nearer_than_its_pixels():
-    # Its top lies between two pixels, where a curve through them would be nearer than all.
+    # The top lies between two pixels. A curve through them would come nearer than both.
     from_top = np.minimum(np.abs(np.arange(256) - 127.5), 3)
     distance = np.broadcast_to(1 / (1 - 0.05 * from_top**2), (256, 256))
     made = lens_map.compute(FISHEYE, narrow_lens(900, focal_length=90), IDENTITY, "adaptive")
-    found = apply_depth(distance.astype("f4"), made, False, False)
-    assert found.max() > 1.5
-    assert found.min() == pytest.approx(distance.min(), rel=1e-6)
+    resampled = apply_depth(distance.astype("f4"), made, False, False)
+    assert resampled.max() > 1.5
+    assert resampled.min() == pytest.approx(distance.min(), rel=1e-6)
 
 
-def test_depth_is_taken_at_the_pixel_centre_whatever_the_samples():
+def test_depth_is_taken_at_the_pixel_centre_for_any_samples():
     source = Equidistant(width=256, height=256, fov=math.pi)
     depth = as_depth(plane_distance(rays_of(source), np.array([0.3, 0, -1.0]), 2.0), source)
-    one, many = (lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4))
-    assert np.allclose(apply_depth(depth, one), apply_depth(depth, many), rtol=1e-6)
+    single, many = (
+        lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4)
+    )
+    assert np.allclose(apply_depth(depth, single), apply_depth(depth, many), rtol=1e-6)
 
 
 def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
-    # Its rim cuts pixels of the source in two.
+    # The rim cuts pixels of the source in two.
     fisheye = Equidistant(width=64, height=64, fov=2.5)
     target = Equidistant(width=400, height=400, fov=2.6)
     rays = rays_of(fisheye)
@@ -466,7 +468,7 @@ def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
     seen = np.isfinite(color)
     assert 0.8 < seen.mean() / (math.pi / 4 * (2.5 / 2.6) ** 2) < 1.2
     assert np.array_equal(np.isfinite(depth), seen)
-    # Every depth is one that the source has within a pixel and a half.
+    # Every depth occurs in the source within a pixel and a half.
     points = fisheye.pixels(rays_of(target)[seen])
     column, row = np.clip(points.astype(int), 0, 63).T
     padded = np.pad(distance, 1, constant_values=np.nan)
@@ -478,11 +480,11 @@ def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4"])
-def test_a_depth_of_zero_stays_one(dtype):
+def test_a_depth_of_zero_is_kept(dtype):
     made = lens_map.compute(FISHEYE, FISHEYE, IDENTITY)
     depth = np.full((256, 256), 3, dtype)
     depth[100:104, 90] = 0
     for is_z in (False, True):
-        found = apply_depth(depth, made, is_z, is_z)
-        assert not found[100:104, 90].any()
-        assert np.allclose(found[110:140, 80:100], 3, rtol=1e-6)
+        resampled = apply_depth(depth, made, is_z, is_z)
+        assert not resampled[100:104, 90].any()
+        assert np.allclose(resampled[110:140, 80:100], 3, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""Rigs whose poses are given: paths through keys, free places, stereo pairs, and files' formats."""
+"""Rigs with given poses: paths through keys, free places, stereo pairs, and formats of files."""
 
 import json
 import struct
@@ -39,7 +39,7 @@ def path(keys, count, **more):
 
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("size", [1, [1, 3, 0.5]])
-def test_cameras_are_evenly_along_a_path_through_its_keys(closed, size):
+def test_cameras_are_evenly_spaced_along_a_path_through_its_keys(closed, size):
     many = places(path(CORNER, 20001, closed=closed, size=size))
     ends = np.vstack([many, many[:1]]) if closed else many
     steps = np.linalg.norm(np.diff(ends, axis=0), axis=-1)
@@ -94,7 +94,7 @@ def test_rotations_turn_evenly_from_key_to_key():
         ),
     ],
 )
-def test_what_is_no_path_is_refused(keys, expected):
+def test_an_invalid_path_is_refused(keys, expected):
     with pytest.raises(UserError, match=expected):
         path(keys, 3).poses()
     with pytest.raises(UserError, match="keys: two in a row are at one place"):
@@ -115,10 +115,10 @@ def test_random_places_are_seeded_and_a_thinned_rig_has_the_first_of_them():
     assert np.ptp(places(rig), axis=0).min() > 2
     up = matrices(rig)[:, :3, 1]
     np.testing.assert_allclose(up, [[0, 0, 1]] * 40, atol=1e-9)
-    # They are what they were, in every version: datasets are made again from them.
-    one = from_settings({"type": "random", "count": 2, "seed": 5}).poses()[1]
-    np.testing.assert_allclose(one.position, [-0.029277, 0.195880, 0.316538], atol=1e-6)
-    assert one.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
+    # These places never change, because datasets are rendered again from them.
+    pose = from_settings({"type": "random", "count": 2, "seed": 5}).poses()[1]
+    np.testing.assert_allclose(pose.position, [-0.029277, 0.195880, 0.316538], atol=1e-6)
+    assert pose.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
 
 
 BUILD = """
@@ -134,9 +134,9 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
 def free_places(blend, rig, output):
     settings = blend.with_name("free_places.json")
     settings.write_text(json.dumps({"rig": rig}))
-    words = ["--blend", blend, "--settings", settings, "--output", output]
+    arguments = ["--blend", blend, "--settings", settings, "--output", output]
     return subprocess.run(
-        [sys.executable, SCRIPTS / "free_places.py", *words],
+        [sys.executable, SCRIPTS / "free_places.py", *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -150,14 +150,14 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     output = tmp_path / "places.json"
     result = free_places(blend, RANDOM | {"clearance": 0.6}, output)
     assert result.returncode == 0, result.stderr
-    found = places(from_settings(RANDOM).placed(output))
-    assert len(np.unique(found, axis=0)) == 40
-    # Walls, floor and ceiling; the ball, the box within its own ball, and the pillar's axis.
-    assert (np.abs(found - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
-    assert np.linalg.norm(found - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
-    assert np.linalg.norm(found - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
-    assert np.linalg.norm(found[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
-    # Nowhere in the box is the box's own half of a metre free.
+    free = places(from_settings(RANDOM).placed(output))
+    assert len(np.unique(free, axis=0)) == 40
+    # Distances to walls, floor and ceiling, the ball, the ball in the box, and the pillar's axis.
+    assert (np.abs(free - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
+    assert np.linalg.norm(free - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
+    assert np.linalg.norm(free - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
+    assert np.linalg.norm(free[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
+    # The scene's box lies in the rig's box, so no place has half a metre free.
     narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
     result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
     assert result.returncode == 1
@@ -186,23 +186,23 @@ def test_a_random_rigs_places_are_a_file_of_its_dataset(tmp_path, monkeypatch):
 @pytest.mark.parametrize("kind", ["plane", "cylinder"])
 def test_a_stereo_pair_stands_on_both_sides_of_its_position(kind, more):
     rig = {"type": kind, "cameras": [3, 2], "size": 2, **more}
-    one = from_settings(rig)
+    stereo_pair = from_settings(rig)
     pair = from_settings(rig | {"stereo": {"distance": 0.064}})
     assert pair.view_count == 12
     names = [pose.name for pose in pair.poses()]
     assert names == sorted(names)
     assert names[:2] == ["view_0000f_left", "view_0000f_right"]
     left, right = matrices(pair)[::2], matrices(pair)[1::2]
-    np.testing.assert_allclose(left[:, :3, :3], matrices(one)[:, :3, :3], atol=1e-9)
+    np.testing.assert_allclose(left[:, :3, :3], matrices(stereo_pair)[:, :3, :3], atol=1e-9)
     np.testing.assert_array_equal(left[:, :3, :3], right[:, :3, :3])
-    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, places(one), atol=1e-9)
-    # In the camera's own axes the right eye is to the right.
+    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, places(stereo_pair), atol=1e-9)
+    # In the camera's own axes, the right eye is on the right.
     apart = (right - left)[:, None, :3, 3] @ left[:, :3, :3]
     np.testing.assert_allclose(apart[:, 0], [[0.064, 0, 0]] * 6, atol=1e-9)
     assert len(pair.thinned(4).poses()) == 4
 
 
-def test_a_stereo_pair_is_no_cube_map():
+def test_a_stereo_pair_cannot_be_a_cube_map():
     with pytest.raises(UserError, match="stereo: does not go with cube_map"):
         from_settings(
             {"type": "plane", "cameras": [2, 2], "cube_map": True, "stereo": {"distance": 0.1}}
@@ -257,7 +257,7 @@ def _colmap_text(folder):
 
 
 def _colmap_text_without_points(folder):
-    """Some programs that write poses alone leave the line of an image's points out."""
+    """Some programs that write only poses omit the line of an image's points."""
     text = (folder / _colmap_text(folder)).read_text()
     lines = [line for line in text.splitlines() if line and not line.startswith("1.5")]
     (folder / "images.txt").write_text("\n".join(lines))
@@ -278,14 +278,14 @@ def _colmap_binary(folder):
     "write",
     [_csv, _transforms, _applied, _colmap_text, _colmap_text_without_points, _colmap_binary],
 )
-def test_poses_are_read_as_each_format_has_them(write, tmp_path):
+def test_poses_of_each_format_are_read(write, tmp_path):
     rig = from_settings({"type": "poses", "file": str(tmp_path / write(tmp_path))})
     assert [pose.name for pose in rig.poses()] == ["v0", "v1", "v2"]
     np.testing.assert_allclose(matrices(rig), POSES, atol=3e-6)
 
 
-def test_colmaps_pose_puts_a_point_before_the_camera_where_it_sees_it():
-    """By its definition: a world point x is at R x + t, with x right, y down and z forward."""
+def test_colmaps_pose_puts_a_point_before_the_camera_that_sees_it():
+    """By definition, a world point x is at R x + t, with x right, y down and z forward."""
     for matrix in POSES:
         (w, *xyz), translation = colmap.pose(matrix)
         world = (matrix @ [0.3, 0.2, -5, 1])[:3]
@@ -312,11 +312,11 @@ def test_colmaps_pose_puts_a_point_before_the_camera_where_it_sees_it():
         ),
         ("images.txt", "1 1 0 0 0 0 0\n", "image 1: must be IMAGE_ID, QW"),
         ("images.txt", "1 1 0 x 0 0 0 0 1 v.png\n", "image 1: must be a finite number"),
-        ("images.bin", "\0" * 7, "is no images.bin of COLMAP's, or is cut short"),
-        ("images.bin", "\x02" + "\0" * 30, "is no images.bin of COLMAP's, or is cut short"),
+        ("images.bin", "\0" * 7, "is not COLMAP's images.bin, or is cut short"),
+        ("images.bin", "\x02" + "\0" * 30, "is not COLMAP's images.bin, or is cut short"),
     ],
 )
-def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
+def test_an_invalid_file_of_poses_is_refused(name, content, expected, tmp_path):
     (tmp_path / name).write_text(content)
     with pytest.raises(UserError, match=expected):
         from_settings({"type": "poses", "file": str(tmp_path / name)}).poses()
@@ -334,7 +334,7 @@ def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
         (lambda pose, by: pose["world_matrix"][3].__setitem__(1, by), 9e-5, 1.1e-4, "its last row"),
         (lambda pose, by: pose["rotation"].__setitem__(2, by), 9e-5, 1.1e-4, "the same rotation"),
         (lambda pose, by: pose["position"].__setitem__(0, by), 9e-5, 1.1e-4, "the same place"),
-        # Far away, in proportion.
+        # Far away, the tolerance is proportional.
         (
             lambda pose, by: pose.update(
                 world_matrix=[[1, 0, 0, 100], *np.eye(4)[1:].tolist()], position=[100 + by, 0, 0]
@@ -353,9 +353,7 @@ def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
         ),
     ],
 )
-def test_poses_may_be_as_far_from_a_rotation_and_from_each_other_as_files_round(
-    change, within, beyond, expected, tmp_path
-):
+def test_poses_may_deviate_as_much_as_files_round(change, within, beyond, expected, tmp_path):
     for by, refused in ((within, False), (beyond, True)):
         pose = {"name": "a", "position": [0, 0, 0], "rotation": [0, 0, 0]}
         pose["world_matrix"] = np.eye(4).tolist()
@@ -370,7 +368,7 @@ def test_poses_may_be_as_far_from_a_rotation_and_from_each_other_as_files_round(
             assert len(rig.poses()) == 1
 
 
-def test_a_quaternion_may_be_as_long_as_files_round(tmp_path):
+def test_a_quaternions_length_may_deviate_as_much_as_files_round(tmp_path):
     for length, refused in ((1 + 9e-5, False), (1 - 9e-5, False), (1 + 1.1e-4, True)):
         file = tmp_path / f"{length}.csv"
         file.write_text(f"name,x,y,z,qw,qx,qy,qz\na,1,2,3,0,0,0,{length}\n")
@@ -382,7 +380,7 @@ def test_a_quaternion_may_be_as_long_as_files_round(tmp_path):
             np.testing.assert_allclose(matrices(rig)[0, :3, :3], np.diag([-1, -1, 1]), atol=1e-12)
 
 
-def test_a_file_that_is_too_large_for_poses_is_not_read(tmp_path, monkeypatch):
+def test_a_file_too_large_for_poses_is_not_read(tmp_path, monkeypatch):
     file = tmp_path / "poses.csv"
     file.write_text("name,x,y,z,rx,ry,rz\na,0,0,0,0,0,0")
     size = file.stat().st_size

@@ -1,4 +1,4 @@
-"""The interpolation volume against rays traced by its definition, and the table of the rigs."""
+"""The interpolation volume, compared with traced rays, and the table of the rigs."""
 
 import csv
 import math
@@ -33,9 +33,9 @@ def volume(rig: Any, camera: Any) -> float:
 def traced_volume(rig: dict[str, Any], sees: Any, count: int) -> tuple[float, float]:
     """Estimate the volume by tracing rays from random points, with its standard error.
 
-    By the definition: every ray from the point must cross a triangle of three neighbouring
-    cameras that all see the ray's direction. ``sees`` says it of directions in the camera's
-    coordinates. The rays go to a fine grid on each triangle of the sphere, its corners included.
+    By definition, every ray from the point must cross a triangle of three neighbouring cameras that
+    all see the ray's direction. ``sees`` tells whether a camera sees directions, in its own
+    coordinates. The rays go to a fine grid on each triangle of the sphere, including its corners.
     """
     views = rigs.from_settings(rig).poses()
     matrices = np.stack([view.matrix()[:3, :3] for view in views])
@@ -82,7 +82,7 @@ def traced_volume(rig: dict[str, Any], sees: Any, count: int) -> tuple[float, fl
         ),
     ],
 )
-def test_volume_of_a_coarse_sphere_is_that_of_traced_rays(camera: Any, sees: Any) -> None:
+def test_a_coarse_spheres_volume_equals_that_of_traced_rays(camera: Any, sees: Any) -> None:
     rig = {"type": "sphere", "subdivisions": 2, "size": [1, 1, 1.3], "center": [1, 2, 3]}
     traced, error = traced_volume(rig, sees, 20_000)
     assert traced > 20 * error
@@ -93,7 +93,7 @@ def test_volume_of_a_coarse_sphere_is_that_of_traced_rays(camera: Any, sees: Any
     ("cameras", "size", "expected"),
     [([10, 30, 10], [1, 3, 1], 3.0), ([21, 21, 16], [4, 4, 3], 48.0), ([2, 2, 2], 1, 1.0)],
 )
-def test_a_cuboid_of_180_degree_views_interpolates_all_of_its_box(
+def test_a_cuboid_of_180_degree_views_interpolates_its_whole_box(
     cameras: list[int], size: Any, expected: float
 ) -> None:
     rig = {"type": "cuboid", "cameras": cameras, "size": size, "rotation": [10, 20, 30]}
@@ -111,12 +111,12 @@ def test_a_spheres_volume_grows_towards_the_ball_with_its_cameras() -> None:
     assert math.cos(1.3 * delta) ** 3 < shares[-1] < 1
 
 
-def test_facing_inside_gives_the_same_volume_by_the_rays_behind() -> None:
+def test_facing_inside_gives_the_same_volume_through_the_rays_behind() -> None:
     rig = {"type": "sphere", "subdivisions": 2}
     assert volume({**rig, "face_inside": True}, FISHEYE) == pytest.approx(volume(rig, FISHEYE))
 
 
-def test_panoramas_and_cube_maps_interpolate_whatever_they_surround() -> None:
+def test_panoramas_and_cube_maps_interpolate_everything_between_them() -> None:
     lattice = {"type": "lattice", "cameras": [2, 2, 2], "size": [1, 2, 3]}
     assert volume(lattice, PANORAMA) == pytest.approx(6)
     assert volume({**lattice, "cube_map": True}, {**SQUARE, "fov": 90}) == pytest.approx(6)
@@ -136,7 +136,7 @@ def test_panoramas_and_cube_maps_interpolate_whatever_they_surround() -> None:
         {"type": "sphere", "subdivisions": 2, "size": [1, 1, 0]},
     ],
 )
-def test_a_surface_that_is_open_or_flat_has_no_immersive_volume(rig: Any) -> None:
+def test_an_open_or_flat_surface_has_no_immersive_volume(rig: Any) -> None:
     assert volume(rig, FISHEYE) == 0
 
 
@@ -149,7 +149,7 @@ def test_loose_poses_span_no_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("camera", [FISHEYE, NARROW, PANORAMA])
 @pytest.mark.parametrize("face_inside", [False, True])
-def test_places_nearer_than_the_edge_are_the_volume(camera: Any, face_inside: bool) -> None:
+def test_places_within_the_edge_make_up_the_volume(camera: Any, face_inside: bool) -> None:
     center = np.array([3.0, -2, 1])
     rig = {"type": "sphere", "subdivisions": 2, "size": 2, "center": center.tolist()}
     rig |= {"face_inside": face_inside, "camera": camera}
@@ -163,7 +163,7 @@ def test_places_nearer_than_the_edge_are_the_volume(camera: Any, face_inside: bo
     )
 
 
-def test_what_lies_in_a_plane_has_no_inside() -> None:
+def test_a_plane_has_no_inside() -> None:
     rig = rigs.from_settings({"type": "plane", "cameras": [3, 3], "size": 1})
     matrices = np.stack([pose.matrix() for pose in rig.poses()])
     parts = parts_to_edge(matrices, lenses.from_camera(FISHEYE), np.zeros((2, 3)))
@@ -192,13 +192,13 @@ rigs:
 """.replace("CAMERA", "lens: equidistant, fov: 180, resolution: [64, 64]")
 
 
-def test_the_table_sets_computed_figures_beside_the_printed_ones(
+def test_the_table_has_computed_figures_beside_the_printed_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, table, figures = (tmp_path / name for name in ("silvr.yaml", "rigs.md", "rigs.csv"))
-    own = tmp_path / "own.blend"
-    own.touch()
-    scene.write_text(SCENE.replace("FILE", str(own)))
+    own_blend = tmp_path / "own.blend"
+    own_blend.touch()
+    scene.write_text(SCENE.replace("FILE", str(own_blend)))
     arguments = ["rig_table.py", scene, "--markdown", table, "--csv", figures]
     monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
     rig_table.main()
@@ -226,6 +226,6 @@ def test_the_table_sets_computed_figures_beside_the_printed_ones(
     ) in text
     said = text.split("## Differences")[1]
     assert "LFCuboid_2x2x1" not in said
-    # Printed 11 cm: the nearest camera is 3 m / 29 or 1 m / 9 away, most of them the former.
+    # The paper says 11 cm. The nearest camera is 3 m / 29 or 1 m / 9 away, mostly the former.
     assert "LFCuboid_1mx3mx1m: the nearest camera is 10.4 cm" in said
     assert "10.8 cm, agrees with the print" in said

@@ -1,4 +1,4 @@
-"""Camera rigs against Blender: its own icosphere, vertex normals, cross products and mathutils."""
+"""Camera rigs, compared with Blender's own icosphere, normals, cross products and mathutils."""
 
 import json
 import math
@@ -18,7 +18,7 @@ from lightfield.geometry import lenses, rigs
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rigs.sphere import icosphere, nested
 
-# Every dataset of SILVR: the number of views as published, and the rig.
+# Every dataset of SILVR: the published number of views, and the rig.
 SILVR: dict[str, tuple[int, dict[str, Any]]] = {
     "barbershop cuboid": (
         1400,
@@ -35,7 +35,7 @@ SILVR: dict[str, tuple[int, dict[str, Any]]] = {
     "evaluation sphere": (42, {"type": "sphere", "subdivisions": 2, "size": 0.5}),
 }
 
-# What the addon has beside those, and the keys that a scene may add.
+# Further options of the addon, and the keys that a scene may add.
 OTHERS: dict[str, tuple[int, dict[str, Any]]] = {
     "plane": (35, {"type": "plane", "cameras": [7, 5], "size": [2, 1, 1]}),
     "cylinder": (60, {"type": "cylinder", "cameras": [12, 5], "size": [1, 1, 2]}),
@@ -60,7 +60,7 @@ OTHERS: dict[str, tuple[int, dict[str, Any]]] = {
 
 RIGS = {label: (count, from_settings(rig)) for label, (count, rig) in (SILVR | OTHERS).items()}
 
-# One rig of each type of the registry; those of files have tests of their own.
+# One rig of each type in the registry. Rigs of files have tests of their own.
 KEYS = [{"position": [0, 0, 0]}, {"position": [3, 0, 0]}, {"position": [3, 4, 1]}]
 EACH: dict[str, dict[str, Any]] = {
     "plane": {"cameras": [3, 2]},
@@ -76,7 +76,7 @@ EACH: dict[str, dict[str, Any]] = {
 }
 OF_FILES = {"poses", "blend_camera"}
 
-# The addon's method, by Blender's own means; nothing of the project is imported here.
+# The addon's method by Blender's own means. This imports nothing of the project.
 BLENDER = r"""
 import json, math, sys
 import bpy
@@ -178,7 +178,7 @@ def registered() -> set[str]:
 
 
 @pytest.mark.parametrize("name", sorted(registered() - OF_FILES))
-def test_each_type_of_rig_has_as_many_views_as_it_says_each_with_a_name(name: str) -> None:
+def test_each_type_of_rig_has_its_declared_number_of_named_views(name: str) -> None:
     rig = from_settings({"type": name, **EACH[name]})
     poses = rig.poses()
     assert len(poses) == rig.view_count == len({pose.name for pose in poses})
@@ -189,7 +189,7 @@ def test_each_type_of_rig_has_as_many_views_as_it_says_each_with_a_name(name: st
 
 
 @pytest.mark.parametrize("label", [*SILVR, *OTHERS])
-def test_every_camera_is_where_blender_puts_it(label: str, blender: dict[str, Any]) -> None:
+def test_every_camera_is_at_blenders_place(label: str, blender: dict[str, Any]) -> None:
     count, rig = RIGS[label]
     views = rig.poses()
     assert len(views) == count == rig.view_count
@@ -207,8 +207,8 @@ def test_the_silvr_rigs_have_7358_cameras() -> None:
 
 
 @pytest.mark.parametrize("label", ["garden sphere", "turned sphere", "turned cuboid"])
-def test_euler_angles_are_those_that_blender_chooses(label: str, blender: dict[str, Any]) -> None:
-    """Of the two sets of angles; where their sums are equal, rounding decides in Blender."""
+def test_euler_angles_are_blenders_choice(label: str, blender: dict[str, Any]) -> None:
+    """Two sets of angles are possible. If their sums are equal, rounding decides in Blender."""
     ours = np.array([view.rotation for view in RIGS[label][1].poses()])
     theirs = blender[f"{label} eulers"].astype(float)
     other = np.array([1, -1, 1]) * ours + math.pi
@@ -216,12 +216,12 @@ def test_euler_angles_are_those_that_blender_chooses(label: str, blender: dict[s
     tie = np.abs(np.abs(ours).sum(1) - np.abs(other).sum(1)) < 1e-5
     off = np.abs((ours - theirs + math.pi) % (2 * math.pi) - math.pi)
     assert tie.mean() < 0.15
-    # Angles lose their meaning towards gimbal lock in proportion to cos(ry).
+    # Towards gimbal lock, angles lose precision in proportion to cos(ry).
     assert (off * np.abs(np.cos(theirs[:, 1:2])))[~tie].max() < 2e-6
 
 
 @pytest.mark.parametrize("subdivisions", range(1, 8))
-def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> None:
+def test_the_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> None:
     theirs = blender[f"icosphere {subdivisions}"]
     np.testing.assert_allclose(icosphere(subdivisions), theirs, rtol=0, atol=1e-6)
     rig = from_settings({"type": "sphere", "subdivisions": subdivisions})
@@ -229,7 +229,9 @@ def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize("subdivisions", [2, 3, 4])
-def test_a_sphere_is_the_same_turned_by_a_fifth_and_has_each_place_once(subdivisions: int) -> None:
+def test_a_sphere_is_symmetric_under_a_fifth_of_a_turn_without_repeated_places(
+    subdivisions: int,
+) -> None:
     places = icosphere(subdivisions)
     turned = places @ Rotation.from_euler("z", 72, degrees=True).as_matrix().T
     tree = KDTree(places)
@@ -237,10 +239,10 @@ def test_a_sphere_is_the_same_turned_by_a_fifth_and_has_each_place_once(subdivis
     assert tree.query(places, 2)[0][:, 1].min() > 0.5 / 2 ** (subdivisions - 1)
 
 
-def test_spheres_hold_the_coarser_ones() -> None:
-    found = nested(642)
-    assert [len(numbers) for numbers in found] == [162, 42, 12]
-    for subdivisions, numbers in zip((3, 2), found, strict=False):
+def test_spheres_contain_the_coarser_ones() -> None:
+    coarser = nested(642)
+    assert [len(numbers) for numbers in coarser] == [162, 42, 12]
+    for subdivisions, numbers in zip((3, 2), coarser, strict=False):
         coarse = icosphere(subdivisions)
         away = np.linalg.norm(icosphere(4)[numbers][:, None] - coarse, axis=-1)
         assert sorted(away.argmin(axis=1)) == list(range(len(coarse)))
@@ -248,7 +250,7 @@ def test_spheres_hold_the_coarser_ones() -> None:
     assert nested(36) == nested(12) == []
 
 
-def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down() -> None:
+def test_sphere_cameras_look_outward_and_upright_and_at_the_poles_up_and_down() -> None:
     views = from_settings({"type": "sphere", "subdivisions": 3, "size": 2}).poses()
     for view in views:
         matrix = view.matrix()
@@ -268,11 +270,11 @@ def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down(
         ({"type": "lattice", "cameras": [1, 2, 2]}, {0.0}),
     ],
 )
-def test_an_axis_of_one_camera_sits_in_the_middle(rig: Any, expected: set[float]) -> None:
+def test_a_single_camera_along_an_axis_sits_in_the_middle(rig: Any, expected: set[float]) -> None:
     assert {view.position[0] for view in from_settings(rig).poses()} == expected
 
 
-def test_lattice_is_the_corners_of_a_cube_and_level() -> None:
+def test_a_lattice_has_level_cameras_at_the_corners_of_a_cube() -> None:
     lattice = {"type": "lattice", "cameras": [2, 2, 2], "size": 2, "center": [1, 2, 3]}
     views = from_settings(lattice).poses()
     corners = {(x, y, z) for x in (0, 2) for y in (1, 3) for z in (2, 4)}
@@ -295,7 +297,7 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
     views = rig.poses()
     assert rig.view_count == len(views) == 12
     assert [view.name for view in views[6:]] == [f"view_0001f_{face}" for face in "fblrud"]
-    # The plane's camera looks along +Y with +Z up: look and up of each face, by hand.
+    # The plane's camera looks along +Y with +Z up. These are each face's directions by hand.
     expected = {
         "f": ([0, 1, 0], [0, 0, 1]),
         "b": ([0, -1, 0], [0, 0, 1]),
@@ -340,35 +342,33 @@ def test_the_row_of_a_sphere_is_its_ring_nearest_the_equator(
     row = rig.middle_row(places)
     assert row == sorted(set(row)) and len(row) == count
     np.testing.assert_allclose(places[row, 2], height, atol=1e-3)
-    # Two rings of one camera are none.
+    # Two rings of one camera each do not count.
     assert rig.middle_row(places[[0, 11]]) == []
 
 
 @pytest.mark.parametrize(
-    ("kind", "own", "area"),
+    ("kind", "keys", "area"),
     [
         ("plane", {"cameras": [4, 3]}, 2 * 6),
         ("cuboid", {"cameras": [4, 3, 2]}, 2 * (2 * 4 + 4 * 6 + 6 * 2)),
         ("lattice", {"cameras": [4, 3, 2]}, 2 * (2 * 4 + 4 * 6 + 6 * 2)),
-        # A prism on a square that lies in the ellipse of the box.
+        # A prism on a square inside the ellipse of the box.
         ("cylinder", {"cameras": [4, 3]}, 4 * math.hypot(1, 2) * 6),
     ],
 )
-def test_cells_cover_the_surface_on_which_the_cameras_stand(
-    kind: str, own: Any, area: float
-) -> None:
-    rig = from_settings({"type": kind, "size": [2, 4, 6], **own})
+def test_cells_cover_the_cameras_surface(kind: str, keys: Any, area: float) -> None:
+    rig = from_settings({"type": kind, "size": [2, 4, 6], **keys})
     places = np.array([pose.position for pose in rig.poses()])
     cells = rig.cells()
     assert cells is not None
     corners = places[np.array(cells)]
-    # Of a parallelogram whose corners are in order, either diagonal halves it.
+    # If a parallelogram's corners are in order, either diagonal halves it.
     halves = [
         np.cross(corners[:, i] - corners[:, 0], corners[:, 2] - corners[:, 0]) for i in (1, 3)
     ]
-    one, other = (np.linalg.norm(half, axis=1) / 2 for half in halves)
-    np.testing.assert_allclose(one, other)
-    assert (one + other).sum() == pytest.approx(area)
+    first, second = (np.linalg.norm(half, axis=1) / 2 for half in halves)
+    np.testing.assert_allclose(first, second)
+    assert (first + second).sum() == pytest.approx(area)
 
 
 def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
@@ -382,7 +382,7 @@ def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "own"),
+    ("kind", "keys"),
     [
         ("plane", {"cameras": [3, 3]}),
         ("cuboid", {"cameras": [3, 3, 3]}),
@@ -398,14 +398,14 @@ def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
         ),
     ],
 )
-def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
+def test_an_outline_reaches_as_far_as_the_rig(kind: str, keys: Any) -> None:
     round_ones = ("sphere", "hemisphere", "ring")
     size = 2 if kind in round_ones else [2, 4, 6]
-    rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **own})
+    rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **keys})
     corners = np.concatenate(rig.outline())
     places = np.array([pose.position for pose in rig.poses()])
     assert rig.is_round == (kind in ("cylinder", *round_ones))
-    # A sphere's cameras need not be at its outermost points, nor those at random places.
+    # A sphere's or a random rig's cameras need not be at its outermost points.
     tolerance = {"sphere": 0.03, "hemisphere": 0.06, "random": 0.02, "path": 0.02}.get(kind, 1e-9)
     axes = [0, 1] if kind == "ring" else [0, 1, 2]
     np.testing.assert_allclose(corners.min(0)[axes], places.min(0)[axes], atol=tolerance)
@@ -419,7 +419,7 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "own", "volume"),
+    ("kind", "keys", "volume"),
     [
         ("cuboid", {"cameras": [2, 2, 2]}, 1),
         ("lattice", {"cameras": [2, 2, 2]}, 1),
@@ -429,11 +429,13 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
         ("ring", {"count": 3}, None),
     ],
 )
-def test_what_a_rig_encloses_of_its_box(kind: str, own: Any, volume: float | None) -> None:
-    assert from_settings({"type": kind, **own}).unit_volume == volume
+def test_the_part_of_its_box_that_a_rig_encloses(
+    kind: str, keys: Any, volume: float | None
+) -> None:
+    assert from_settings({"type": kind, **keys}).unit_volume == volume
 
 
-def test_more_than_9999_views_keep_one_name_each() -> None:
+def test_more_than_9999_views_have_different_names() -> None:
     rig = from_settings({"type": "plane", "cameras": [101, 101]})
     names = [view.name for view in rig.poses()]
     assert names[9999:10001] == ["view_9999f", "view_10000f"]
@@ -493,7 +495,7 @@ def test_a_malformed_pose_file_is_named_with_row_and_key(
 
 @pytest.mark.parametrize("label", [*SILVR, "plane", "cylinder"])
 @pytest.mark.parametrize("limit", [12, 20, 42, 100, 500, 10_000])
-def test_thin_is_the_same_rig_within_the_limit(label: str, limit: int) -> None:
+def test_a_thinned_rig_is_of_the_same_kind_within_the_limit(label: str, limit: int) -> None:
     rig = RIGS[label][1]
     thinner = rig.thinned(limit)
     assert thinner.view_count == len(thinner.poses()) <= limit
@@ -502,7 +504,7 @@ def test_thin_is_the_same_rig_within_the_limit(label: str, limit: int) -> None:
     if rig.view_count <= limit:
         assert thinner == rig
         return
-    # Nothing denser of the same kind fits.
+    # No denser rig of the same kind fits.
     if isinstance(thinner, rigs.Grid) and isinstance(rig, rigs.Grid):
         denser = [
             {"cameras": tuple(n + (i == axis) for i, n in enumerate(thinner.cameras))}
@@ -516,13 +518,13 @@ def test_thin_is_the_same_rig_within_the_limit(label: str, limit: int) -> None:
 
 
 def cameras(rig: dict[str, Any], limit: int) -> tuple[int, ...]:
-    """Return a grid's cameras along each axis when it is thinned."""
+    """Return a grid's cameras along each axis after thinning."""
     thinner = from_settings(rig).thinned(limit)
     assert isinstance(thinner, rigs.Grid)
     return thinner.cameras
 
 
-def test_thin_keeps_proportions_and_two_cameras_an_axis() -> None:
+def test_thinning_keeps_proportions_and_two_cameras_an_axis() -> None:
     _, rig = SILVR["lone_monk cuboid"]
     shares = np.array(cameras(rig, 600)) / rig["cameras"]
     assert np.ptp(shares) < 0.1
@@ -542,7 +544,7 @@ def test_thin_takes_an_even_subset_of_a_pose_file(tmp_path: Path) -> None:
     assert [view.name for view in thinner.poses()] == ["v0", "v25", "v50", "v75", "v100"]
 
 
-def test_a_rig_of_pairs_or_of_cubes_cannot_have_fewer_views_than_one_of_them() -> None:
+def test_a_rig_of_pairs_or_cubes_keeps_at_least_one_of_them() -> None:
     ring = {"type": "ring", "count": 3}
     for more, views in (({"stereo": {"distance": 0.1}}, 2), ({"cube_map": True}, 6)):
         rig = from_settings(ring | more)
@@ -565,7 +567,7 @@ def test_the_path_of_a_blends_camera_is_thinned_from_end_to_end() -> None:
 
 
 @pytest.mark.parametrize("label", ["garden sphere", "garden cuboid"])
-def test_thin_says_when_no_such_rig_is_small_enough(label: str) -> None:
+def test_thinning_says_if_no_such_rig_is_small_enough(label: str) -> None:
     with pytest.raises(UserError, match="cannot have as few as 5 views"):
         RIGS[label][1].thinned(5)
 
@@ -579,7 +581,7 @@ ORBITS = {
 
 
 @pytest.mark.parametrize("name", ORBITS)
-def test_orbits_look_at_the_middle_from_where_they_are_said_to_be(name):
+def test_orbits_look_at_the_middle_from_the_given_places(name):
     settings = {**ORBITS[name], "size": 4, "center": [1, -2, 0.5]}
     rig = rigs.from_settings(settings)
     matrices = np.array([pose.matrix() for pose in rig.poses()])
@@ -597,7 +599,7 @@ def test_orbits_look_at_the_middle_from_where_they_are_said_to_be(name):
     assert len(thinner.poses()) == thinner.view_count == 7
 
 
-def test_orbits_begin_before_the_object_and_go_round_it_as_a_cylinder_does():
+def test_orbits_begin_in_front_of_the_object_and_turn_like_a_cylinder():
     ring = rigs.from_settings({"type": "ring", "count": 4, "size": 2}).poses()
     expected = [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]
     np.testing.assert_allclose([pose.position for pose in ring], expected, atol=1e-9)
@@ -620,8 +622,8 @@ def test_a_hemisphere_is_evenly_covered():
         assert nearest.min() > 0.5 * even and nearest.max() < 1.6 * even, name
 
 
-def test_each_camera_of_a_hemisphere_stands_in_the_middle_of_its_share_of_the_area():
-    """The area of a zone grows with its height, so a zone's cameras have its mean height."""
+def test_each_camera_of_a_hemisphere_is_in_the_middle_of_its_share_of_the_area():
+    """The area of a zone is proportional to its height, so cameras have the zone's mean height."""
     low, high = (math.sin(math.radians(angle)) for angle in (10, 80))
     places = rigs.from_settings(ORBITS["hemisphere"] | {"size": 2}).poses()
     heights = np.array([pose.position[2] for pose in places])
@@ -629,7 +631,7 @@ def test_each_camera_of_a_hemisphere_stands_in_the_middle_of_its_share_of_the_ar
     assert heights.min() - low == pytest.approx(high - heights.max(), abs=1e-9)
 
 
-def test_spiral_rises_evenly_round_and_round():
+def test_a_spiral_rises_evenly():
     places = np.array([p.position for p in rigs.from_settings(ORBITS["spiral"]).poses()]) * 2
     azimuth = np.unwrap(np.arctan2(places[:, 0], places[:, 1]))
     np.testing.assert_allclose(np.diff(azimuth), 2 * math.pi * 3 / 49, atol=1e-9)
@@ -644,14 +646,19 @@ def test_every_rig_can_look_at_a_point():
         matrix = pose.matrix()
         toward = target - matrix[:3, 3]
         np.testing.assert_allclose(-matrix[:3, 2], toward / np.linalg.norm(toward), atol=1e-9)
-    # Straight above and below there is no "up": +X stays the world's.
+    # Straight above and below, "up" is undefined: +X stays the world's.
     for height, up in ((5.0, 1.0), (-5.0, -1.0)):
-        one = {"type": "plane", "cameras": [1, 1], "center": [0, 0, height], "look_at": [0, 0, 0]}
-        (pose,) = rigs.from_settings(one).poses()
+        single = {
+            "type": "plane",
+            "cameras": [1, 1],
+            "center": [0, 0, height],
+            "look_at": [0, 0, 0],
+        }
+        (pose,) = rigs.from_settings(single).poses()
         np.testing.assert_allclose(pose.matrix()[:3, 0], (1, 0, 0), atol=1e-9)
         np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
     with pytest.raises(UserError, match="a camera stands at"):
-        rigs.from_settings({**one, "look_at": one["center"]}).poses()
+        rigs.from_settings({**single, "look_at": single["center"]}).poses()
     with pytest.raises(UserError, match="look_at: does not go with face_inside"):
         rigs.from_settings({**plane, "face_inside": True})
 

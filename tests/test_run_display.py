@@ -1,4 +1,4 @@
-"""What a run shows while it works: a line that stays in view, warnings, failures, phases."""
+"""The terminal during a run: a line that stays in view, warnings, failures, phases."""
 
 import io
 import time
@@ -15,7 +15,7 @@ class Terminal(io.StringIO):
 
 
 class Run:
-    """Jobs whose states and logs a test writes, and what is shown of them."""
+    """Jobs whose states and logs a test writes, and the terminal's output."""
 
     def __init__(self, folder, stream):
         self.folder, self.stream, self.now = folder, stream, time.time()
@@ -40,7 +40,7 @@ class Run:
             file.writelines(f"{line}\n" for line in lines)
 
     def shown(self, seconds=0, **states):
-        """Return the lines that are shown when jobs have come to other states."""
+        """Return the new lines on the terminal after some seconds."""
         self.now += seconds
         for state, names in states.items():
             for others in self.states.values():
@@ -61,9 +61,9 @@ def run(request, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
-def test_one_line_says_how_far_the_whole_run_is(run):
-    # 250 s of renders and four times 1.5 s, on two cores.
-    assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 08 s left"]
+def test_one_line_shows_the_progress_of_the_whole_run(run):
+    # 250 s of renders on two cores.
+    assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 05 s left"]
     run.shown(running=["place"])
     assert run.shown(2, finished=["place"], running=["a", "b"])[0] == "cameras: 1 job in 2 s"
     run.log("a", "render scene a: 8 views to do, 2 already done")
@@ -80,8 +80,23 @@ def test_one_line_says_how_far_the_whole_run_is(run):
     assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
 
 
+def test_the_end_shows_the_forecast_beside_what_the_run_took(run):
+    run.tasks["place"].seconds = 5.0
+    run.shown(running=["a"])
+    # An earlier run rendered 2 of 10 views.
+    run.log("a", "render scene a: 8 views to do, 2 already done")
+    run.shown(100, finished=[*run.tasks])
+    forecast = 5 + 80 + 100 + 50
+    assert run.display.summary(300) == (
+        f"4 jobs in 1 min 40 s, 5 min 00 s of CPU time; the forecast was 3 min {forecast - 180} s"
+    )
+    assert run.display.summary(None) == "4 jobs in 1 min 40 s"
+    run.tasks["place"].seconds = None
+    assert run.display.summary(300) == "4 jobs in 1 min 40 s, 5 min 00 s of CPU time"
+
+
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
-def test_a_measurement_takes_as_long_as_its_log_says(run):
+def test_a_measurement_takes_the_time_that_its_log_tells(run):
     run.tasks = {"error": run.task("error", "measurement")}
     run.display.begin(run.tasks, cores=2)
     run.shown(running=["error"])
@@ -103,13 +118,13 @@ def test_warnings_are_shown_once_and_other_lines_not(run):
     assert not any("coarse" in line for line in run.shown())
 
 
-def test_a_failure_is_shown_at_once_where_others_go_on(run):
+def test_a_failure_is_shown_at_once_while_other_jobs_continue(run):
     run.shown(running=["a", "b"])
     assert run.shown(failed=["a"])[0] == "a failed: no room"
 
 
 @pytest.mark.parametrize("run", [io.StringIO], indirect=True)
-def test_a_log_gets_a_line_now_and_then(run):
+def test_a_log_file_gets_a_line_at_intervals(run):
     lines = []
     for _ in range(3600):
         lines += run.shown(1, running=["a"])
@@ -117,14 +132,14 @@ def test_a_log_gets_a_line_now_and_then(run):
     assert run.shown(10 * 24 * 3600)[0].startswith("0 of 4 jobs · 0 of 20 views · ")
 
 
-def test_a_log_of_another_run_is_not_read(run):
+def test_logs_of_other_runs_are_not_read(run):
     run.log("a", "warning: of old")
     run.now += 60
     run.display.begin(run.tasks, cores=2)
     assert not any("of old" in line for line in run.shown(running=["a"]))
 
 
-def test_what_progress_says_can_be_read(capsys):
+def test_progress_lines_can_be_parsed(capsys):
     shard = progress.Progress(2, "render results/a: b 0:2", already=3)
     shard.done()
     shard.done()

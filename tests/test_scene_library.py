@@ -1,11 +1,11 @@
-"""What the scene builders share: points, closed shapes, random streams, fingerprints."""
+"""The common parts of scene builders: points, closed shapes, random streams, fingerprints."""
 
 import shutil
 
 import numpy as np
 import pytest
 
-from lightfield.dataset import config, keys
+from lightfield.dataset import keys, names
 from lightfield.dataset.config import SceneSource
 from scenes.library.architecture import cut
 from scenes.library.points import evenly, lattice, mirrored, noise, polar, smoothstep
@@ -16,7 +16,7 @@ SCENE = Scene(3, 1.0)
 
 
 def volume(shape):
-    """The volume that a closed shape encloses: positive where its faces look outwards."""
+    """Return the volume that a closed shape encloses. It is positive if its faces look outwards."""
     quads = shape.quads
     triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]], shape.triangles])
     a, b, c = (shape.vertices[triangles[:, i]] for i in range(3))
@@ -43,7 +43,7 @@ SQUARE = [(0, 0), (0, 1), (1, 1), (1, 0), (0, 0)]
         ("frame", {"size": (1, 1), "profile": SQUARE}, 8.0),
     ],
 )
-def test_a_part_of_a_model_has_its_volume(kind, measures, expected):
+def test_a_models_part_has_its_volume(kind, measures, expected):
     model = Model(SCENE)
     getattr(model, kind)(**measures, **OAK)
     assert model.materials == ["Oak"]
@@ -58,7 +58,7 @@ def test_a_part_is_scaled_then_turned_then_moved():
     assert part.vertices.max(axis=0) == pytest.approx([6, 2, 0.5])
 
 
-def test_words_planes_and_pipes_have_the_size_that_they_are_given():
+def test_texts_planes_and_pipes_have_their_given_size():
     word, plane, pipe = Model(SCENE), Model(SCENE), Model(SCENE)
     word.word(letters="I", size=2, depth=0.01, at=(0, 0, 1), **OAK)
     plane.plane(size=(2, 4), **OAK)
@@ -69,7 +69,7 @@ def test_words_planes_and_pipes_have_the_size_that_they_are_given():
     assert np.hypot(*wall[:, :2].T) == pytest.approx(1.0) and np.ptp(wall[:, 2]) == 3.0
 
 
-def test_places_are_made_of_all_combinations_of_coordinates():
+def test_places_are_all_combinations_of_coordinates():
     expected = [[x, y, 3.0] for x in (-1.0, 0.5, 2.0) for y in (-4.0, 4.0)]
     assert lattice(x=evenly(-1, 2, 3), y=(-4, 4), z=3).tolist() == expected
     assert mirrored(x=1, y=2).tolist() == [[-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]]
@@ -90,7 +90,7 @@ def test_places_are_made_of_all_combinations_of_coordinates():
 )
 def test_solids_are_closed_and_look_outwards(shape, expected):
     assert volume(shape) == pytest.approx(expected, rel=2e-3)
-    far = shape.moved(3, -4, 5)  # a shape with a hole would change its volume
+    far = shape.moved(3, -4, 5)  # a hole in the shape would change its volume
     assert volume(far) == pytest.approx(expected, rel=2e-3)
 
 
@@ -129,20 +129,20 @@ def test_noise_is_smooth_and_differs_by_seed():
     assert smoothstep(2.0, 1.0, [0.5, 1.5, 2.5]).tolist() == [1.0, 0.5, 0.0]
 
 
-def test_each_element_has_a_random_stream_of_its_own():
+def test_each_element_has_its_own_random_stream():
     assert SCENE.random("maple").random() == SCENE.random("maple").random()
     others = [SCENE.random("pines"), Scene(4, 1.0).random("maple")]
     assert SCENE.random("maple").random() not in [other.random() for other in others]
 
 
-def test_less_detail_is_a_part_of_the_triangles():
+def test_less_detail_has_a_part_of_the_triangles():
     half = Scene(0, 0.25)
     assert (half.segments(40), half.count(40)) == (20, 10)
     assert (half.segments(2, 8), half.count(2, 8)) == (8, 8)
 
 
 def test_builders_are_the_folders_beside_the_library():
-    assert config.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
+    assert names.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
 
 
 @pytest.mark.parametrize(
@@ -154,11 +154,11 @@ def test_builders_are_the_folders_beside_the_library():
         ("lone_monk/__init__.py", False),
     ],
 )
-def test_a_fingerprint_is_of_the_library_and_the_builders_own_files(
+def test_a_fingerprint_covers_the_library_and_the_builders_own_files(
     file, changes, tmp_path, monkeypatch
 ):
     builders = tmp_path / "scenes"
-    shutil.copytree(config.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(names.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(keys, "BUILDERS", builders)
     source = SceneSource(builder="garden", parameters={"seed": 1})
     before = keys.scene_fingerprint(source)

@@ -1,4 +1,4 @@
-"""The scenes as they are built: rich, clear of cameras, whole in one file, alike each time."""
+"""The built scenes: rich, clear of cameras, complete in one file, and reproducible."""
 
 import hashlib
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from scene_fingerprint import fingerprint
 from lightfield.dataset import config
 
 pytestmark = pytest.mark.slow
-CLEARANCE = 0.05  # metres that every camera must have around it
-REACH = 0.4  # metres; something is nearer than this to a camera of each scene
+CLEARANCE = 0.05  # free metres around every camera
+REACH = 0.4  # metres: each scene has something nearer than this to a camera
 
 
 @dataclass(frozen=True)
 class Size:
-    """Objects and triangles, counting instances, and the triangles that are in memory."""
+    """Objects and triangles with instances, and the triangles in memory."""
 
     objects: float
     seen: float
     stored: float
 
 
-# Builders by the YAMLs that have rigs for them: the least of each, and the most that is stored.
+# Builders by the YAMLs with their rigs: the least objects and triangles, and the most in memory.
 SCENES = {"barbershop": "barbershop", "garden": "garden", "lone_monk": "lone_monk"}
 SCENES["still_life"] = "object"
 LEAST = {
@@ -42,7 +42,7 @@ MOST_BYTES = dict.fromkeys(SCENES, 60e6) | {"still_life": 40e6}
 
 
 def built(name, detail):
-    """Build a scene; return it as an evaluated dependency graph."""
+    """Build a scene. Return it as an evaluated dependency graph."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     import_module(f"scenes.{name}").build({"seed": 1, "detail": detail})
     bpy.context.scene.frame_set(1)
@@ -51,40 +51,40 @@ def built(name, detail):
 
 @pytest.fixture(scope="module", params=SCENES)
 def scene(request):
-    """The name of a scene that is there at full detail."""
+    """The name of a scene that is built with full detail."""
     built(request.param, 1.0)
     return request.param
 
 
 def of(name):
-    """Let a test look at one scene alone."""
+    """Return the parameter for a test of one scene alone."""
     return pytest.mark.parametrize("scene", [name], indirect=True)
 
 
 def ray_cast(start, ray, **limits):
-    """Whether a ray from ``start`` meets something, where, and what: object and face."""
+    """Cast a ray from ``start``. Return whether and where it hits, and the object and face."""
     graph = bpy.context.evaluated_depsgraph_get()
-    hit, place, _, face, thing, _ = bpy.context.scene.ray_cast(
+    hit, place, _, face, obj, _ = bpy.context.scene.ray_cast(
         graph, Vector(start), Vector(ray).normalized(), **limits
     )
-    return hit, place, thing, face
+    return hit, place, obj, face
 
 
 def meshes():
-    """Yield name, mesh and matrix (4, 4) of each mesh object and instance as it is rendered."""
+    """Yield name, mesh and matrix (4, 4) of each mesh object and instance as they are rendered."""
     for instance in bpy.context.evaluated_depsgraph_get().object_instances:
         if instance.object.type == "MESH":
             yield instance.object.name, instance.object.data, np.array(instance.matrix_world)
 
 
 def values(collection, name, size=3, kind=np.float32):
-    found = np.empty(size * len(collection), kind)
-    collection.foreach_get(name, found)
-    return found.reshape(-1, size)
+    array = np.empty(size * len(collection), kind)
+    collection.foreach_get(name, array)
+    return array.reshape(-1, size)
 
 
 def placed(points, matrix):
-    """Return places (n, 3) in the world."""
+    """Return the points (n, 3) in the world."""
     matrix = np.array(matrix)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -100,22 +100,22 @@ def size():
 
 
 def cameras(scene):
-    """Return the places (n, 3) of the cameras of all its rigs."""
+    """Return the places (n, 3) of the cameras of all the scene's rigs."""
     written = config.load_scene(SCENES[scene])
     return np.concatenate([[p.position for p in rig.poses()] for rig in written.rigs.values()])
 
 
 def test_objects_triangles_and_instancing(scene):
-    found, least = size(), LEAST[scene]
-    assert found.objects >= least.objects
-    assert found.seen >= least.seen
-    assert least.stored <= found.stored <= STORED_PART[scene] * found.seen
-    assert scene != "still_life" or found.stored < 300_000
+    actual, least = size(), LEAST[scene]
+    assert actual.objects >= least.objects
+    assert actual.seen >= least.seen
+    assert least.stored <= actual.stored <= STORED_PART[scene] * actual.seen
+    assert scene != "still_life" or actual.stored < 300_000
 
 
 @pytest.mark.parametrize("scene", ["barbershop", "garden", "lone_monk"], indirect=True)
 def test_cameras_keep_clear(scene):
-    """No camera of any rig has geometry within 5 cm, by BVHs of the evaluated meshes."""
+    """No camera of any rig has geometry within 5 cm, according to BVHs of the evaluated meshes."""
     places, nearest = cameras(scene), np.inf
     for name, data, matrix in meshes():
         points = placed(values(data.vertices, "co"), matrix)
@@ -124,14 +124,14 @@ def test_cameras_keep_clear(scene):
         if len(close):
             faces = [tuple(face.vertices) for face in data.polygons]
             tree = BVHTree.FromPolygons(points.tolist(), faces)
-            found = min(tree.find_nearest(Vector(place))[3] for place in close)
-            assert found >= CLEARANCE, name
-            nearest = min(nearest, found)
+            least_distance = min(tree.find_nearest(Vector(place))[3] for place in close)
+            assert least_distance >= CLEARANCE, name
+            nearest = min(nearest, least_distance)
     assert nearest < REACH
 
 
-def test_the_file_is_small_and_needs_nothing_else(scene, tmp_path):
-    """Nothing from outside, no drivers, no camera, and a material on every face."""
+def test_the_file_is_small_and_complete(scene, tmp_path):
+    """No external files, no drivers, no camera, and a material on every face."""
     images = [image.packed_file for image in bpy.data.images if image.source == "FILE"]
     assert all(images)
     assert bool(images) == (scene in ("garden", "still_life"))
@@ -152,16 +152,16 @@ def test_the_file_is_small_and_needs_nothing_else(scene, tmp_path):
 
 @of("barbershop")
 def test_it_is_closed_and_rich_on_every_side(scene):
-    """From the middle every ray meets the room or its window, and many surfaces on each side."""
+    """Every ray from the middle hits the room or its window, and many surfaces on each side."""
     met, objects = {}, set()
     for ray in np.random.default_rng(7).normal(size=(3000, 3)):
-        hit, place, thing, face = ray_cast((0, 0, 1.05), ray)
+        hit, place, obj, face = ray_cast((0, 0, 1.05), ray)
         assert hit, ray
-        assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, thing)
+        assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, obj)
         axis = int(np.abs(ray).argmax())
-        surface = thing.name, thing.data.polygons[face].material_index
+        surface = obj.name, obj.data.polygons[face].material_index
         met.setdefault((axis, bool(ray[axis] > 0)), set()).add(surface)
-        objects.add(thing.name)
+        objects.add(obj.name)
     assert len(objects) >= 200
     assert len(met) == 6 and min(len(surfaces) for surfaces in met.values()) >= 12, met
 
@@ -191,17 +191,17 @@ def test_every_direction_has_something_to_see(scene):
         seen = set()
         for azimuth in np.radians(np.arange(30 * sector, 30 * sector + 30, 3)):
             for height in np.tan(np.radians([-50, -35, -22, -12, -6, -3, 0, 2, 5, 9, 14, 20])):
-                hit, _, thing, _ = ray_cast((0, 0, 1), (np.cos(azimuth), np.sin(azimuth), height))
+                hit, _, obj, _ = ray_cast((0, 0, 1), (np.cos(azimuth), np.sin(azimuth), height))
                 assert hit or height > 0.03
                 if hit:
-                    seen.add(thing.name)
+                    seen.add(obj.name)
         seen_by_sector.append(len(seen))
     assert min(seen_by_sector) >= 8
 
 
 @of("garden")
 def test_the_rigs_are_inside_nothing(scene):
-    """Rays from the rig's middle to all its cameras meet nothing on their way."""
+    """No ray from the rig's middle to a camera hits anything on its way."""
     middle = np.array([0, 0, 1])
     for ray in cameras(scene) - middle:
         assert not ray_cast(middle, ray, distance=np.linalg.norm(ray))[0]
@@ -225,7 +225,7 @@ def test_only_fire_and_water_move(scene):
 
 
 @of("garden")
-def test_the_ripples_run_on_for_ever(scene):
+def test_the_ripples_repeat_without_a_jump(scene):
     tree = bpy.data.materials["Water"].node_tree
     ripples = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexNoise")
     phases = []
@@ -239,29 +239,29 @@ def test_the_ripples_run_on_for_ever(scene):
 
 
 def world_points(thing):
-    """Return the places (n, 3) of a mesh's vertices or of curves' points, in the world."""
+    """Return the places (n, 3) of a mesh's vertices or of curves' points in the world."""
     if thing.type == "MESH":
         return placed(values(thing.data.vertices, "co"), thing.matrix_world)
     return placed(values(thing.data.points, "position"), thing.matrix_world)
 
 
 @of("still_life")
-def test_all_of_it_is_on_the_board_and_far_from_the_cameras(scene):
-    things = [thing for thing in bpy.data.objects if thing.type in ("MESH", "CURVES")]
-    whole = np.concatenate([world_points(thing) for thing in things])
-    assert np.isfinite(whole).all()
-    assert np.hypot(*whole[:, :2].T).max() < 0.36
-    assert -0.4 < whole[:, 2].min() < -0.1 and 0.2 < whole[:, 2].max() < 0.25
-    for thing in things:
-        if thing.type == "MESH" and thing.name not in ("Cloth", "Board"):
-            assert world_points(thing)[:, 2].min() > -1e-3, thing.name
+def test_everything_is_on_the_board_and_far_from_the_cameras(scene):
+    objs = [obj for obj in bpy.data.objects if obj.type in ("MESH", "CURVES")]
+    points = np.concatenate([world_points(obj) for obj in objs])
+    assert np.isfinite(points).all()
+    assert np.hypot(*points[:, :2].T).max() < 0.36
+    assert -0.4 < points[:, 2].min() < -0.1 and 0.2 < points[:, 2].max() < 0.25
+    for obj in objs:
+        if obj.type == "MESH" and obj.name not in ("Cloth", "Board"):
+            assert world_points(obj)[:, 2].min() > -1e-3, obj.name
     middle = np.array([0, 0, 0.05])
-    reach = np.linalg.norm(whole - middle, axis=-1).max()
+    reach = np.linalg.norm(points - middle, axis=-1).max()
     assert np.linalg.norm(cameras(scene) - middle, axis=-1).min() > reach + 0.5
 
 
 @of("still_life")
-def test_it_is_of_many_materials_and_of_hair(scene):
+def test_the_still_life_has_many_materials_and_hair(scene):
     nodes = [node for material in bpy.data.materials for node in material.node_tree.nodes]
     assert "ShaderNodeBsdfHairPrincipled" in {node.bl_idname for node in nodes}
     principled = [node.inputs for node in nodes if node.bl_idname == "ShaderNodeBsdfPrincipled"]
@@ -272,7 +272,7 @@ def test_it_is_of_many_materials_and_of_hair(scene):
     assert len(bpy.data.objects["Down"].data.curves) > 10_000
 
 
-# Comes last of a scene's tests, as it takes its place.
+# This is the last test of a scene, because it replaces the scene.
 @pytest.mark.parametrize("scene", ["barbershop", "still_life"], indirect=True)
 def test_less_detail_is_less(scene):
     full = size()
@@ -284,8 +284,8 @@ def test_less_detail_is_less(scene):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_equal_seeds_give_equal_geometry_and_pixels_and_others_do_not(name):
-    # One scene's pixels stand for all: a picture takes as long as the scene.
+def test_only_equal_seeds_give_equal_geometry_and_pixels(name):
+    # One scene's pixels stand for all: a picture takes as long as building the scene.
     pixels = name == "garden"
     first = fingerprint(name, 3, "1", pixels)
     assert fingerprint(name, 3, "2", pixels) == first

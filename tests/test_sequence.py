@@ -64,7 +64,7 @@ def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
         ({"frames": 3}, "LFSequence.frames: is 3; must be a mapping"),
     ],
 )
-def test_a_wrong_sequence_is_told(change, expected, moving):
+def test_a_wrong_sequence_is_refused(change, expected, moving):
     content = yaml.safe_load(SCENE)
     content["rigs"]["LFSequence"] |= change
     moving.write_text(yaml.safe_dump(content))
@@ -73,7 +73,7 @@ def test_a_wrong_sequence_is_told(change, expected, moving):
     assert expected in str(caught.value)
 
 
-def test_a_reprojection_cannot_take_a_frames_folder(moving):
+def test_a_reprojection_cannot_have_a_frames_folder(moving):
     moving.write_text(SCENE.replace("perspective:", "f00001:"))
     with pytest.raises(UserError, match=r"reprojections\.f00001: the name f00001 is taken"):
         config.read_scene(moving)
@@ -86,7 +86,7 @@ def test_every_stage_is_planned_for_every_frame(tmp_path):
     assert jobs["build_scene"] == jobs["inventory"] == 1
     for name in ("lightfield", "check_cameras", "render", "reproject", "validate"):
         assert jobs[name] == 4
-    # All frames of a sequence in one archive.
+    # One archive has all frames of a sequence.
     assert jobs["pack"] == 2
 
 
@@ -109,7 +109,7 @@ def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):
     changed = np.abs(colours[0] - colours[1]) / (colours[0] + colours[1] + 1e-9)
 
     def around(x, y, z):
-        """Return the mean change within 6 degrees of a point, as seen from the panorama."""
+        """Return the mean change within 6 degrees of a point, seen from the panorama."""
         column = (0.5 + np.arctan2(x, y) / (2 * np.pi)) * 144
         row = (0.5 - np.arctan2(z - 1, np.hypot(x, y)) / np.pi) * 72
         rows, columns = np.ogrid[:72, :144]
@@ -120,5 +120,5 @@ def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):
     change = {name: around(*place) for name, place in from_scene.items()}
     assert min(change["fire"], change["water"]) > 10 * change["statue"]
     assert np.median(changed) < 0.01
-    # Nothing solid moves; only rays through the bent water differ.
+    # Nothing solid moves. Only rays through the moving water differ.
     assert np.mean(depths[0] != depths[1]) < 0.01

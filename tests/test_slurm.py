@@ -1,4 +1,4 @@
-"""A build on a real Slurm node, to which happens what happens on clusters."""
+"""A build on a real Slurm node, with the accidents that happen on clusters."""
 
 import json
 import os
@@ -10,17 +10,18 @@ from pathlib import Path
 
 import psutil
 import pytest
-from checkouts import assert_same_bytes, checkout, rendered, start_snakemake, wait_until
+from checkouts import checkout, rendered, snakemake, start_snakemake, wait_until
 from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
 JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
+CONFIG = ["--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"]
 WORDS = [
     *("--profile", "profiles/slurm", "--cores", "2", "--retries", "4"),
     *("--slurm-init-seconds-before-status-checks", "2"),
-    # A panorama is given too little memory first.
+    # The panorama gets too little memory at first.
     *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
-    *("--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"),
+    *CONFIG,
 ]
 IMPATIENT = Path(__file__).with_name("impatient")
 pytestmark = [
@@ -29,23 +30,40 @@ pytestmark = [
 ]
 
 
-def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tmp_path):
+def slower_checkout(folder: Path) -> Path:
+    """Return a checkout whose views take seconds, so that a shard can be stopped amid them."""
+    path = checkout(folder) / "configs/scenes/smoke.yaml"
+    path.write_text(path.read_text().replace("samples: 4\n", "samples: 60\n"))
+    return folder
+
+
+def views_of(folder: Path) -> dict[str, bytes]:
+    """Return the rendered views of the dataset by name."""
+    views = folder.glob(f"results/{CUBOID}/exr/*.exr")
+    return {path.name: path.read_bytes() for path in views}
+
+
+def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     install()
-    folder = checkout(tmp_path / "cluster")
+    undisturbed = slower_checkout(tmp_path / "undisturbed")
+    records = [f"work/{CUBOID}/render/{shard}.json" for shard in ("0-3", "3-6")]
+    result = snakemake(undisturbed, *CONFIG, "--", *records)
+    assert result.returncode == 0, result.stdout + result.stderr
+    folder = slower_checkout(tmp_path / "cluster")
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
         environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}
         with log.open("wb") as terminal:
             run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
         began = stop_next(folder, "*.journal.jsonl", set(), run)
-        # All happens to one shard; the other one's jobs may be faster.
+        # All accidents happen to one shard. The other one's jobs may be faster.
         (shard,) = {path.name for path in folder.glob(JOURNALS) if pids(path) & began}
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
-        # What is submitted in its place hangs, until its time is over.
+        # The job submitted in its place hangs until its time is over.
         began |= stop_next(folder, shard, began, run)
         for job in node.run("squeue", "--states=RUNNING", "--noheader", "--format=%i").split():
             node.run("scontrol", "update", f"JobId={job}", "EndTime=now")
-        # What is submitted in place of that finds no room, until it has failed.
+        # The next job finds the disk full, and fails.
         full = stop_next(folder, shard, began, run)
         with no_room(node, full):
             for process in full:
@@ -65,7 +83,8 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
         assert any(map(no_room_left.search, logs)), logs
     assert "exceeded memory limit" in (tmp_path / "node/slurmd.log").read_text()
     assert set(rendered(folder).values()) == {1}
-    assert_same_bytes(smoke, folder, CUBOID)
+    assert views_of(folder) == views_of(undisturbed)
+    assert len(views_of(folder)) == 6
 
 
 def pids(journal: Path) -> set[int]:
@@ -75,12 +94,12 @@ def pids(journal: Path) -> set[int]:
 
 
 def processes(folder: Path, journals: str) -> set[int]:
-    """Return the processes that have worked on the shards whose journals have such a name."""
+    """Return the processes that worked on the shards with these journals."""
     return set().union(*map(pids, folder.glob(JOURNALS.replace("*.journal.jsonl", journals))))
 
 
 def stop_next(folder: Path, journals: str, began: set[int], run) -> set[int]:
-    """Wait for processes beside those that ``began``, stop them, and return them."""
+    """Wait for processes other than those in ``began``. Stop and return them."""
     log = folder / "terminal.log"
     wait_until(lambda: processes(folder, journals) - began, run, log=log)
     stopped = processes(folder, journals) - began
@@ -91,7 +110,7 @@ def stop_next(folder: Path, journals: str, began: set[int], run) -> set[int]:
 
 @contextmanager
 def no_room(node: Node, found: set[int]):
-    """Fill the node's disk; where it has none of its own, let these processes write no file."""
+    """Fill the node's disk. Without a disk of its own, limit the files of these processes."""
     if node.own_disk:
         filler = node.fill_disk()
         yield
@@ -103,7 +122,7 @@ def no_room(node: Node, found: set[int]):
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:
-    """Wait until the journals have so many views."""
+    """Wait until the journals have this many views."""
     wait_until(
         lambda: sum(path.read_text().count('"view"') for path in folder.glob(JOURNALS)) >= count,
         run,

@@ -11,7 +11,7 @@ import soak
 def test_a_build_that_is_limited_killed_and_damaged_loses_nothing(capsys, monkeypatch):
     sizes = ("--views", 2, "--limits", 1, "--kills", 1, "--faults", 7)
     monkeypatch.setattr(sys, "argv", ["soak.py", *map(str, sizes)])
-    # Fails where something was not found, not mended, lost, or made twice.
+    # It fails if something was not found, not repaired, lost, or made twice.
     soak.main()
     lines = capsys.readouterr().out.splitlines()
     rows = [[cell.strip() for cell in line.split("|")[2:-1]] for line in lines if "|" in line]

@@ -1,4 +1,4 @@
-"""Splits: what each view is for, from the scene YAML to every export and to validation."""
+"""Splits: the purpose of each view, from the scene YAML to every export and to validation."""
 
 import json
 import shutil
@@ -40,10 +40,10 @@ LISTS = {"validation": ["view_0003f"], "test": ["view_0001f", "view_0007f"]}
         ("test", [], range(12)),
     ],
 )
-def test_a_rig_says_what_its_views_are_for(split, validation, test):
-    found = [pose.split for pose in rigs.from_settings(PLANE | {"split": split}).poses()]
+def test_a_rig_says_the_purpose_of_its_views(split, validation, test):
+    purposes = [pose.split for pose in rigs.from_settings(PLANE | {"split": split}).poses()]
     parts = dict.fromkeys(test, "test") | dict.fromkeys(validation, "validation")
-    assert found == [parts.get(number, "train") for number in range(12)]
+    assert purposes == [parts.get(number, "train") for number in range(12)]
 
 
 def test_the_faces_of_a_cube_map_stay_together():
@@ -51,7 +51,7 @@ def test_the_faces_of_a_cube_map_stay_together():
     assert [pose.split for pose in rig.poses()] == 3 * (6 * ["test"] + 18 * ["train"])
 
 
-def test_a_thinned_rig_has_no_list_of_views_that_it_lacks():
+def test_a_thinned_rig_has_no_list_of_removed_views():
     assert rigs.from_settings(PLANE | {"split": LISTS}).thinned(4).split is None
     assert rigs.from_settings(PLANE | {"split": "odd"}).thinned(4).split == "odd"
 
@@ -76,7 +76,7 @@ SCENE = {
     [
         ("rigs.around.split", "even", 'split: is "even"; must be odd or train, validation or test'),
         ("rigs.around.split", {"every": 1}, "split.every: is 1; must be a whole number at least 2"),
-        ("rigs.around.split", {"test": ["a", "a"]}, "'a' is there twice"),
+        ("rigs.around.split", {"test": ["a", "a"]}, "'a' occurs twice"),
         ("rigs.around.split", {"every": 2, "test": ["a"]}, "must be odd or .* have every, or test"),
         ("rigs.around.split", {"test": ["view_0012f"]}, "there is no view 'view_0012f'"),
         ("rigs.around.split", "test", "rigs.around.split: is test, but no rig trains"),
@@ -86,7 +86,7 @@ SCENE = {
         ("reprojections.small.rigs", ["around"], "reprojections.small.rigs: lacks along; must"),
     ],
 )
-def test_what_is_no_split_is_refused(path, value, expected):
+def test_an_invalid_split_is_refused(path, value, expected):
     content = json.loads(json.dumps(SCENE))
     *parents, last = path.split(".")
     part = content
@@ -98,7 +98,7 @@ def test_what_is_no_split_is_refused(path, value, expected):
 
 
 @pytest.mark.slow
-def test_what_one_rig_tests_is_exported_with_what_another_trains(tmp_path, monkeypatch):
+def test_a_rig_that_tests_is_exported_with_the_trained_one(tmp_path, monkeypatch):
     (tmp_path / "two.yaml").write_text(json.dumps(SCENE))
     monkeypatch.setattr(config, "SCENES", tmp_path)
     around, along = scene_datasets("two")
@@ -117,7 +117,7 @@ def test_what_one_rig_tests_is_exported_with_what_another_trains(tmp_path, monke
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A scene's folder with a rig to train on and one each for validation and to test with."""
+    """A scene's folder with a rig to train on, one for validation, and one to test with."""
     folder = tmp_path_factory.mktemp("splits") / "scene"
     for name, split in (("around", "train"), ("near", "validation"), ("along", "test")):
         rig = {"type": "plane", "cameras": [2, 2], "size": 0.5, "split": split}
@@ -145,7 +145,7 @@ NAMES = {
 }
 
 
-def test_nerf_synthetic_has_a_folder_and_a_list_a_part(scene, tmp_path):
+def test_nerf_synthetic_has_a_folder_and_a_list_for_each_part(scene, tmp_path):
     folder = exported(scene, "nerf_synthetic", tmp_path / "export")
     for part, names in NAMES.items():
         frames = json.loads((folder / f"transforms_{part}.json").read_text())["frames"]
@@ -157,8 +157,8 @@ def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
     folder = exported(scene, "nerfstudio", tmp_path / "nerfstudio", points=200)
     content = json.loads((folder / "transforms.json").read_text())
     for part, names in NAMES.items():
-        found = content[f"{part}_filenames"]
-        assert sorted(found) == sorted(f"images/{name}.png" for name in names)
+        listed_names = content[f"{part}_filenames"]
+        assert sorted(listed_names) == sorted(f"images/{name}.png" for name in names)
     folder = exported(scene, "colmap", tmp_path / "colmap", format="text", points=200)
     assert (folder / "sparse/0/test.txt").read_text().split() == [
         f"along_view_000{i}f.png" for i in range(4)
@@ -166,7 +166,7 @@ def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
     assert len(Colmap(folder / "sparse/0").images) == 12
 
 
-def test_points_come_from_the_views_to_train_on_alone(scene, tmp_path):
+def test_points_come_only_from_the_training_views(scene, tmp_path):
     shutil.copytree(scene, tmp_path / "scene")
     for rig in ("near", "along"):
         shutil.rmtree(tmp_path / "scene" / rig / "exr")
@@ -186,11 +186,11 @@ def test_a_split_without_a_part_is_an_error():
     lens = rigs.from_settings(PLANE | {"camera": PERSPECTIVE}).camera.make()
     for split, missing in (("train", "test"), ("test", "train")):
         lightfield = LightField.from_rig(PLANE | {"split": split}, lens)
-        with pytest.raises(UserError, match=f"frames: none is there to {missing}"):
+        with pytest.raises(UserError, match=f"frames: no view is left to {missing}"):
             splits(lightfield)
 
 
-def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
+def test_validation_finds_deviations_from_the_split(scene, tmp_path):
     folder = tmp_path / "scene"
     shutil.copytree(scene, folder)
     path = folder / "splits.json"
@@ -201,8 +201,10 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
         return splits_check.check(path, dataset, read_sets(dataset, ["small"])[0]).problems
 
     def write():
-        found = {name: LightField.read(folder / name / "lightfield.json") for name in rig_names}
-        write_json(path, splits_content(found))
+        lightfields = {
+            name: LightField.read(folder / name / "lightfield.json") for name in rig_names
+        }
+        write_json(path, splits_content(lightfields))
         return json.loads(path.read_text())
 
     content = write()
@@ -210,7 +212,7 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
     assert problems() == []
     write_json(path, content | {"test": [*content["test"], "around/view_0001f"]})
     assert problems() == ["splits.json: test: is not what the rigs' lightfield.json say"]
-    # A test view from where one trains.
+    # A test view has the place of a training view.
     trained = json.loads((folder / "around" / "lightfield.json").read_text())
     tested = json.loads((folder / "along" / "lightfield.json").read_text())
     tested["frames"][2] = trained["frames"][1] | {"name": "view_0002f", "split": "test"}

@@ -1,4 +1,4 @@
-"""The stability measurement: its reference, its bounds, and the verdicts it comes to."""
+"""The stability measurement: its reference, its bounds, and its verdicts."""
 
 import csv
 import math
@@ -24,7 +24,7 @@ def digits() -> None:
     mpmath.mp.dps = stability.DIGITS
 
 
-def test_reference_undoes_itself_to_all_its_digits() -> None:
+def test_the_reference_inverts_itself_to_all_its_digits() -> None:
     for name, lens in ALL.items():
         x, y = (mpf(float(c)) for c in stability.places(lens)[6])
         ray, excess = stability.ray_and_excess(lens, x, y)
@@ -49,16 +49,16 @@ def test_lens_pairs_are_within_their_bounds(chosen: list[str]) -> None:
     rows = list(stability.measure(lenses))
     assert len(rows) == 2 * len(chosen) ** 2
     assert [row["case"] for row in rows if row["verdict"] == "FAIL"] == []
-    own = [row for row in rows if len(set(row["case"].split(" → "))) == 1]
-    for row in own:
+    same_lens = [row for row in rows if len(set(row["case"].split(" → "))) == 1]
+    for row in same_lens:
         allowed = 0.01 if row["dtype"] == "float32" else 1e-9
-        # Where a lens turns, one rounding moves a pixel by more, and each processor rounds its own.
+        # At a lens's turning point rounding moves a pixel more, and processors round differently.
         one_rounding = row["round_trip_bound"] / stability.ROUNDINGS
         assert row["round_trip_error"] < max(allowed, one_rounding), row["case"]
 
 
 class Careless(Equidistant):
-    """An equidistant lens that finds θ by acos, which loses half the digits near the axis."""
+    """An equidistant lens that computes θ by acos, which loses half the digits near the axis."""
 
     def pixels(self, rays: np.ndarray) -> np.ndarray:
         theta = np.arccos(np.clip(-rays[..., 2], -1, 1))
@@ -70,7 +70,7 @@ class Careless(Equidistant):
 
 
 class Silent(Rectilinear):
-    """A rectilinear lens that sees behind the camera as if it were before it."""
+    """A rectilinear lens that sees points behind the camera as if they were in front."""
 
     def pixels(self, rays: np.ndarray) -> np.ndarray:
         return super().pixels(rays * [1, 1, -1] if np.ndim(rays) else rays)
@@ -90,7 +90,7 @@ def test_a_lens_that_loses_digits_or_invents_pixels_fails(lens: Lens) -> None:
     assert "good → good" not in failed
 
 
-def test_program_writes_a_row_a_case_a_summary_and_a_plot(
+def test_the_program_writes_a_row_for_each_case_a_summary_and_a_plot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = {name: ALL[name] for name in ("rectilinear 90° odd", "equidistant 360°")}
@@ -109,13 +109,13 @@ def test_program_writes_a_row_a_case_a_summary_and_a_plot(
     assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_program_fails_where_a_case_is_outside_its_bound(
+def test_the_program_fails_if_a_case_exceeds_its_bound(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good = list(stability.measure({"a": ALL["rectilinear 90° odd"]}))
-    bad = good[0] | {"case": "made up", "error": 1.0, "error_bound": 1e-16, "verdict": "FAIL"}
+    bad = good[0] | {"case": "made → up", "error": 1.0, "error_bound": 1e-16, "verdict": "FAIL"}
     monkeypatch.setattr(stability, "measure", lambda lenses: [*good, bad])
     monkeypatch.setattr(sys, "argv", ["stability.py", "--output", str(tmp_path)])
-    with pytest.raises(UserError, match=r"1 of 3 cases.*made up"):
+    with pytest.raises(UserError, match=r"1 of 3 cases.*made → up"):
         stability.main()
-    assert "Outside its bound: made up" in (tmp_path / "stability.md").read_text()
+    assert "Outside its bound: made → up" in (tmp_path / "stability.md").read_text()

@@ -1,4 +1,4 @@
-"""How far a build is: never started, at work, killed and finished."""
+"""The status of a build: never started, at work, killed and finished."""
 
 import json
 import os
@@ -24,15 +24,15 @@ NAMES = ["a", "b", "c", "d"]
 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch, capsys):
-    """A dataset of four views of which the first ``count`` are rendered, and its status."""
+    """A dataset of four views. Functions render some of them, and print its status."""
     folder, made = tmp_path / "results/scene/rig", tmp_path / "work/scene/rig"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [2, 1]})
     content = LightField(lens.to_lightfield(), [View.placed(name, np.eye(4)) for name in NAMES])
 
     def lines(others=()):
         folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
-        words = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
-        monkeypatch.setattr(sys, "argv", list(map(str, words)))
+        arguments = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
+        monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
         status.main()
         return capsys.readouterr().out.splitlines()
 
@@ -49,7 +49,7 @@ def dataset(tmp_path, monkeypatch, capsys):
         (made / "render").mkdir(parents=True, exist_ok=True)
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (made / f"render/{name}.journal.jsonl").write_text(text)
-        # A user's copy is of no shard.
+        # This copy by the user belongs to no shard.
         (made / "render/kept.journal.jsonl").write_text(text)
 
     lines.folder, lines.made, lines.content = folder, made, content
@@ -83,15 +83,15 @@ def test_views_of_other_settings_are_not_counted(dataset):
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
 
 
-def test_the_time_left_is_that_at_the_rate_of_the_shards_at_work(dataset, monkeypatch):
+def test_the_time_left_follows_from_the_rate_of_the_shards_at_work(dataset, monkeypatch):
     dataset.render("a", "b")
-    # This process stands for the renderer's. It began just now, so the clock is put forward.
+    # This process stands in for the renderer's. It began just now, so the clock is put forward.
     now = time.time() + 1000
     monkeypatch.setattr(status.time, "time", lambda: now)
     start = started(1000, pid=os.getpid())
     dataset.journal("0-4", start, *(finished("a", ago) for ago in (900, 500, 1)))
     lines = dataset()
-    # Two views within the last ten minutes, and two are left.
+    # Two views were finished in the last ten minutes, and two are left.
     assert lines[1] == (
         "  rendered: 2 of 4, 0.2 a minute, 10 min 00 s left at the rate of the last 10 min 00 s"
     )
@@ -99,7 +99,7 @@ def test_the_time_left_is_that_at_the_rate_of_the_shards_at_work(dataset, monkey
     assert lines[-1] == lines[1].replace("  rendered: 2 of 4", "all: 2 of 4 views rendered")
 
 
-def test_a_killed_shard_is_listed_until_its_views_are_there(dataset):
+def test_a_killed_shard_is_listed_until_its_views_are_finished(dataset):
     dataset.render("a")
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
@@ -111,11 +111,11 @@ def test_a_killed_shard_is_listed_until_its_views_are_there(dataset):
     assert "killed" not in "\n".join(dataset())
 
 
-def test_a_process_on_another_machine_is_at_work_while_it_is_heard_of(dataset):
+def test_a_process_on_another_machine_is_at_work_if_it_wrote_lately(dataset):
     dataset.render("a", "c")
-    there = started(5000, pid=1) | {"host": "another-node"}
-    dataset.journal("0-2", there, finished("a", 30))
-    dataset.journal("2-4", there, finished("c", 4000))
+    elsewhere = started(5000, pid=1) | {"host": "another-node"}
+    dataset.journal("0-2", elsewhere, finished("a", 30))
+    dataset.journal("2-4", elsewhere, finished("c", 4000))
     lines = dataset()
     assert any(
         re.fullmatch(r"  shards at work: 0:2 on another-node \(heard of 3\d s ago\)", line)
@@ -133,7 +133,7 @@ def test_a_reprojected_view_older_than_its_source_is_not_counted(dataset):
     assert "  flat: 2 of 4" in dataset()
 
 
-def test_a_validation_counts_if_it_is_of_these_views(dataset):
+def test_a_validation_counts_only_for_the_present_views(dataset):
     dataset.render(*NAMES)
     file = dataset.folder / "validation.json"
     file.write_text('{"valid": true}')
@@ -146,8 +146,8 @@ def test_a_validation_counts_if_it_is_of_these_views(dataset):
 
 def test_a_clock_that_is_ahead_gives_no_rate(dataset):
     dataset.render("a")
-    there = started(-5, pid=1) | {"host": "another-node"}
-    dataset.journal("0-4", there, finished("a", -7))
+    elsewhere = started(-5, pid=1) | {"host": "another-node"}
+    dataset.journal("0-4", elsewhere, finished("a", -7))
     assert dataset()[1] == "  rendered: 1 of 4, no rate yet"
 
 
@@ -159,56 +159,56 @@ def test_all_chosen_datasets_are_added_up(dataset):
 
 
 @pytest.mark.slow
-def test_snakemake_says_it_without_a_lock(tmp_path):
+def test_snakemake_shows_the_status_without_a_lock(tmp_path):
     folders = (f"results={tmp_path / 'results'}", f"work={tmp_path / 'work'}")
-    words = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
-    result = snakemake(ROOT, *words)
+    arguments = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
+    result = snakemake(ROOT, *arguments)
     assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines()[0] == "garden_tiny/LFSphere_e100cm_d170cm"
     assert result.stdout.splitlines()[-1] == "all: 0 of 12 views rendered, no rate yet"
 
 
-def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
+def test_progress_starts_at_once_and_can_be_read_in_a_log(capsys, monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    told = progress.Progress(10, "render scene/rig 0:12", already=2)
+    render_progress = progress.Progress(10, "render scene/rig 0:12", already=2)
     assert capsys.readouterr().err == "render scene/rig 0:12: 10 views to do, 2 already done\n"
     # The first view takes 100 s more than the others' 20 s.
     for seconds in (120, 20, 20):
         now[0] += seconds
-        told.done()
+        render_progress.done()
     assert capsys.readouterr().err.splitlines() == [
         "render scene/rig 0:12: 1 of 10 views, 120 s each, 18 min 00 s left",
         "render scene/rig 0:12: 2 of 10 views, 20 s each, 2 min 40 s left",
         "render scene/rig 0:12: 3 of 10 views, 20 s each, 2 min 20 s left",
     ]
-    # Within the interval nothing is told, but the end is.
+    # Within the interval nothing is printed, except the end.
     now[0] += 1
-    told.done()
+    render_progress.done()
     assert capsys.readouterr().err == ""
-    told.done(6)
+    render_progress.done(6)
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
 
 
-def test_progress_bears_that_nothing_is_done_yet(capsys, monkeypatch):
+def test_progress_works_while_nothing_is_finished(capsys, monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    told = progress.Progress(10, "places", "cameras")
+    place_progress = progress.Progress(10, "places", "cameras")
     now[0] += 60
-    told.done(0)
+    place_progress.done(0)
     now[0] += 60
-    told.done(4)
+    place_progress.done(4)
     assert capsys.readouterr().err.splitlines() == [
         "places: 10 cameras to do",
         "places: 4 of 10 cameras, 30 s each, 3 min 00 s left",
     ]
 
 
-def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
+def test_a_record_lists_finished_views_until_a_file_is_lost(dataset):
     dataset.render("a", settings=dataset.content)
     dataset.render("b", "c", settings=dataset.content.changed(resolution=[4, 1]))
     record = dataset.made / "render/1-3.json"
-    # The names of what a pass numbers are no view.
+    # The names that a pass numbers are not a view.
     files.write_json(dataset.folder / "object/names.json", {"cube": 1})
     sizes = {
         name: (dataset.folder / name).stat().st_size
@@ -219,7 +219,7 @@ def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
     assert dataset()[1].startswith("  rendered: 3 of 4")
     (dataset.folder / "exr/c.exr").write_bytes(b"cut short")
     assert dataset()[1].startswith("  rendered: 1 of 4")
-    # Of a lightfield.json that is newer than the record only what has its key counts.
+    # If lightfield.json is newer than the record, only files with its key count.
     dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
     os.utime(record, (1, 1))
     assert dataset()[1].startswith("  rendered: 1 of 4")

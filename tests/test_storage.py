@@ -1,4 +1,4 @@
-"""Builds whose jobs see no common folder, by a storage in a folder."""
+"""Builds whose jobs share no folder, with a storage in a folder."""
 
 from collections import Counter
 
@@ -21,13 +21,13 @@ WORDS = (
 )
 
 
-def test_without_its_server_the_benchmark_says_at_once_what_to_install(tmp_path, monkeypatch):
+def test_without_its_server_the_benchmark_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(cloud, "ROOT", tmp_path)
     with pytest.raises(UserError, match=r"make .*\.venv-s3-server/complete"):
         cloud.check_environment()
 
 
-def test_a_server_that_cannot_start_is_named_with_its_own_words(tmp_path, monkeypatch):
+def test_a_server_that_cannot_start_is_reported_with_its_own_message(tmp_path, monkeypatch):
     monkeypatch.setattr(cloud, "ROOT", tmp_path)
     python = tmp_path / cloud.SERVER / "bin/python"
     python.parent.mkdir(parents=True)
@@ -38,7 +38,7 @@ def test_a_server_that_cannot_start_is_named_with_its_own_words(tmp_path, monkey
 
 
 @pytest.mark.slow
-def test_settings_that_a_killed_run_could_not_send_are_sent_by_the_next(tmp_path):
+def test_settings_of_a_killed_run_are_sent_by_the_next(tmp_path):
     build = Cloud(tmp_path / "cloud", 2, str(tmp_path / "store"))
     build.start("--dry-run").communicate()
     settings = list((tmp_path / "store").glob("work/**/settings/*.json"))
@@ -60,7 +60,7 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
     for group in build.running():
         kill_group(group)
     kept = {path.name.split("@")[1].removesuffix(".exr") for path in keys.glob("*/*.exr@*")}
-    # As a node that is gone: what is made afterwards is in the journals of other jobs.
+    # A node is gone: the journals of other jobs show what was rendered afterwards.
     build.jobs.rename(tmp_path / "gone")
     build.jobs.mkdir()
     said, _ = run.communicate()
@@ -69,16 +69,16 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
 
     for stage in ("render", "perspective"):
         record = f"work/{PANORAMAS}/{stage}/0-2.json"
-        found = shard_files.read_record(folder / record)
-        assert found == shard_files.read_record(smoke / record)
-        for name, (_, digest) in found.items():
+        files = shard_files.read_record(folder / record)
+        assert files == shard_files.read_record(smoke / record)
+        for name, (_, digest) in files.items():
             assert store.take(digest, tmp_path / name)
             assert (tmp_path / name).read_bytes() == (
                 smoke / "results" / PANORAMAS / name
             ).read_bytes()
 
 
-# A room with a texture of its walls, and a box with another one from a linked library.
+# A room with a texture on its walls, and a box from a linked library with another texture.
 BLEND = """
 import sys
 import bpy
@@ -130,7 +130,7 @@ BROUGHT_WORDS = (
 
 
 @pytest.mark.slow
-def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_path):
+def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     folder, root, given = (tmp_path / name for name in ("store", "cloud", "dataset"))
     build = Cloud(root, 2, str(folder), ("published/LFPlane/lightfield.json",))
     for name in ("blends/parts", "textures", "published"):
@@ -146,15 +146,20 @@ def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_pa
     assert run.returncode == 0, said
 
     work, store = folder / "work", ViewStore(str(folder))
-    words = ("--blend", root / "blends/mine.blend", "--inventory", work / "brought/inventory.json")
-    words += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
-    words += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
-    run_program("render_shard.py", *words)
-    found = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
-    assert found == shard_files.read_record(tmp_path / "here.json")
+    arguments = (
+        "--blend",
+        root / "blends/mine.blend",
+        "--inventory",
+        work / "brought/inventory.json",
+    )
+    arguments += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
+    arguments += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
+    run_program("render_shard.py", *arguments)
+    files = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
+    assert files == shard_files.read_record(tmp_path / "here.json")
 
-    found = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
-    for name, (_, digest) in found.items():
+    files = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
+    for name, (_, digest) in files.items():
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
 

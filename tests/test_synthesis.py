@@ -1,4 +1,4 @@
-"""Synthesised views against a scene whose every point is known: a ball inside a sphere."""
+"""Synthesised views, compared with a scene whose points are all known: a ball inside a sphere."""
 
 import csv
 import json
@@ -39,7 +39,7 @@ def sources(see, camera=FISHEYE, rig=RIG):
 
 
 def errors(made, see, lens, matrix=EYE):
-    """The difference in sRGB and the relative one in distance, each pixel's, where there is one."""
+    """Return the differences in sRGB and the relative ones in distance of all pixels with both."""
     colour, distance = see(lens, matrix)
     seen = np.isfinite(distance) & ~made.holes
     difference = encode_srgb(made.colour[seen]) - encode_srgb(colour[seen])
@@ -48,11 +48,11 @@ def errors(made, see, lens, matrix=EYE):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EYES)
-def test_a_view_from_between_the_cameras_is_what_is_there(name):
+def test_a_view_between_the_cameras_shows_the_scene(name):
     lens = lenses.from_camera(EYES[name])
     made = sources(look).synthesise(EYE, lens, 12)
     colour, distance = errors(made, look, lens)
-    # A triangle at the rim has no place for the corner that the lens does not see.
+    # At the rim, the lens does not see a triangle's outer corner.
     outside = np.isnan(lens.pixel_rays()[..., 0])
     rim = binary_dilation(np.pad(outside, 1, constant_values=name == "fisheye"), np.ones((3, 3)))
     assert not (made.holes & ~rim[1:-1, 1:-1]).any()
@@ -61,12 +61,12 @@ def test_a_view_from_between_the_cameras_is_what_is_there(name):
     assert np.isnan(made.colour[outside]).all()
 
 
-def test_it_tears_where_depth_jumps():
+def test_surfaces_tear_where_depth_jumps():
     lens = lenses.from_camera(EYES["perspective"])
     made = sources(look_at_ball).synthesise(EYE, lens)
     colour, distance = errors(made, look_at_ball, lens)
     assert made.hole_fraction(lens.pixel_rays()) < 0.02
-    # Of the silhouette, a pixel or two are on its other side; none is between ball and sphere.
+    # A pixel or two of the silhouette are on its other side. None is between ball and sphere.
     assert (np.abs(distance) > 0.02).mean() < 0.05
     between = (made.distance > 2.0) & (made.distance < 2.4)
     assert not between.any()
@@ -74,7 +74,7 @@ def test_it_tears_where_depth_jumps():
 
 
 def panel_before_wall(lens, matrix):
-    """What cameras along +Y see of a red panel at y = 2, of which the wall is 0.3 m behind."""
+    """Return what cameras along +Y see of a red panel at y = 2, and of a wall 0.3 m behind it."""
     rays = lens.pixel_rays() @ matrix[:3, :3].T
     panel = 2.0 - matrix[1, 3]
     plane = panel if panel > 0 else panel + 0.3
@@ -85,7 +85,7 @@ def panel_before_wall(lens, matrix):
 
 
 def views_along_y(places):
-    """Return views that look along +Y, from places on that axis."""
+    """Return views that look along +Y, at places on that axis."""
     views = []
     for number, y in enumerate(places):
         matrix = EYE.copy()
@@ -94,12 +94,12 @@ def views_along_y(places):
     return views
 
 
-def test_of_views_in_one_line_the_nearer_to_the_surface_counts():
+def test_the_view_nearest_to_the_surface_counts_most():
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
     views = views_along_y([0.0, -6.0])
 
     def wall(view):
-        """What a view sees of a wall at y = 2: the first one calls it red, the other green."""
+        """A wall at y = 2, which the first view sees in red and the other in green."""
         distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
         return np.full((48, 48, 3), [0.8, 0, 0] if view is views[0] else [0, 0.8, 0]), distance
 
@@ -110,13 +110,13 @@ def test_of_views_in_one_line_the_nearer_to_the_surface_counts():
     assert (middle[..., 0] > 10 * middle[..., 1]).all()
 
 
-def test_the_colour_of_an_edge_counts_where_no_other_view_sees_the_surface():
+def test_the_colour_of_an_edge_counts_only_without_other_views():
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
     views = views_along_y([0.0, 0.0])
     green_column = 23
 
     def edge(view):
-        """One view sees a red wall; to the other it ends, and its last pixels are green."""
+        """One view sees a red wall. For the other it ends, and its last pixels are green."""
         depth = np.full((48, 48), 2.0)
         colour = np.full((48, 48, 3), [0.8, 0, 0])
         if view is views[0]:
@@ -129,12 +129,12 @@ def test_the_colour_of_an_edge_counts_where_no_other_view_sees_the_surface():
     assert (alone[:, 1] > 0.6).all()
     assert (alone[:, 0] < 0.03).all()
     both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
-    # The harmonic mean darkens where views disagree, but what shows is the wall.
+    # The harmonic mean darkens where views disagree, but the wall shows.
     assert (both[:, 0] > 100 * both[:, 1]).all()
     assert (both[:, 0] > 0.02).all()
 
 
-def test_a_wall_does_not_shine_through_a_panel_close_before_it():
+def test_a_wall_does_not_shine_through_a_panel_close_in_front():
     lens = lenses.from_camera(FISHEYE | {"fov": 120})
     # The second camera stands between the panel and the wall, and sees the wall alone.
     views = views_along_y([0.0, 2.1])
@@ -147,42 +147,44 @@ def test_a_wall_does_not_shine_through_a_panel_close_before_it():
     np.testing.assert_allclose(made.distance * -target.pixel_rays()[..., 2], 2, rtol=1e-3)
 
 
-def test_what_no_view_sees_is_a_hole():
-    one = {"type": "plane", "cameras": [1, 1], "size": 0}
-    made = sources(look_at_ball, rig=one).synthesise(EYE, lenses.from_camera(EYES["panorama"]))
+def test_pixels_that_no_view_sees_are_holes():
+    single_camera = {"type": "plane", "cameras": [1, 1], "size": 0}
+    made = sources(look_at_ball, rig=single_camera).synthesise(
+        EYE, lenses.from_camera(EYES["panorama"])
+    )
     lens = lenses.from_camera(EYES["panorama"])
     colour, _ = errors(made, look_at_ball, lens)
-    # A single fisheye of 180 degrees sees half, and what lies behind the ball not at all.
+    # A single fisheye of 180 degrees sees half. The part behind the ball is a hole too.
     assert 0.4 < made.hole_fraction(lens.pixel_rays()) < 0.6
     assert np.median(np.abs(colour)) < 0.01
 
 
 @pytest.mark.parametrize("times", [1, 256])
-def test_a_view_at_a_source_is_that_source(times):
+def test_a_view_at_a_cameras_place_equals_the_cameras_view(times):
     field = sources(look_at_ball)
     made = field.blended(field.matrices[3], field.lens, [3] * times)
     colour, distance = look_at_ball(field.lens, field.matrices[3])
     torn = binary_dilation(field.surface(3).torn, np.ones((3, 3)))
-    # Of a pixel at the rim, not all samples are seen.
+    # At the rim, not all samples of a pixel are seen.
     inside = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)))
     amid = inside & ~torn & ~made.holes
     assert amid.mean() > 0.6
-    # Not half an 8-bit step apart.
+    # The difference is less than half an 8-bit step.
     difference = encode_srgb(made.colour[amid]) - encode_srgb(colour[amid])
     assert np.abs(difference).max() < 0.5 / 255
     np.testing.assert_allclose(made.distance[amid], distance[amid], rtol=1e-4)
 
 
-def test_from_a_views_own_place_nothing_is_missing():
+def test_a_view_from_a_cameras_place_has_no_holes():
     field = sources(look_at_ball)
     made = field.blended(field.matrices[3], field.lens, [3])
-    # At the rim a triangle has no place for the corner that the lens does not see.
+    # At the rim, the lens does not see a triangle's outer corner.
     seen = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)), 2)
     assert not made.holes[seen].any()
 
 
-def test_a_single_pixel_before_a_wall_leaves_no_gap_around_it():
-    # Diagonal neighbours of what is alone before a wall have no triangle towards it.
+def test_a_single_near_pixel_leaves_no_gap_around_it():
+    # The wall's diagonal neighbours of a near pixel have no triangle towards it.
     def see(lens, matrix):
         colour, distance = look(lens, matrix)
         distance[30:60:6, 30:60:6] = 0.5
@@ -193,9 +195,9 @@ def test_a_single_pixel_before_a_wall_leaves_no_gap_around_it():
     assert not made.holes[28:62, 28:62].any()
 
 
-def test_holes_are_filled_with_what_is_around_and_behind():
+def test_holes_are_filled_mostly_from_the_background():
     def see(lens, matrix):
-        """A wall that is blue, and before its middle a red strip."""
+        """A blue wall, and a red strip in front of its middle."""
         x = np.linspace(-1, 1, lens.width)
         strip = np.broadcast_to(np.abs(x) < 0.2, (lens.height, lens.width))
         ahead = -lens.pixel_rays()[..., 2]
@@ -209,13 +211,13 @@ def test_holes_are_filled_with_what_is_around_and_behind():
     middle = made.holes[32]
     assert middle[:48].sum() > 4
     row = made.colour[32, :48][middle[:48]]
-    # Between strip and wall, and more of the wall than of the strip.
+    # The filling is between strip and wall, and closer to the wall.
     assert row[:, 2].mean() > 1.5 * row[:, 0].mean()
     assert row[-1, 2] > 5 * row[-1, 0] or row[0, 2] > 5 * row[0, 0]
     channels = made.channels("z", field.rays)
     assert (channels["A"][32][middle] == 0).all()
     assert np.isnan(channels["Z"][32][middle]).all()
-    # Of views without a background, what none of them sees is most likely nothing.
+    # Without a background, unseen pixels most likely show nothing.
     field.fills_holes = False
     black = field.synthesise(beside, field.lens)
     assert (black.holes == made.holes).all()
@@ -253,7 +255,7 @@ def test_the_best_views_look_where_the_eye_does():
     assert len(set(field.best(EYE, lenses.from_camera(EYES["panorama"]), 6))) == 6
 
 
-def test_what_is_infinitely_far_is_drawn():
+def test_infinitely_far_points_are_drawn():
     def sky(lens, matrix):
         rays = lens.pixel_rays() @ matrix[:3, :3].T
         return np.nan_to_num(0.5 + 0.4 * rays), np.where(np.isnan(rays[..., 0]), np.nan, np.inf)
@@ -265,7 +267,7 @@ def test_what_is_infinitely_far_is_drawn():
     np.testing.assert_allclose(made.colour, expected, atol=0.002)
 
 
-def test_few_views_are_held_in_memory():
+def test_only_a_few_views_stay_in_memory():
     field = sources(look)
     field.most = 3
     for index in range(10):
@@ -284,21 +286,21 @@ def test_the_program_writes_a_dataset_and_a_video(dataset, tmp_path, run_program
     keys = [{"position": [0, 0, 0]}, {"position": [0.2, 0.1, 0]}]
     rig = {"type": "path", "count": 3, "keys": keys, "camera": EYES["perspective"]}
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig))
-    words = [dataset, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "walk"]
-    result = run_program("synthesize.py", *words)
+    arguments = [dataset, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "walk"]
+    result = run_program("synthesize.py", *arguments)
     assert "3 views of 6 each; holes: 0.000%" in result.stdout
     lightfield = LightField.read(tmp_path / "walk" / "lightfield.json")
     for view in lightfield.views:
-        found = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
-        assert set(found.channels) == {*"RGBAZ"}
+        image = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
+        assert set(image.channels) == {*"RGBAZ"}
         colour, distance = look(lightfield.lens, view.matrix)
         z = distance * -lightfield.lens.pixel_rays()[..., 2]
-        np.testing.assert_allclose(found.channels["Z"], z, rtol=0.02)
-        assert np.abs(found.colour - colour).max() < 0.05
+        np.testing.assert_allclose(image.channels["Z"], z, rtol=0.02)
+        assert np.abs(image.colour - colour).max() < 0.05
         assert (tmp_path / "walk" / "png" / f"{view.name}.png").is_file()
 
 
-def test_the_test_views_of_a_split_come_from_the_others(dataset, tmp_path, run_program):
+def test_the_test_views_of_a_split_are_synthesised_from_the_others(dataset, tmp_path, run_program):
     result = run_program("synthesize.py", dataset, "--output", tmp_path)
     held_out = json.loads((tmp_path / "lightfield.json").read_text())["frames"]
     assert f"{len(held_out)} views" in result.stdout
@@ -307,7 +309,7 @@ def test_the_test_views_of_a_split_come_from_the_others(dataset, tmp_path, run_p
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory, run_program):
-    """What is measured of a sphere of views, compared with a ring in it: rows and their file."""
+    """The quality of a sphere of views, measured with a ring inside it: its rows and their file."""
     folder = tmp_path_factory.mktemp("measured")
     around, ring, out = (folder / name / "dataset" for name in ("around", "ring", "out"))
     write_views(around, FISHEYE, RIG, see=look_at_ball)
@@ -325,8 +327,8 @@ def measured(tmp_path_factory, run_program):
             light = dict.fromkeys("RGB", lit.astype(np.float16))
             images.write_exr(PASSES[name].path(ring, view.name), light)
     stem = out.with_name("quality")
-    words = [around, "--truth", ring, "--output", stem]
-    run_program("synthesis_quality.py", *words)
+    arguments = [around, "--truth", ring, "--output", stem]
+    run_program("synthesis_quality.py", *arguments)
     assert stem.with_suffix(".svg").is_file()
     with stem.with_suffix(".csv").open() as file:
         return list(csv.DictReader(file)), stem.with_suffix(".csv")
@@ -334,25 +336,25 @@ def measured(tmp_path_factory, run_program):
 
 def test_fewer_views_and_the_controls_are_worse(measured):
     means = summaries.means(measured[0])
-    found = {(row["variant"], row["value"]): row for row in means}
-    plain = found["all", "42"]
-    assert plain["psnr"] > found["views", "12"]["psnr"] + 0.5
-    assert plain["source_bytes"] > 3 * found["views", "12"]["source_bytes"]
+    mean_of = {(row["variant"], row["value"]): row for row in means}
+    plain = mean_of["all", "42"]
+    assert plain["psnr"] > mean_of["views", "12"]["psnr"] + 0.5
+    assert plain["source_bytes"] > 3 * mean_of["views", "12"]["source_bytes"]
     for control in ("nearest view alone", "shuffled depth"):
-        assert plain["psnr"] > found["control", control]["psnr"] + 2
+        assert plain["psnr"] > mean_of["control", control]["psnr"] + 2
 
 
-def test_regions_are_told_apart_by_the_light_that_pixels_show(measured):
+def test_regions_follow_the_light_that_pixels_show(measured):
     rows, _ = measured
     assert {row["region"] for row in rows} == {"all", "diffuse", "glossy"}
-    (whole,), (diffuse,), (glossy,) = (
+    (everywhere,), (diffuse,), (glossy,) = (
         summaries.means([row for row in rows if row["variant"] == "all"], region)
         for region in ("all", "diffuse", "glossy")
     )
-    assert whole["part"] == 1
+    assert everywhere["part"] == 1
     assert diffuse["part"] + glossy["part"] == pytest.approx(1)
     assert 0.02 < glossy["part"] < 0.5
-    # All errors are those of its parts, in each view.
+    # In each view, the errors of all pixels are the weighted mean of the regions'.
     for view in {row["view"] for row in rows}:
         part = {
             row["region"]: (float(row["part"]), 10 ** (-float(row["psnr"]) / 10))
@@ -363,7 +365,7 @@ def test_regions_are_told_apart_by_the_light_that_pixels_show(measured):
         assert sum(sides) == pytest.approx(part["all"][1])
 
 
-def test_places_are_inside_or_towards_the_edge(measured):
+def test_places_are_inside_or_at_the_edge(measured):
     rows, _ = measured
     places = {row["view"]: (row["place"], float(row["to_edge"])) for row in rows}
     (near, near_part), (far, far_part) = (places[name] for name in sorted(places))
@@ -375,24 +377,24 @@ def test_a_page_has_these_tables(measured):
     _, path = measured
     folder = path.parent / "synthesis" / "ball"
     folder.mkdir(parents=True)
-    found = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
-    places, regions = list(found.tables.values())[1:]
+    page_tables = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
+    places, regions = list(page_tables.tables.values())[1:]
     assert [row[:2] for row in places.rows] == [["dataset", "inside"], ["dataset", "edge"]]
     assert [row[1] for row in regions.rows] == ["all", "diffuse", "glossy"]
 
 
 @pytest.mark.parametrize(
-    ("words", "problem"),
+    ("arguments", "problem"),
     [
         (["--best", "0"], "--best: is 0; must be 1 or more"),
         (["--poses", "rig.yaml"], "camera: is missing"),
         (["--poses", "none.json"], "none.json"),
     ],
 )
-def test_mistakes_are_one_line(dataset, tmp_path, run_program, words, problem):
+def test_mistakes_are_one_line(dataset, tmp_path, run_program, arguments, problem):
     (tmp_path / "rig.yaml").write_text("type: plane\ncameras: [2, 2]\nsize: 1\n")
-    words = [word.replace("rig.yaml", str(tmp_path / "rig.yaml")) for word in words]
-    result = run_program("synthesize.py", dataset, *words, "--output", tmp_path, check=False)
+    arguments = [word.replace("rig.yaml", str(tmp_path / "rig.yaml")) for word in arguments]
+    result = run_program("synthesize.py", dataset, *arguments, "--output", tmp_path, check=False)
     assert result.returncode
     assert problem in result.stderr.splitlines()[-1]
     assert "Traceback" not in result.stderr

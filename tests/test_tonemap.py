@@ -9,7 +9,7 @@ from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, to_16
 
 def test_reinhard_makes_its_maximum_white_and_keeps_order():
     values = np.array([0.0, 0.5, 1.0, 2.0, 5.0], np.float32)
-    # v (1 + v / 25) / (1 + v), worked out by hand.
+    # v (1 + v / 25) / (1 + v), calculated by hand.
     expected = [0.0, 0.34, 0.52, 0.72, 1.0]
     assert np.allclose(tone_map(values, 0.0, 5.0), expected, atol=1e-6)
 
@@ -28,7 +28,7 @@ def test_no_negative_value_passes_the_pole_of_the_curve():
 
 
 @pytest.mark.parametrize("white", [1e-9, 1, 5, 1e9])
-def test_all_light_too_strong_for_a_float_is_white_and_none_is_black(white):
+def test_infinite_light_is_white_and_no_light_is_black(white):
     values = np.array([0, 3e38, np.inf], np.float32)
     assert to_8_bit(tone_map(values, 1, white)).tolist() == [0, 255, 255]
 
@@ -39,7 +39,7 @@ def reference_srgb(linear):
     return xyz2rgb(np.asarray(linear)[:, None] * white)[:, 1]
 
 
-def test_srgb_is_that_of_scikit_image():
+def test_srgb_is_scikit_images():
     linear = np.concatenate([np.linspace(0, 1, 5001), np.geomspace(1e-6, 1, 500)])
     assert np.abs(encode_srgb(linear) - reference_srgb(linear)).max() < 1e-5
     assert np.abs(decode_srgb(encode_srgb(linear)) - linear).max() < 1e-12
@@ -53,7 +53,7 @@ def test_8_bit_codes_are_the_nearest_ones():
 
 
 @pytest.mark.parametrize("step", [-1, 0, 1])
-def test_every_8_bit_code_survives_the_way_there_and_back(step):
+def test_every_8_bit_code_survives_decoding_and_encoding(step):
     codes = np.arange(256)
     linear = np.nextafter(decode_srgb(codes / 255).astype(np.float32), np.float32(step))
     assert np.array_equal(to_8_bit(linear), codes)
@@ -65,6 +65,6 @@ def test_16_bit_codes_are_the_nearest_ones(beside):
     assert np.array_equal(to_16_bit(decode_srgb((codes + beside) / 65535)), codes)
 
 
-def test_what_is_out_of_range_is_clipped():
+def test_values_out_of_range_are_clipped():
     values = np.array([-1.0, -0.0, 1.0, 7.0, np.inf, -np.inf, np.nan], np.float32)
     assert to_8_bit(values).tolist() == [0, 0, 255, 255, 255, 0, 0]

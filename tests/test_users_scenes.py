@@ -1,4 +1,4 @@
-"""Scenes of users that Cycles renders wrong without an error: what is wrong is said, once."""
+"""Scenes of users that Cycles renders incorrectly without an error: each is reported once."""
 
 from pathlib import Path
 
@@ -39,9 +39,9 @@ def write_lightfield(path, lens, places, **more):
 def checked(folder, run_program, blend, places):
     """Return the status of the check of cameras, and its warnings or error."""
     write_lightfield(folder / "checked.json", "flat", places)
-    words = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
     output = ("--output", folder / "cameras.json")
-    result = run_program("check_cameras.py", *words, *output, check=False)
+    result = run_program("check_cameras.py", *arguments, *output, check=False)
     return result.returncode, result.stderr.splitlines()
 
 
@@ -49,8 +49,8 @@ def rendered(folder, run_program, blend, lens):
     """Return the channels of a view, and of its pass object."""
     output = folder / f"{blend}_{lens}"
     write_lightfield(output / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
-    words = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
-    run_program("render_shard.py", *words, "--views", "0:1", "--output", output / "exr")
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *arguments, "--views", "0:1", "--output", output / "exr")
     view = images.read_image(output / "exr/view_0000f.exr").channels
     view |= images.read_image(output / "object/view_0000f.exr").channels
     return {name: pixels.astype(float) for name, pixels in view.items()}
@@ -62,23 +62,23 @@ def test_grease_pencil_is_left_out_of_a_fisheye(folder, run_program):
         np.testing.assert_array_equal(drawn[name], pixels, err_msg=name)
 
 
-def test_grease_pencil_is_in_the_colour_of_perspective_views_alone(folder, run_program):
+def test_only_perspective_views_show_grease_pencil_and_only_in_their_colour(folder, run_program):
     plain, drawn = (rendered(folder, run_program, each, "flat") for each in ("wall", "pencil"))
     for name in "ZY":
         np.testing.assert_array_equal(drawn[name], plain[name], err_msg=name)
     differs = np.abs(drawn["R"] - plain["R"]) > 0.01
     assert differs[12:20, 12:20].mean() > 0.5
-    # What is behind the wall would be seen here.
+    # Behind the wall, this would be visible.
     assert not differs[:4].any() and not differs[:, :4].any()
 
 
 @pytest.mark.parametrize(
     ("lens", "said"), [("fisheye", "is left out"), ("flat", "no depth and no pass")]
 )
-def test_what_views_lack_of_grease_pencil_is_said(lens, said, folder, run_program):
+def test_missing_grease_pencil_is_reported(lens, said, folder, run_program):
     write_lightfield(folder / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
-    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
-    result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *words)
+    arguments = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
+    result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *arguments)
     (warning,) = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
     assert said in warning
     assert "behind, drawing" in warning
@@ -97,7 +97,7 @@ ONE_INSIDE = [(0, 0, 0), (0, 30, 30)]
         ("dome", BOTH_INSIDE, "2 of 2 cameras are inside an open mesh: dome: "),
     ],
 )
-def test_cameras_inside_an_open_mesh_are_said(blend, places, said, folder, run_program):
+def test_cameras_inside_an_open_mesh_are_reported(blend, places, said, folder, run_program):
     status, (warning,) = checked(folder, run_program, blend, places)
     assert status == 0
     assert warning.startswith(f"warning: {said}")
@@ -111,20 +111,22 @@ def test_a_camera_inside_a_closed_mesh_is_refused(blend, folder, run_program):
 
 
 @pytest.mark.parametrize("blend", ["open_room", "leaves", "floor"])
-def test_cameras_that_see_fronts_or_a_plane_are_not_said_to_be_inside(blend, folder, run_program):
+def test_cameras_that_see_fronts_or_a_plane_are_not_inside(blend, folder, run_program):
     assert checked(folder, run_program, blend, BOTH_INSIDE) == (0, [])
 
 
 def listed(folder, run_program, blend, frame):
-    """Return the warnings of the inventory of a .blend that is rendered at a frame."""
+    """Return the warnings of the inventory of a .blend for a frame."""
     scenes = folder / "configs/scenes"
     scenes.mkdir(parents=True, exist_ok=True)
     text = SIMULATED.format(blend=blend, frame=frame)
     (scenes / f"{blend}.yaml").write_text(text)
-    words = ("--scene", blend, "--blend", f"{blend}.blend", "--output", "inventory.json")
-    result = run_program("inventory.py", *words, cwd=folder, check=False)
-    told = [line for line in result.stderr.splitlines() if line.startswith(("warning: ", "error"))]
-    return result.returncode, told
+    arguments = ("--scene", blend, "--blend", f"{blend}.blend", "--output", "inventory.json")
+    result = run_program("inventory.py", *arguments, cwd=folder, check=False)
+    messages = [
+        line for line in result.stderr.splitlines() if line.startswith(("warning: ", "error"))
+    ]
+    return result.returncode, messages
 
 
 SIMULATED = """
@@ -147,7 +149,7 @@ def test_unbaked_simulations_are_named_with_a_remedy(folder, run_program):
     assert "bake them in Blender" in warning
 
 
-def test_simulations_are_right_without_a_bake_at_their_first_frame(folder, run_program):
+def test_simulations_need_no_bake_at_their_first_frame(folder, run_program):
     assert listed(folder, run_program, "simulations", 1) == (0, [])
 
 
@@ -164,12 +166,12 @@ def test_a_fluid_that_is_not_baked_is_refused_by_name(folder, run_program):
 @pytest.mark.parametrize("lens", LENSES)
 def test_a_transparent_view_of_nothing_is_valid(lens, folder, run_program):
     output = folder / f"nothing_{lens}"
-    # The box lies behind the first camera and before the second.
+    # The box is behind the first camera, and in front of the second.
     places = [(0, 5, 0), (0, -5, 0)]
     more = {"passes": [], "transparent": True}
     write_lightfield(output / "lightfield.json", lens, places, **more)
-    words = ("--blend", folder / "box.blend", "--lightfield", output / "lightfield.json")
-    run_program("render_shard.py", *words, "--output", output / "exr")
+    arguments = ("--blend", folder / "box.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *arguments, "--output", output / "exr")
     covered = [
         images.read_image(output / f"exr/view_{view}f.exr").channels["A"][16, 16]
         for view in ("0000", "0001")
@@ -189,7 +191,7 @@ rigs:
 """
 
 
-def test_a_pixel_aspect_is_said_to_be_ignored_and_pixels_are_square(folder, run_program):
+def test_a_pixel_aspect_is_reported_as_ignored_and_pixels_are_square(folder, run_program):
     (folder / "configs/scenes").mkdir(parents=True, exist_ok=True)
     (folder / "configs/scenes/aspect.yaml").write_text(ASPECT)
     blend = ("--scene", "aspect", "--blend", "aspect.blend")
@@ -197,10 +199,10 @@ def test_a_pixel_aspect_is_said_to_be_ignored_and_pixels_are_square(folder, run_
     said = run_program("inventory.py", *blend, "--output", "inventory.json", cwd=folder).stdout
     (note,) = [line for line in said.splitlines() if line.startswith("note: ")]
     assert "pixel aspect 2 ignored" in note
-    words = ("--scene", "aspect", "--rig", "View", "--inventory", "inventory.json")
-    run_program("make_lightfield.py", *words, "--output", "View/lightfield.json", cwd=folder)
-    words = ("--blend", "aspect.blend", "--lightfield", "View/lightfield.json")
-    run_program("render_shard.py", *words, "--output", "View/exr", cwd=folder)
+    arguments = ("--scene", "aspect", "--rig", "View", "--inventory", "inventory.json")
+    run_program("make_lightfield.py", *arguments, "--output", "View/lightfield.json", cwd=folder)
+    arguments = ("--blend", "aspect.blend", "--lightfield", "View/lightfield.json")
+    run_program("render_shard.py", *arguments, "--output", "View/exr", cwd=folder)
     depth = images.read_image(folder / "View/exr/view_0001f.exr").channels["Z"]
     seen = np.isfinite(depth)
     assert 4 < seen.any(axis=0).sum() == seen.any(axis=1).sum() < 32

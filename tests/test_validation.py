@@ -1,7 +1,7 @@
-"""Validation against datasets whose truth is analytic: a room of planes, spheres and thin rods.
+"""Validation of datasets with analytic truth: a room of planes, spheres and thin rods.
 
-Each dataset is right, and then spoilt in one way: validation has to say so and to name the view.
-Depth is traced under jittered sub-pixel positions, as Cycles samples it.
+Each dataset is correct, and then spoiled in one way. Validation must report it and name the view.
+Depth is traced at jittered sub-pixel positions, as Cycles samples it.
 """
 
 import json
@@ -40,11 +40,11 @@ CYCLES_ROOM = Path(__file__).parent / "cycles_room.py"
 
 SPHERE = {"type": "sphere", "subdivisions": 1, "size": 1.7}
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
-BAD = 2  # the view that is spoilt where one is
+BAD = 2  # the view that most tests spoil
 
 
 def trace(origin: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return distance (...) and albedo (...) of what unit rays (..., 3) hit in the room."""
+    """Return distance (...) and albedo (...) of the room's points that unit rays (..., 3) hit."""
     low, high = np.array([-3, -2.5, -1.4]), np.array([3, 2.5, 1.8])
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(rays > 0, (high - origin) / rays, (low - origin) / rays)
@@ -95,7 +95,7 @@ def render(
         for name, gain in zip("RGB", (1.0, 0.8, 0.6), strict=True)
     }
     if depth:
-        # The renderer knows the ray of the pixel's centre only.
+        # The renderer knows only the ray of the pixel's centre.
         value = distance * -centre_rays[..., 2] if depth == "z" else distance
         channels["Z"] = np.where(np.isnan(value), np.inf, value).astype(np.float32)
     return channels
@@ -124,7 +124,7 @@ def right_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def dataset(right_dataset: Path, tmp_path: Path) -> Path:
-    """A copy of the right dataset, to spoil: 12 views."""
+    """A copy of the correct dataset of 12 views, to be spoiled."""
     return Path(shutil.copytree(right_dataset, tmp_path / "room" / "sphere"))
 
 
@@ -136,13 +136,13 @@ def right_small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def small_dataset(right_small_dataset: Path, tmp_path: Path) -> Path:
-    """A copy of a right dataset of 3 views, for what one file tells."""
+    """A copy of a correct dataset of 3 views, for faults of a single file."""
     return Path(shutil.copytree(right_small_dataset, tmp_path / "room" / "plane"))
 
 
 @pytest.fixture
 def one_view(tmp_path: Path) -> Path:
-    """A right dataset of one view, for what is wrong with an image."""
+    """A correct dataset of one view, for faults of an image."""
     rig = {"type": "plane", "cameras": [1, 1]}
     return make_dataset(tmp_path / "room" / "one", rig, FISHEYE)
 
@@ -167,7 +167,7 @@ def rewrite(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def relist(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change lightfield.json; positions and rotations then follow the matrices."""
+    """Change lightfield.json. Positions and rotations then follow the matrices."""
     rewrite(dataset, change)
     lightfield = LightField.read(dataset / NAME)
     views = [View.placed(view.name, view.matrix, view.others) for view in lightfield.views]
@@ -262,19 +262,19 @@ RIGHT = {
 def test_right_dataset_is_valid_with_margin(case: str, tmp_path: Path) -> None:
     result = validate(make_dataset(tmp_path / "room" / "rig", *RIGHT[case]))
     assert failed(result) == []
-    found = check(result, "geometry")
-    assert found.passed
-    assert not found.warnings
-    figures = found.figures
+    geometry_check = check(result, "geometry")
+    assert geometry_check.passed
+    assert not geometry_check.warnings
+    figures = geometry_check.figures
     assert figures["worst_contradiction"] < geometry.CONTRADICTIONS_LIMIT / 3
     assert figures["worst_displacement_pixels"] < geometry.DISPLACEMENT_LIMIT / 1.5
-    for what in ("angle", "depth"):
-        if figures.get(f"{what}_scale_deviation", 1) < geometry.SCALE_DEVIATION_LIMIT:
-            assert abs(figures[f"{what}_scale_error"]) < geometry.SCALE_LIMIT / 2
+    for key in ("angle", "depth"):
+        if figures.get(f"{key}_scale_deviation", 1) < geometry.SCALE_DEVIATION_LIMIT:
+            assert abs(figures[f"{key}_scale_error"]) < geometry.SCALE_LIMIT / 2
 
 
 def two_views_of_a_ball(folder: Path, fov: float, angle: float, recorded_fov: float) -> Result:
-    """Validate two views of 64², 4 m from a ball of 1 m, their axes at ``angle`` degrees."""
+    """Validate two views of 64², 4 m from a ball of 1 m, with ``angle`` degrees between them."""
     angle = math.radians(angle)
     places = [[0, -4, 0], [4 * math.sin(angle), -4 * math.cos(angle), 0]]
     rig = {"type": "path", "count": 2, "keys": [{"position": place} for place in places]}
@@ -298,7 +298,7 @@ def two_views_of_a_ball(folder: Path, fov: float, angle: float, recorded_fov: fl
 
 
 @pytest.mark.parametrize(("fov", "angle"), [(50, 40), (35, 60), (35, 20)])
-def test_two_small_views_of_a_ball_are_not_called_scaled(
+def test_two_small_views_of_a_ball_are_not_taken_for_scaled(
     fov: float, angle: float, tmp_path: Path
 ) -> None:
     result = two_views_of_a_ball(tmp_path, fov, angle, fov)
@@ -402,13 +402,13 @@ def test_wrong_set_fails_its_geometry(case: str, dataset: Path) -> None:
 
 @pytest.mark.parametrize("case", WRONG_VIEWS)
 @pytest.mark.slow
-def test_wrong_view_is_named_and_no_other(case: str, dataset: Path) -> None:
+def test_only_the_wrong_view_is_named(case: str, dataset: Path) -> None:
     WRONG_VIEWS[case](dataset)
     result = validate(dataset)
     assert failed(result) == ["geometry"]
-    found = check(result, "geometry")
-    assert found.views == [names(dataset)[BAD]]
-    assert [problem.split(": ")[0] for problem in found.problems] == [
+    geometry = check(result, "geometry")
+    assert geometry.views == [names(dataset)[BAD]]
+    assert [problem.split(": ")[0] for problem in geometry.problems] == [
         f"exr/{names(dataset)[BAD]}.exr"
     ]
 
@@ -420,15 +420,15 @@ SMALL_SPIRAL = (
 
 
 @pytest.mark.parametrize("precision", [np.float32, np.float16])
-def test_few_pixels_on_curved_surfaces_are_no_error_and_a_turn_by_one_is(
+def test_with_few_pixels_a_curved_surface_passes_and_a_turn_of_a_pixel_fails(
     precision: type, tmp_path: Path
 ) -> None:
     dataset = make_dataset(tmp_path / "room" / "spiral", *SMALL_SPIRAL)
     painted(lambda channels: {**channels, "Z": channels["Z"].astype(precision)})(dataset)
-    found = check(validate(dataset), "geometry")
-    assert found.passed
-    # It is more than would pass where more pixels determine it.
-    assert found.figures["worst_displacement_pixels"] > geometry.DISPLACEMENT_LIMIT
+    geometry_check = check(validate(dataset), "geometry")
+    assert geometry_check.passed
+    # This is more than would pass with more pixels.
+    assert geometry_check.figures["worst_displacement_pixels"] > geometry.DISPLACEMENT_LIMIT
     for axis in range(3):
         copy = Path(shutil.copytree(dataset, tmp_path / str(axis) / "spiral"))
         relist(copy, turn([BAD], degrees(axis, 60 / 24)))
@@ -444,27 +444,27 @@ def test_swapped_views_are_both_named(dataset: Path) -> None:
 
 
 @pytest.mark.parametrize(("fov", "center"), [(185.4, [0, 0, 0]), (174.6, [0.6, -1, 0.4])])
-def test_small_error_of_the_lens_shows_in_all_pairs_together(
+def test_a_small_error_of_the_lens_shows_in_all_pairs_together(
     fov: float, center: list[float], tmp_path: Path
 ) -> None:
-    # Parallel views near each other hardly disagree under a lens 3 % wrong: only the mean tells.
+    # Near parallel views hardly disagree under a lens that is 3 % wrong. Only the mean shows it.
     rig = {"type": "plane", "cameras": [3, 3], "size": 0.5, "center": center}
     dataset = make_dataset(tmp_path / "room" / "plane", rig, FISHEYE, "distance")
     relist(dataset, recamera({"fov": fov}))
-    found = check(validate(dataset), "geometry")
-    assert found.passed is False
-    assert found.views == []
-    assert len(found.problems) == 1
-    assert "all angles" in found.problems[0]
+    geometry = check(validate(dataset), "geometry")
+    assert geometry.passed is False
+    assert geometry.views == []
+    assert len(geometry.problems) == 1
+    assert "all angles" in geometry.problems[0]
 
 
-def test_what_geometry_finds_does_not_depend_on_where_the_world_begins(small_dataset: Path) -> None:
+def test_geometry_does_not_depend_on_the_worlds_origin(small_dataset: Path) -> None:
     relist(small_dataset, recamera({"fov": 177}))
     here = check(validate(small_dataset), "geometry").figures
     for view in range(3):
         relist(small_dataset, move(view, (3, -2, 1)))
-    there = check(validate(small_dataset), "geometry").figures
-    assert there == pytest.approx(here, rel=1e-3)
+    elsewhere = check(validate(small_dataset), "geometry").figures
+    assert elsewhere == pytest.approx(here, rel=1e-3)
 
 
 def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
@@ -475,7 +475,7 @@ def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
     assert check(validate(dataset), "geometry").views == names(dataset)
 
 
-def test_of_three_views_the_one_that_disagrees_with_both_others_is_named(
+def test_the_view_that_disagrees_with_both_others_is_named(
     small_dataset: Path,
 ) -> None:
     # Each of the others disagrees with one of its two neighbours, which is not its own fault.
@@ -498,13 +498,13 @@ UNCHECKED = {
 
 
 @pytest.mark.parametrize("case", UNCHECKED)
-def test_what_cannot_be_checked_is_no_pass(case: str, tmp_path: Path) -> None:
+def test_a_check_without_data_does_not_pass(case: str, tmp_path: Path) -> None:
     *made, reason = UNCHECKED[case]
     result = validate(make_dataset(tmp_path / "room" / "rig", *made))
     assert result.valid
-    found = check(result, "geometry")
-    assert found.passed is None
-    assert reason in found.detail
+    geometry = check(result, "geometry")
+    assert geometry.passed is None
+    assert reason in geometry.detail
     assert re.search("not applicable: .*geometry", result.summary())
 
 
@@ -568,8 +568,8 @@ BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
     ),
     "truncated": (on_file(truncate), "images", "cannot be read"),
     "end cut off": (on_file(cut_tail), "images", "cannot be read"),
-    "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "no image"),
-    "empty file": (on_file(lambda path: path.write_bytes(b"")), "images", "no image"),
+    "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "not an image"),
+    "empty file": (on_file(lambda path: path.write_bytes(b"")), "images", "not an image"),
     "wrong size": (painted(small, ONE), "images", "is 64 × 32; must be 64 × 64"),
     "no blue": (
         painted(lambda c: {name: c[name] for name in "RGZ"}, ONE),
@@ -608,16 +608,16 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     spoil(small_dataset)
     result = validate(small_dataset)
     assert failed(result) == [name]
-    found = check(result, name)
-    assert found.views == [names(small_dataset)[BAD]]
-    assert len(found.problems) == 1
-    assert found.problems[0].startswith(f"exr/{names(small_dataset)[BAD]}.exr: ")
-    assert text in found.problems[0]
+    broken_check = check(result, name)
+    assert broken_check.views == [names(small_dataset)[BAD]]
+    assert len(broken_check.problems) == 1
+    assert broken_check.problems[0].startswith(f"exr/{names(small_dataset)[BAD]}.exr: ")
+    assert text in broken_check.problems[0]
     assert str(small_dataset) not in json.dumps(result.to_json())
 
 
 def grey(but: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Give a view one colour, but for as many pixels."""
+    """Give a view one colour, except for a number of pixels."""
 
     def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         colour = (channels["R"] > 0) * np.float16(0.3)
@@ -630,7 +630,7 @@ def grey(but: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
 def light_outside(
     value: float, part: float = 1, within: int = 64
 ) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Light a part of the pixels outside the image circle, up to so many pixels from its rim."""
+    """Light a part of the pixels outside the image circle, within a distance of its rim."""
 
     def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         seen = np.isfinite(channels["Z"])
@@ -645,7 +645,7 @@ def light_outside(
 
 
 def depth_outside(within: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Give pixels up to so many beyond the image circle a depth."""
+    """Give pixels within a distance beyond the image circle a depth."""
 
     def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         seen = np.isfinite(channels["Z"])
@@ -658,7 +658,7 @@ def depth_outside(within: int) -> Callable[[dict[str, np.ndarray]], dict[str, np
 @pytest.mark.parametrize(
     ("change", "check_name", "passed"),
     [
-        # A five-hundredth of what the lens sees is 5 pixels here.
+        # A five-hundredth of the lens's pixels is 5 pixels here.
         (grey(4), "colour", False),
         (grey(8), "colour", True),
         (light_outside(0.0009), "colour", True),
@@ -672,21 +672,21 @@ def depth_outside(within: int) -> Callable[[dict[str, np.ndarray]], dict[str, np
         (depth_outside(3), "depth", False),
     ],
 )
-def test_how_little_is_none(
+def test_the_limits_of_how_many_pixels_may_deviate(
     change: Callable[[Any], Any], check_name: str, passed: bool, one_view: Path
 ) -> None:
     painted(change)(one_view)
     assert failed(validate(one_view)) == ([] if passed else [check_name])
 
 
-def test_the_first_view_is_looked_at_too(small_dataset: Path) -> None:
+def test_the_first_view_is_checked_too(small_dataset: Path) -> None:
     first = names(small_dataset)[0]
     repaint(small_dataset, first, lambda c: {**c, **{n: c[n] * 0 for n in "RGB"}})
     assert check(validate(small_dataset), "colour").views == [first]
 
 
-def test_a_pose_is_compared_to_the_digits_that_blender_keeps(small_dataset: Path) -> None:
-    """float32 holds a position 1 km away to 0.03 mm; of what is near, 0.1 mm off is a fault."""
+def test_a_pose_is_compared_within_blenders_precision(small_dataset: Path) -> None:
+    """float32 holds a position 1 km away to 0.03 mm. Nearby, a deviation of 0.1 mm is a fault."""
 
     def displaced(by: float, away: float) -> Callable[[dict[str, Any]], None]:
         def change(content: dict[str, Any]) -> None:
@@ -713,11 +713,11 @@ GPU = f"OPTIX NVIDIA H200, {INTEL}"
         ([GPU, GPU, GPU], []),
         ([INTEL, AMD, INTEL], [f"1 on {AMD}", f"2 on {INTEL}"]),
         ([INTEL, INTEL, GPU], [f"2 on {INTEL}", f"1 on {GPU}"]),
-        # On nodes of another kind than where the build was begun.
+        # Another kind of node rendered some of the views.
         ([AMD, AMD, AMD], [f"3 on {AMD}", f"lightfield.json names {INTEL}"]),
     ],
 )
-def test_machines_whose_views_may_differ_in_the_last_digits_are_named(
+def test_machines_with_possibly_different_last_digits_are_named(
     machines: list[str], warned: list[str], small_dataset: Path
 ) -> None:
     rewrite(small_dataset, lambda content: content.update(machine=INTEL))
@@ -731,7 +731,7 @@ def test_machines_whose_views_may_differ_in_the_last_digits_are_named(
     assert all(text in result.summary() for text in warned)
 
 
-def test_views_that_name_no_machine_are_not_checked_for_it(small_dataset: Path) -> None:
+def test_views_without_a_machine_are_not_checked_for_it(small_dataset: Path) -> None:
     assert "machines" not in [check.name for check in validate(small_dataset).checks]
 
 
@@ -793,12 +793,12 @@ def test_stray_files_fail(small_dataset: Path) -> None:
     result = validate(small_dataset)
     assert failed(result) == ["files"]
     assert check(result, "files").problems == [
-        "exr/view_9999f.exr: is no file of this dataset",
-        "old/notes.txt: is no file of this dataset",
+        "exr/view_9999f.exr: is not a file of this dataset",
+        "old/notes.txt: is not a file of this dataset",
     ]
 
 
-def test_an_unpacked_dataset_is_valid_with_what_its_package_adds(small_dataset: Path) -> None:
+def test_an_unpacked_dataset_is_valid_with_its_packages_files(small_dataset: Path) -> None:
     for name in ("README.md", "card.json"):
         (small_dataset / name).write_text("{}")
     assert not failed(validate(small_dataset))
@@ -846,15 +846,13 @@ def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> No
     assert sorted(check(wrong, "cameras").views) == ["view_0000f", names(small_dataset)[BAD]]
 
 
-def test_of_a_scene_with_volumes_the_misses_are_counted(
-    small_dataset: Path, tmp_path: Path
-) -> None:
-    one = small_dataset / "exr" / f"{names(small_dataset)[BAD]}.exr"
-    image = images.read_image(one)
+def test_misses_are_counted_in_a_scene_with_volumes(small_dataset: Path, tmp_path: Path) -> None:
+    view_path = small_dataset / "exr" / f"{names(small_dataset)[BAD]}.exr"
+    image = images.read_image(view_path)
     attributes = {k: v for k, v in image.attributes.items() if k.startswith("plenoforge:")}
     depth = image.channels["Z"].copy()
     depth[20:36, 24:40] = np.inf
-    images.write_exr(one, image.channels | {"Z": depth}, attributes)
+    images.write_exr(view_path, image.channels | {"Z": depth}, attributes)
     write_json(tmp_path / "inventory.json", {"volumes": ["Fog", "Smoke"]})
     result = validate(small_dataset, inventory=tmp_path / "inventory.json")
     assert result.valid
@@ -862,7 +860,7 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
     part, text = warning.split("% of the depths are inf; ")
     assert text == "volumes are no surfaces: Fog, Smoke"
     rays = LightField.read(small_dataset / NAME).lens.pixel_rays()
-    # The rim of what the lens sees is not counted.
+    # The rim of the image circle does not count.
     seen = binary_erosion(np.pad(np.isfinite(rays[..., 0]), 2, "edge"), np.ones((5, 5)))[2:-2, 2:-2]
     views = [images.read_image(path).channels["Z"] for path in (small_dataset / "exr").iterdir()]
     missed = np.mean([np.isposinf(depth[seen]).mean() for depth in views])
@@ -889,7 +887,7 @@ def test_a_wrong_list_is_named_before_images_are_read(small_dataset, capsys, nam
     assert not capsys.readouterr().err
 
 
-def test_exports_own_what_they_list(small_dataset: Path) -> None:
+def test_listed_files_belong_to_their_export(small_dataset: Path) -> None:
     picture = np.zeros((64, 64, 3), np.uint8)
     images.write_png(small_dataset / "exr" / "dynamic_mask_view_0001f.png", picture[..., 0])
     images.write_png(small_dataset / "pictures" / "one.png", picture)
@@ -910,8 +908,8 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
     images.write_png(small_dataset / "pictures" / "one.png", picture[:10])
     problems = check(validate(small_dataset), "exports").problems
     assert problems == [
-        "transforms_test.json: pictures/two.png is no file of the dataset",
-        "transforms_train.json: is no JSON with frames, each with a file_path",
+        "transforms_test.json: pictures/two.png is not a file of the dataset",
+        "transforms_train.json: is not JSON with frames, each with a file_path",
         "pictures/one.png: is 64 × 10; must be 64 × 64",
     ]
 
@@ -920,7 +918,7 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
 
 
 def alpha(value: float) -> Callable[[Any], dict[str, np.ndarray]]:
-    """Give a view an alpha of 1, but for one pixel."""
+    """Give a view an alpha of 1, except for one pixel."""
 
     def change(channels: Any) -> dict[str, np.ndarray]:
         covered = np.ones((64, 64), np.float16)
@@ -936,14 +934,14 @@ def nothing_seen(channels: Any) -> dict[str, np.ndarray]:
 
 
 def opaque_rim(channels: Any) -> dict[str, np.ndarray]:
-    """Show nothing, with the opaque rim that Cycles gives an image circle."""
+    """Show nothing, except for the opaque rim that Cycles gives an image circle."""
     y, x = np.mgrid[:64, :64] + 0.5
     rim = np.abs(np.hypot(x - 32, y - 32) - 31.5) < 0.5
     return {**nothing_seen(channels), "A": (0.5 * rim).astype(np.float16)}
 
 
 def one_speck(channels: Any) -> dict[str, np.ndarray]:
-    """Show a thing that covers one pixel."""
+    """Show an object that covers one pixel."""
     seen = nothing_seen(channels)
     for name, value in zip("RGBAZ", (0.3, 0.2, 0.1, 1, 7), strict=True):
         seen[name][40, 20] = value
@@ -971,32 +969,38 @@ def test_transparent_views_have_alpha_and_may_be_empty(
     painted(alpha(1), slice(BAD))(small_dataset)
     painted(change, ONE)(small_dataset)
     result = validate(small_dataset)
-    problems = [one for name in ("images", "colour") for one in check(result, name).problems]
-    assert [problem in one for one in problems] == ([True] if problem else [])
+    problems = [
+        problem_line
+        for name in ("images", "colour")
+        for problem_line in check(result, name).problems
+    ]
+    assert [problem in problem_line for problem_line in problems] == ([True] if problem else [])
 
 
 # ---- passes ---------------------------------------------------------------------------------
 
 
 def add_passes(dataset: Path) -> None:
-    """Add passes of one thing that is everywhere, of which each holds what it must."""
+    """Add valid passes of one object that covers everything."""
     wanted = [PASSES[name] for name in ("normal", "object", "cryptomatte", "emission")]
-    render = {"passes": [one.name for one in wanted]}
+    render = {"passes": [render_pass.name for render_pass in wanted]}
     rewrite(dataset, lambda held: held.update(render=render))
     write_json(dataset / "object" / NAMES, {"thing": 1})
-    for view, one in product(names(dataset), wanted):
-        planes = {channel: np.zeros((64, 64), one.dtype) for channel in one.channels}
+    for view, render_pass in product(names(dataset), wanted):
+        planes = {
+            channel: np.zeros((64, 64), render_pass.dtype) for channel in render_pass.channels
+        }
         header = {}
-        if one.name in ("normal", "object"):
+        if render_pass.name in ("normal", "object"):
             depth = images.read_image(dataset / "exr" / f"{view}.exr").channels["Z"]
-            planes["B" if one.name == "normal" else "Y"][np.isfinite(depth)] = 1
-        if one.name == "cryptomatte":
+            planes["B" if render_pass.name == "normal" else "Y"][np.isfinite(depth)] = 1
+        if render_pass.name == "cryptomatte":
             planes["CryptoObject00.R"][:], planes["CryptoObject00.G"][:] = 1, 0.6
             planes["CryptoObject00.B"][:], planes["CryptoObject00.A"][:] = 2, 0.4
-            # The last two are no numbers as floats, and are written as others.
+            # The last two hold integers, not floats, and are written with other functions.
             hashes = ("3f800000", "40000000", "00000001", "ff800001")
             header = matte_header(dict(zip("abcd", hashes, strict=True)))
-        images.write_exr(one.path(dataset, view), planes, header)
+        images.write_exr(render_pass.path(dataset, view), planes, header)
 
 
 def in_pass(name: str, **pixels: float) -> Spoil:
@@ -1021,7 +1025,7 @@ def of_pass(name: str, change: Callable[[Path], Any]) -> Spoil:
 OUT_OF_ORDER = "1 pixels have parts below 0 or not in order"
 BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
     "missing": (of_pass("emission", Path.unlink), "is missing"),
-    "truncated": (of_pass("emission", truncate), "no image that can be read"),
+    "truncated": (of_pass("emission", truncate), "not an image that can be read"),
     "small": (
         of_pass("object", lambda path: images.write_exr(path, {"Y": np.zeros((64, 32), "u4")})),
         "is 32 × 64; must be 64 × 64",
@@ -1031,8 +1035,8 @@ BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
         "has the channels Y:float32; must have Y:uint32",
     ),
     "not finite": (in_pass("emission", R=np.nan, G=np.inf), "2 values are not finite"),
-    "long normal": (in_pass("normal", B=1.00012), "1 normals are no unit vectors"),
-    "short normal": (in_pass("normal", B=0.99988), "1 normals are no unit vectors"),
+    "long normal": (in_pass("normal", B=1.00012), "1 normals are not unit vectors"),
+    "short normal": (in_pass("normal", B=0.99988), "1 normals are not unit vectors"),
     "unknown object": (in_pass("object", Y=7), "has [7], which object/names.json does not have"),
     "no object": (in_pass("object", Y=0), "1 pixels have a depth or an object, and not both"),
     "unknown matte": (
@@ -1058,24 +1062,24 @@ def test_a_broken_pass_is_named(case: str, small_dataset: Path) -> None:
     assert text in said
 
 
-def test_right_passes_are_valid_and_what_cycles_had_no_number_for_is_a_warning(
+def test_correct_passes_are_valid_with_a_warning_for_clamped_numbers(
     small_dataset: Path,
 ) -> None:
     add_passes(small_dataset)
     in_pass("normal", B=1.00009)(small_dataset)
     for_floats = np.array([0x00800001, 0xFF000001], np.uint32).view(np.float32)
-    own = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
-    in_pass("cryptomatte", **own)(small_dataset)
-    # What covers nothing need not be known.
+    own_channels = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
+    in_pass("cryptomatte", **own_channels)(small_dataset)
+    # A name that covers nothing may be missing.
     in_pass("cryptomatte", CryptoObject01_R=3)(small_dataset)
     for view in names(small_dataset)[:2]:
         path = PASSES["normal"].path(small_dataset, view)
         images.write_exr(path, images.read_image(path).channels, {images.NAN_ATTRIBUTE: 3})
     result = validate(small_dataset)
     assert failed(result) == []
-    found = check(result, "passes")
-    assert found.detail == "12 of 12 are there and hold what they must"
-    (warning,) = found.warnings
+    passes_check = check(result, "passes")
+    assert passes_check.detail == "12 of 12 are there and hold what they must"
+    (warning,) = passes_check.warnings
     assert warning.startswith("6 values in normal were not numbers to Cycles and are 0")
     assert {"normal/view_0000f.exr", f"object/{NAMES}"} <= result.checksums.keys()
     (small_dataset / "object" / NAMES).unlink()
@@ -1087,7 +1091,7 @@ def test_right_passes_are_valid_and_what_cycles_had_no_number_for_is_a_warning(
 
 
 def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] = dict) -> None:
-    """Add what the fisheyes see as equirectangular panoramas: all that lies before the camera."""
+    """Add the fisheyes' views as equirectangular panoramas, which end beside the camera."""
     folder = dataset / "panorama"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [96, 48]})
     lightfield = LightField.read(dataset / NAME).changed(lens=lens, depth="distance")
@@ -1113,15 +1117,15 @@ def test_right_reprojection_is_valid(small_dataset: Path) -> None:
     assert check(result, "panorama/marks").passed
     assert check(result, "panorama/views").detail == "6 of 6 images are there"
     assert "panorama/dynamic_mask_view_0001f.png" in result.checksums
-    # Masks are there and no list names them.
+    # Masks exist, and no list names them.
     assert check(result, "exports").passed
     assert failed(validate(small_dataset)) == ["files"]
 
 
 def test_reprojected_views_are_as_coarse_as_their_source(small_dataset: Path) -> None:
     add_panoramas(small_dataset)
-    (own, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
-    assert own.grain == 0
+    (rendered_set, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
+    assert rendered_set.grain == 0
     assert reprojected.grain == pytest.approx(math.pi / 64)
 
 
@@ -1131,8 +1135,8 @@ def test_a_reprojected_view_of_one_colour_is_a_warning(small_dataset: Path) -> N
     add_panoramas(
         small_dataset, lambda c: {**c, **{name: np.full_like(c[name], 0.5) for name in "RGB"}}
     )
-    one = validate(small_dataset, ["panorama"])
-    for result, warnings in ((right, []), (one, ["6 images in panorama have one colour"])):
+    one_colour = validate(small_dataset, ["panorama"])
+    for result, warnings in ((right, []), (one_colour, ["6 images in panorama have one colour"])):
         assert check(result, "panorama/colour").warnings == warnings
         assert check(result, "colour").warnings == []
 
@@ -1169,7 +1173,7 @@ def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
 
 
 def marked_from(columns: float) -> Callable[[dict[str, np.ndarray]], Any]:
-    """Mark what is so many columns and more from the middle; the source sees up to 24."""
+    """Mark pixels from a number of columns beside the middle on. The source sees up to 24."""
     away = np.abs(np.arange(96) + 0.5 - 48)
     return lambda c: {
         **c,
@@ -1201,14 +1205,14 @@ def test_one_coloured_pixel_without_a_source_is_named(one_view: Path) -> None:
         (lambda held: held["frames"][0].update(name="b"), "is made of no view of the dataset's"),
     ],
 )
-def test_a_reprojected_view_is_where_its_source_is(
+def test_a_reprojected_view_has_the_place_of_its_source(
     change: Callable[[dict[str, Any]], None], fault: str | None, one_view: Path
 ) -> None:
     add_panoramas(one_view)
     relist(one_view / "panorama", change)
-    found = check(validate(one_view, ["panorama"]), "panorama/lightfield")
-    assert found.passed is (fault is None)
-    assert fault is None or fault in found.problems[0]
+    lightfield_check = check(validate(one_view, ["panorama"]), "panorama/lightfield")
+    assert lightfield_check.passed is (fault is None)
+    assert fault is None or fault in lightfield_check.problems[0]
 
 
 def test_a_transparent_view_of_nothing_may_be_reprojected(one_view: Path) -> None:
@@ -1227,7 +1231,7 @@ def test_a_transparent_view_of_nothing_may_be_reprojected(one_view: Path) -> Non
 
 
 @pytest.mark.parametrize("transparent", [True, False])
-def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
+def test_only_pixels_of_transparent_views_may_be_clear_although_the_source_sees_them(
     transparent: bool, one_view: Path
 ) -> None:
     rewrite(one_view, lambda held: held.update(render={"transparent": transparent}))
@@ -1242,7 +1246,7 @@ def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
     result = validate(one_view, ["panorama"])
     assert check(result, "panorama/marks").passed is transparent
     assert check(result, "panorama/images").passed
-    # With depth the two differ: a clear pixel is a miss, and NaN has no source.
+    # Depth tells the two apart: a clear pixel is a miss, and NaN has no source.
     path = path.with_suffix(".exr")
     channels = images.read_image(path).channels
     depth = channels["Z"].copy()
@@ -1253,13 +1257,16 @@ def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
 
 def test_the_faces_of_a_cube_map_are_compared_with_their_view(one_view: Path) -> None:
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [32, 32]})
-    own = LightField.read(one_view / NAME)
+    lightfield_of_view = LightField.read(one_view / NAME)
     for face, side in (("l", 1), ("r", -1)):
         turned = np.eye(4)
         turned[:3, :3] = degrees(1, 90 * side)
-        views = [View.placed(f"{view.name}_{face}", view.matrix @ turned) for view in own.views]
-        lightfield = own.changed(lens=lens, views=views, depth="distance")
-        # Ahead of the fisheyes is the right half of what is to the left, and the other way round.
+        views = [
+            View.placed(f"{view.name}_{face}", view.matrix @ turned)
+            for view in lightfield_of_view.views
+        ]
+        lightfield = lightfield_of_view.changed(lens=lens, views=views, depth="distance")
+        # The fisheyes see only what is in front, which is half of each face.
         unseen = (np.arange(32) < 16) == (side > 0)
         for view in views:
             channels = render(lens, view.matrix, "distance", np.random.default_rng(3))
@@ -1288,33 +1295,31 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 
 
 def run(run_program: Any, dataset: Path, *more: Any) -> Any:
-    words = (dataset, "--output", dataset / "validation.json")
-    return run_program("validate.py", *words, "--sums", dataset.with_suffix(".sums"), *more)
+    arguments = (dataset, "--output", dataset / "validation.json")
+    return run_program("validate.py", *arguments, "--sums", dataset.with_suffix(".sums"), *more)
 
 
 def publish(run_program: Any, dataset: Path) -> Any:
-    words = ("--validation", dataset / "validation.json", "--page", "the page")
-    words += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
-    return run_program("publish_checksums.py", *words, check=False)
+    arguments = ("--validation", dataset / "validation.json", "--page", "the page")
+    arguments += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
+    return run_program("publish_checksums.py", *arguments, check=False)
 
 
-def test_program_needs_no_other_word_than_the_dataset(
-    small_dataset: Path, run_program: Any
-) -> None:
+def test_the_program_needs_only_the_dataset(small_dataset: Path, run_program: Any) -> None:
     add_panoramas(small_dataset)
     before = {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
     assert ": valid: " in run_program("validate.py", small_dataset).stdout
     assert before == {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
     (small_dataset / "panorama" / "view_0001f.png").unlink()
-    words = (small_dataset, "--reprojection", "panorama/")
-    result = run_program("validate.py", *words, check=False)
+    arguments = (small_dataset, "--reprojection", "panorama/")
+    result = run_program("validate.py", *arguments, check=False)
     assert result.returncode == 1
     assert result.stderr.endswith(f"error: {small_dataset}: is not valid\n")
     assert "panorama/view_0001f.png: is missing" in result.stderr
     assert "failed: panorama/views; " in result.stdout
 
 
-def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
+def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     dataset: Path, tmp_path: Path, run_program: Any
 ) -> None:
     write_json(tmp_path / "record.json", record_of(dataset))
@@ -1354,7 +1359,7 @@ def test_an_image_without_inner_pixels_has_no_surfaces(size: tuple[int, int]) ->
 
 
 def kill_workers() -> None:
-    """Kill the processes that this one starts, once they are there."""
+    """Kill the processes that this one starts, as soon as they exist."""
     workers: list[psutil.Process] = []
     while not workers:
         children = psutil.Process().children()
@@ -1372,7 +1377,7 @@ def test_a_killed_worker_is_an_error_of_one_line(dataset: Path) -> None:
     killer.join()
 
 
-def test_strays_are_moved_before_they_make_a_dataset_invalid(
+def test_stray_files_are_moved_before_they_make_a_dataset_invalid(
     dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -1394,7 +1399,7 @@ def test_strays_are_moved_before_they_make_a_dataset_invalid(
     assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
 
 
-def test_an_export_that_is_no_longer_wanted_is_moved_away(
+def test_an_export_that_is_no_longer_requested_is_moved_away(
     small_dataset: Path, tmp_path: Path
 ) -> None:
     picture = np.full((64, 64, 3), 128, np.uint8)
@@ -1407,7 +1412,7 @@ def test_an_export_that_is_no_longer_wanted_is_moved_away(
     manifest.parent.mkdir(parents=True)
     (manifest.parent / "poses.csv").write_text("name\n")
     write_json(manifest, {"files": {"poses.csv": sha256(manifest.parent / "poses.csv")}})
-    # Every one that is there, those that are wanted, and none.
+    # All existing exports, the requested ones, and none.
     for lists, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
         assert check(validate(small_dataset, export_lists=lists), "files").passed == (not moved)
         removed = tmp_path / "removed"
@@ -1417,7 +1422,7 @@ def test_an_export_that_is_no_longer_wanted_is_moved_away(
 
 
 @pytest.mark.parametrize("broken", [NAME, "transforms.json", f"panorama/{NAME}", None])
-def test_nothing_is_moved_of_a_dataset_that_is_not_understood(
+def test_nothing_is_moved_from_a_dataset_that_cannot_be_read(
     broken: str | None, small_dataset: Path, tmp_path: Path
 ) -> None:
     add_passes(small_dataset)
@@ -1431,7 +1436,9 @@ def test_nothing_is_moved_of_a_dataset_that_is_not_understood(
     assert (small_dataset / "stray").exists() == bool(broken)
 
 
-def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path, run_program: Any) -> None:
+def test_the_program_names_faults_and_publishes_no_checksums(
+    dataset: Path, run_program: Any
+) -> None:
     (dataset / "sha256sums.txt").write_text("of an earlier validation")
     on_file(truncate)(dataset)
     (dataset / "exr" / "view_0009f.exr").unlink()
@@ -1448,7 +1455,7 @@ def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path, run_pr
     assert published.returncode == 1
     assert re.fullmatch(
         r"error: room/sphere is not valid: views: exr/view_0009f.exr: is missing; "
-        r"images: exr/view_0002f.exr: .+; files: stray: is no file of this dataset: "
+        r"images: exr/view_0002f.exr: .+; files: stray: is not a file of this dataset: "
         r"see the page\n",
         published.stderr,
     )

@@ -1,4 +1,4 @@
-"""The view store, in a folder: nothing is taken for a file but its own bytes."""
+"""The view store in a folder: a stored file is used only if its bytes are right."""
 
 import hashlib
 import os
@@ -14,7 +14,7 @@ from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 
 KEY = "0" * 64
-# What a job's own folder has: the dataset's views, and the record of a shard.
+# A job's own folder holds the dataset's views and a shard's record.
 VIEW, PASS = "results/s/rig/exr/a.exr", "results/s/rig/normal/a.exr"
 RECORD = "work/s/rig/render/0-1.json"
 
@@ -27,7 +27,7 @@ def store(tmp_path, monkeypatch):
 
 @pytest.fixture
 def shard(tmp_path, store):
-    """Return a function that makes or opens the shard's record in a job's folder of its own."""
+    """Return a function that makes or opens the shard's record in a job's own folder."""
 
     def work_in(name):
         folder = tmp_path / name
@@ -42,7 +42,7 @@ def make(folder, record, name, content):
     record.add(folder / name, KEY)
 
 
-def test_another_job_takes_what_one_has_finished(shard):
+def test_another_job_takes_finished_views(shard):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")
     make(folder, record, PASS, b"pass")
@@ -55,7 +55,7 @@ def test_another_job_takes_what_one_has_finished(shard):
     assert not again.is_finished(other / VIEW, "1" * 64)
 
 
-def test_a_file_here_that_is_not_as_it_was_finished_is_taken_anew(shard):
+def test_a_damaged_local_file_is_fetched_again(shard):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")
     (folder / VIEW).write_bytes(b"weiv")
@@ -65,7 +65,7 @@ def test_a_file_here_that_is_not_as_it_was_finished_is_taken_anew(shard):
 
 
 @pytest.mark.parametrize("spoil", [lambda path: path.write_bytes(b"vie"), lambda p: p.unlink()])
-def test_what_the_store_has_lost_is_made_again(shard, store, tmp_path, spoil):
+def test_a_view_lost_in_the_store_is_rendered_again(shard, store, tmp_path, spoil):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")
     spoil(tmp_path / "store/views/sums" / sha256(folder / VIEW))
@@ -77,7 +77,7 @@ def test_what_the_store_has_lost_is_made_again(shard, store, tmp_path, spoil):
     assert last.is_finished(third / VIEW, KEY)
 
 
-def test_what_is_cut_short_in_the_store_is_not_there(store, tmp_path):
+def test_a_truncated_object_does_not_count(store, tmp_path):
     path = write(tmp_path / "texture.png", b"texture")
     assert not store.has(digest(b"texture"), 7)
     store.put(path, digest(b"texture"))
@@ -88,7 +88,7 @@ def test_what_is_cut_short_in_the_store_is_not_there(store, tmp_path):
 
 def test_no_view_is_listed_before_the_store_has_it(store, tmp_path):
     path = write(tmp_path / "a.exr", b"view")
-    # As where a job is killed while it puts the view.
+    # This is the state after a job is killed while it puts the view.
     write(tmp_path / "store/views/sums", b"no folder")
     with pytest.raises(UserError, match="the view store cannot be used"):
         store.put_view(path, "exr/a.exr", KEY, digest(b"view"))
@@ -99,7 +99,7 @@ def test_no_view_is_listed_before_the_store_has_it(store, tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"tex", b"something longer"])
-def test_an_object_with_other_bytes_is_not_taken_and_is_mended(store, tmp_path, content):
+def test_an_object_with_other_bytes_is_not_taken_but_replaced(store, tmp_path, content):
     path = write(tmp_path / "texture.png", b"texture")
     write(tmp_path / "store/views/sums" / digest(b"texture"), content)
     assert not store.take(digest(b"texture"), tmp_path / "taken.png")
@@ -109,18 +109,16 @@ def test_an_object_with_other_bytes_is_not_taken_and_is_mended(store, tmp_path, 
     assert (tmp_path / "taken.png").read_bytes() == b"texture"
 
 
-def test_who_reads_an_object_gets_all_of_it_while_another_job_puts_it(store, tmp_path):
+def test_a_reader_gets_a_complete_object_while_another_job_puts_it(store, tmp_path):
     store.put(write(tmp_path / "one", b"texture"), digest(b"texture"))
     with (tmp_path / "store/views/sums" / digest(b"texture")).open("rb", 0) as reader:
         assert reader.read(3) == b"tex"
-        # Another job's copy, of which only a part is there yet.
+        # Only a part of the other job's copy exists yet.
         store.put(write(tmp_path / "other", b"tex"), digest(b"texture"))
         assert reader.read() == b"ture"
 
 
-def test_who_reads_a_stored_list_gets_all_of_it_while_it_is_sent_again(
-    store, tmp_path, monkeypatch
-):
+def test_a_reader_gets_a_complete_list_while_it_is_sent_again(store, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / RECORD, b"first")
     store.send(RECORD)
@@ -131,7 +129,7 @@ def test_who_reads_a_stored_list_gets_all_of_it_while_it_is_sent_again(
     assert (tmp_path / "store" / RECORD).read_bytes() == b"2"
 
 
-def test_consumers_take_what_records_and_manifests_list(shard, store, run_program):
+def test_consumers_take_the_files_of_records_and_manifests(shard, store, run_program):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")
     record.write([folder / VIEW])
@@ -144,34 +142,36 @@ def test_consumers_take_what_records_and_manifests_list(shard, store, run_progra
     (folder / export / "images").mkdir()
     (folder / export / "images/a.exr").write_bytes(b"copy")
     store.put_list(folder / export / "export.json", [folder / export / "images/a.exr"])
-    words = ("--results", "results", "--work", "work", RECORD, exported)
-    run_program("take_views.py", *words, cwd=other)
+    arguments = ("--results", "results", "--work", "work", RECORD, exported)
+    run_program("take_views.py", *arguments, cwd=other)
     assert (other / VIEW).read_bytes() == b"view"
     assert (exported.parent / "images/a.exr").read_bytes() == b"copy"
 
     (other / VIEW).unlink()
     write_json(other / RECORD, {"files": {"exr/a.exr": {"bytes": 4, "sha256": "f" * 64}}})
-    failed = run_program("take_views.py", *words, cwd=other, check=False)
+    failed = run_program("take_views.py", *arguments, cwd=other, check=False)
     assert failed.returncode == 1
     assert failed.stderr.splitlines()[-1].startswith("error: 1 files are not in the view store")
     assert f"as {VIEW}; --mend lets" in failed.stderr
 
 
-def test_what_lists_a_lost_file_is_removed_from_the_storage(shard, store, run_program, monkeypatch):
+def test_a_list_with_a_lost_file_is_removed_from_the_storage(
+    shard, store, run_program, monkeypatch
+):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")
     record.write([folder / VIEW])
-    # Under the same path in the storage is what Snakemake has brought here.
+    # Snakemake keeps a copy of the storage's file under the same path.
     monkeypatch.chdir(folder)
     store.send(RECORD)
     stored = Path(store.url, RECORD)
     assert stored.read_bytes() == (folder / RECORD).read_bytes()
     (Path(store.url) / "views/sums" / sha256(folder / VIEW)).unlink()
     (folder / VIEW).unlink()
-    words = ("--results", "results", "--work", "work", RECORD)
-    assert run_program("take_views.py", *words, cwd=folder, check=False).returncode == 1
+    arguments = ("--results", "results", "--work", "work", RECORD)
+    assert run_program("take_views.py", *arguments, cwd=folder, check=False).returncode == 1
     assert stored.exists()
-    failed = run_program("take_views.py", "--mend", *words, cwd=folder, check=False)
+    failed = run_program("take_views.py", "--mend", *arguments, cwd=folder, check=False)
     assert failed.stderr.splitlines()[-1].endswith(f"as {VIEW}; the next run makes them again")
     assert not stored.exists()
 
@@ -182,13 +182,13 @@ def test_an_unusable_store_is_one_line(tmp_path):
         ViewStore(str(tmp_path / "store")).check()
 
 
-def test_a_package_that_is_missing_is_named(monkeypatch):
+def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
     with pytest.raises(UserError, match=r"make \.venv/complete-with-storage"):
         ViewStore("s3://bucket").check()
 
 
-def test_what_is_stored_under_a_path_is_brought_with_its_time(tmp_path, monkeypatch, store):
+def test_a_stored_file_is_fetched_with_its_time(tmp_path, monkeypatch, store):
     stored = tmp_path / "store/results/lightfield.json"
     stored.parent.mkdir(parents=True)
     stored.write_text("{}")
@@ -196,18 +196,16 @@ def test_what_is_stored_under_a_path_is_brought_with_its_time(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     store.bring("results/lightfield.json")
     store.bring("results/missing.json")
-    found = tmp_path / "results/lightfield.json"
-    assert (found.read_text(), found.stat().st_mtime) == ("{}", 1000)
+    path = tmp_path / "results/lightfield.json"
+    assert (path.read_text(), path.stat().st_mtime) == ("{}", 1000)
     assert not (tmp_path / "results/missing.json").exists()
 
 
-def test_a_finished_dataset_is_taken_as_its_checksums_say(
-    tmp_path, monkeypatch, store, run_program
-):
+def test_a_finished_dataset_is_fetched_by_its_checksums(tmp_path, monkeypatch, store, run_program):
     monkeypatch.chdir(tmp_path)
     dataset, stored = Path("results/s/rig"), tmp_path / "store/results/s/rig"
-    words = ("--store", store.url, str(dataset))
-    missing = run_program("take_dataset.py", *words, check=False)
+    arguments = ("--store", store.url, str(dataset))
+    missing = run_program("take_dataset.py", *arguments, check=False)
     assert "sha256sums.txt: is not in" in missing.stderr
 
     store.put(write(tmp_path / "view", b"view"), digest(b"view"))
@@ -215,7 +213,7 @@ def test_a_finished_dataset_is_taken_as_its_checksums_say(
     write(stored / "report/index.html", b"page")
     sums = f"{digest(b'view')}  exr/a.exr\n{digest(b'lens')}  perspective/lightfield.json\n"
     write(stored / "sha256sums.txt", sums.encode())
-    taken = run_program("take_dataset.py", *words, check=False)
+    taken = run_program("take_dataset.py", *arguments, check=False)
     assert taken.returncode == 0, taken.stderr
     assert (dataset / "exr/a.exr").read_bytes() == b"view"
     assert (dataset / "perspective/lightfield.json").read_bytes() == b"lens"
@@ -223,7 +221,7 @@ def test_a_finished_dataset_is_taken_as_its_checksums_say(
 
     write(stored / "perspective/lightfield.json", b"snel")
     shutil.rmtree(dataset)
-    wrong = run_program("take_dataset.py", *words, check=False)
+    wrong = run_program("take_dataset.py", *arguments, check=False)
     assert wrong.returncode == 1
     assert f"1 files are not in {store.url}" in wrong.stderr
     assert str(dataset / "perspective/lightfield.json") in wrong.stderr

@@ -1,4 +1,4 @@
-"""The walk inside a light field, in a real browser: what its canvas shows, and how it is moved."""
+"""The walk inside a light field in a real browser: what its canvas shows, and how the eye moves."""
 
 import base64
 import io
@@ -37,7 +37,7 @@ def dataset(tmp_path_factory):
 
 @pytest.fixture
 def tab(dataset, show):
-    """The page, once it can be walked and has all of its views."""
+    """Return a function that opens the page and waits until all its views are loaded."""
 
     def tab(**options):
         tab = show(dataset / "index.html", **options)
@@ -49,14 +49,14 @@ def tab(dataset, show):
 
 def wait(tab):
     for _ in range(300):
-        if tab.evaluate("Boolean(walk.frames && walk.order.every((source) => source.isThere))"):
+        if tab.evaluate("Boolean(walk.frames && walk.order.every((source) => source.isLoaded))"):
             return
         tab.wait_for_timeout(100)
     raise AssertionError("the walk did not begin")
 
 
 def written_page(folder, camera, rig, see):
-    """Write views and their page into a folder; return the page's path."""
+    """Write views and their page into a folder. Return the page's path."""
     write_views(folder, camera, rig, see=see)
     field = LightField.read(folder / "lightfield.json")
     field.changed(frame=1, scene={"name": "ball"}, render={"samples": 1}).write(field.path)
@@ -68,14 +68,14 @@ def written_page(folder, camera, rig, see):
 
 
 def look_at_ball_alone(lens, matrix):
-    """The ball before nothing at all."""
+    """Return what a camera sees of the ball before an empty background."""
     colour, distance = look_at_ball(lens, matrix)
     ball = (colour == RED).all(axis=-1)
     return np.where(ball[..., None], colour, 0), np.where(ball, distance, np.inf)
 
 
 def look_from(tab, place, yaw, pitch):
-    """Return what the canvas shows, (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
+    """Return the canvas from a place (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
     uri = tab.evaluate(
         """([at, yaw, pitch, width, height]) => {
             walk.size = [width, height];
@@ -90,7 +90,7 @@ def look_from(tab, place, yaw, pitch):
 
 
 def matrix_of(place, yaw, pitch):
-    """The eye's camera-to-world: yaw turns it to the left of +Y, pitch up."""
+    """Return the eye's camera-to-world. Yaw turns it left of +Y, pitch turns it up."""
     back = -np.array(
         [-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)]
     )
@@ -100,11 +100,11 @@ def matrix_of(place, yaw, pitch):
     return matrix
 
 
-def psnr(one, other):
-    return -10 * math.log10(((one - other) ** 2).mean())
+def psnr(first, second):
+    return -10 * math.log10(((first - second) ** 2).mean())
 
 
-def test_the_canvas_shows_what_is_synthesised_and_what_is_true(dataset, tab):
+def test_the_canvas_equals_the_synthesis_and_the_truth(dataset, tab):
     opened = tab()
     exposure = opened.evaluate("viewer.exposure")
     source, lens = SourceDataset(dataset, "", ".exr"), lenses.from_camera(EYE)
@@ -125,7 +125,7 @@ def test_the_canvas_shows_what_is_synthesised_and_what_is_true(dataset, tab):
         assert psnr(shown, truth) >= 28
 
 
-def test_it_is_walked_by_keys_by_mouse_and_by_touch(tab):
+def test_the_eye_moves_by_keys_mouse_and_touch(tab):
     opened = tab(has_touch=True)
     state = "[...walk.at, walk.yaw, walk.pitch]"
     home = opened.evaluate(state)
@@ -169,7 +169,7 @@ DOWN = {"type": "plane", "cameras": [3, 3], "size": 0.5, "rotation": [-90, 0, 0]
     ],
     ids=["hemisphere", "ring", "from above"],
 )
-def test_it_begins_where_the_cameras_look(tmp_path, show, rig):
+def test_the_walk_begins_where_the_cameras_look(tmp_path, show, rig):
     page = written_page(tmp_path / "dataset", NARROW, rig, look_at_ball_alone)
     opened = show(page)
     wait(opened)
@@ -182,14 +182,14 @@ def test_it_begins_where_the_cameras_look(tmp_path, show, rig):
     assert opened.evaluate("metresToEdge(walk.at)") > -1e-6
 
 
-def test_nobody_leaves_the_volume(tab):
+def test_the_eye_stays_inside_the_volume(tab):
     opened = tab()
-    opened.evaluate("moved(5, 0, 0)")
+    opened.evaluate("moveEye(5, 0, 0)")
     assert -1e-6 < opened.evaluate("metresToEdge(walk.at)") < 0.01
     assert "m to the edge" in opened.locator("#walk-readout").inner_text()
 
 
-def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
+def test_another_frame_of_a_sequence_keeps_the_eyes_place(dataset, show, tmp_path):
     rig = rigs.from_settings(RIG | {"frames": {"first": 1, "last": 17, "step": 8}})
     for name in rig.sequence.folders:
         folder = tmp_path / "ball" / name
@@ -201,7 +201,7 @@ def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
     slider = opened.locator("#walk-frame")
     assert [slider.get_attribute(key) for key in ("max", "value")] == ["2", "0"]
     opened.locator("#walk-depth").click()
-    opened.evaluate("Object.assign(walk, { yaw: 1.25, pitch: -0.5 }), moved(0.05, 0.02, 0)")
+    opened.evaluate("Object.assign(walk, { yaw: 1.25, pitch: -0.5 }), moveEye(0.05, 0.02, 0)")
     before = opened.evaluate("[...walk.at, walk.yaw, walk.pitch, walk.mode]")
     slider.focus()
     with opened.expect_navigation():
@@ -217,20 +217,20 @@ def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
     assert opened.locator("#walk-frame").input_value() == "0"
 
 
-def test_a_place_that_is_none_is_the_start(tab):
+def test_an_invalid_place_leads_to_the_start(tab):
     opened = tab()
     state = "[...walk.at, walk.yaw, walk.pitch, walk.mode]"
     home = opened.evaluate(state)
-    go = f"(place) => {{ location.hash = place; goWhereItWas(); return {state}; }}"
+    go = f"(place) => {{ location.hash = place; restorePlace(); return {state}; }}"
     for place in ("", "walk=", "walk=1,a,3,0,0,0", "walk=0,0,0,0,0,9", "walk=0,0,0,0,0,0.5"):
         assert opened.evaluate(go, place) == home
-    # Nobody leaves the volume so, either.
+    # The address cannot lead outside the volume either.
     opened.evaluate(go, "walk=9,0,0,0.5,0.2,1")
     assert -1e-6 < opened.evaluate("metresToEdge(walk.at)") < 0.01
     assert opened.evaluate("[walk.yaw, walk.pitch, walk.mode]") == [0.5, 0.2, 1]
 
 
-def test_one_in_motion_is_of_few_views_where_drawing_takes_long(tab):
+def test_slow_pictures_in_motion_use_few_views(tab):
     opened = tab()
     opened.evaluate("clearTimeout(walk.rest)")
     opened.evaluate(
@@ -239,7 +239,7 @@ def test_one_in_motion_is_of_few_views_where_drawing_takes_long(tab):
             window.counts = [];
             drawWalk = (...words) => { draw(...words); window.counts.push(walk.chosen.length); };
             walk.slow = true;
-            turned(0.1, 0);
+            turnEye(0.1, 0);
         }"""
     )
     for _ in range(100):
@@ -257,7 +257,7 @@ def test_other_modes_show_something_else(tab, mode):
     other = look_from(opened, [0, 0, 0], 0, 0)
     assert np.abs(other - colour).mean() > 0.02
     if mode == "depth":
-        # The ball, ahead, is nearer than what is beside it.
+        # The ball, ahead, is nearer than its surroundings.
         assert np.abs(other[HEIGHT // 2, WIDTH // 2] - other[HEIGHT // 2, 5]).max() > 0.1
 
 
@@ -281,7 +281,7 @@ def test_a_thousand_frames_leak_nothing(tab):
     assert after < before + 2e6
 
 
-def test_a_phone_has_it_too(tab):
+def test_a_phone_shows_the_walk(tab):
     opened = tab(width=390)
     box = opened.locator("#walk-overlay").bounding_box()
     assert box["x"] >= 0
@@ -289,7 +289,7 @@ def test_a_phone_has_it_too(tab):
     assert opened.evaluate("document.documentElement.scrollWidth") <= 390
 
 
-def test_views_are_chosen_only_once_the_eye_has_moved(tab):
+def test_views_are_chosen_again_only_after_the_eye_has_moved(tab):
     opened = tab()
     opened.evaluate("clearTimeout(walk.rest)")
     count = """(moves) => {
@@ -303,7 +303,7 @@ def test_views_are_chosen_only_once_the_eye_has_moved(tab):
     }"""
     assert opened.evaluate(count, [[0, False], [0, False]]) == 0
     assert opened.evaluate(count, [[0.001, False]]) == 1
-    # The first picture in motion is made of fewer views.
+    # The first picture in motion uses fewer views.
     assert opened.evaluate(count, [[0.001, True], [0.001, True], [0.001, True]]) == 1
     assert opened.evaluate(count, [[0.1, True], [0.1, True]]) == 2
 
@@ -321,7 +321,7 @@ def test_the_default_field_of_view_keeps_source_pixels_small(tab, width, widest)
 def test_keys_zoom_in_and_back(tab):
     opened = tab()
     before = opened.evaluate("scales(160, 90)")
-    opened.evaluate("zoomed(2)")
+    opened.evaluate("zoomBy(2)")
     assert opened.evaluate("scales(160, 90)") == pytest.approx([2 * scale for scale in before])
-    opened.evaluate("zoomed(0.01)")
+    opened.evaluate("zoomBy(0.01)")
     assert opened.evaluate("scales(160, 90)") == pytest.approx(before)

@@ -1,4 +1,4 @@
-"""The whole workflow through real bpy: a tiny dataset, every stage, and what can go wrong."""
+"""The whole workflow with real bpy: a tiny dataset, every stage, and what can go wrong."""
 
 import json
 import os
@@ -14,7 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simulated
-from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake, wait_until
+from checkouts import (
+    assert_same_bytes,
+    checkout,
+    planned,
+    rendered,
+    snakemake,
+    start_snakemake,
+    wait_until,
+)
 
 from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
@@ -25,7 +33,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def other(tmp_path):
-    """A checkout in which nothing has been built."""
+    """A checkout without any build."""
     return checkout(tmp_path / "other")
 
 
@@ -42,9 +50,9 @@ def failing(folder, *arguments):
 
 
 def files(folder):
-    """Return when each file was made: a dry run makes and removes none."""
-    found = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
-    return {path: path.stat().st_mtime_ns for path in found if path.is_file()}
+    """Return the time of each file. A dry run must not change them."""
+    paths = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
+    return {path: path.stat().st_mtime_ns for path in paths if path.is_file()}
 
 
 def test_every_dataset_is_valid_and_its_checksums_hold(smoke):
@@ -68,8 +76,8 @@ def test_a_second_run_does_nothing(smoke):
     assert "Nothing to be done" in succeeding(smoke, "--cores", "2", "smoke")
 
 
-def test_deleted_and_damaged_views_are_made_again_alone(smoke, tmp_path):
-    """A plan says so and changes nothing; a run renders them alone, to the same bytes."""
+def test_only_deleted_and_damaged_views_are_rendered_again(smoke, tmp_path):
+    """A plan reports them and changes nothing. A run renders only them, to the same bytes."""
     folder = tmp_path / "copy"
     shutil.copytree(smoke, folder)
     before = rendered(folder)
@@ -86,23 +94,23 @@ def test_deleted_and_damaged_views_are_made_again_alone(smoke, tmp_path):
     (pictures / "view_d0000f.png").unlink()
     (pictures / "view_f0000f.png").write_bytes((pictures / "view_r0000f.png").read_bytes())
 
-    found = files(folder)
-    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
-    assert files(folder) == found
+    times_before = files(folder)
+    assert planned(folder, "smoke")["render"] == 1
+    assert files(folder) == times_before
     succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == [
         *("view_b0000f", "view_d0000f", "view_u0000f")
     ]
     assert_same_bytes(smoke, folder)
-    # Both runs count, and what the second made again is told.
+    # Both runs count, and repeated renders are reported.
     costs = json.loads((folder / CUBOID / "report/costs.json").read_text())
     (shard,) = costs["shards"]
     assert (shard["views"], shard["views_rendered"], shard["runs"]) == (6, 9, 2)
     assert 0 < shard["repeated_seconds"] < shard["wall_seconds"]
 
 
-def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(smoke, tmp_path):
+def test_an_invalid_dataset_gets_a_page_but_no_checksums_until_it_is_repaired(smoke, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(smoke, folder)
     dataset = folder / CUBOID
@@ -112,7 +120,7 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
     channels = {name: pixels.copy() for name, pixels in image.channels.items()}
     channels["G"][20:24, 30:40] = np.nan
     images.write_exr(view, channels, kept)
-    # As if it had been rendered so.
+    # The view is wrong as if it had been rendered so.
     (record,) = (folder / "work" / CUBOID.relative_to("results") / "render").glob("*-*.json")
     content = json.loads(record.read_text())
     content["files"]["exr/view_b0000f.exr"] = {
@@ -121,13 +129,13 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
     }
     write_json(record, content)
     simulated.note_again(folder, record.relative_to(folder))
-    # Of itself no fault: it is moved out of the way.
+    # A stray file is not a fault: it is moved away.
     (dataset / "notes.txt").touch()
 
     nan = "colour: exr/view_b0000f.exr: 40 values are not a number"
     page_path = f"{CUBOID}/report/index.html"
     archive = "results/smoke/smoke_LFCuboid_1x1x1.tar"
-    # A second run mends nothing, so it validates and fails again.
+    # A second run repairs nothing, so it validates and fails again.
     for _ in range(2):
         terminal = failing(folder, "--cores", "2", "smoke", archive)
         assert terminal.splitlines()[-2:] == [
@@ -152,7 +160,7 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
     assert "Nothing to be done" in succeeding(folder, "--cores", "2", "smoke")
 
 
-def test_a_package_unfolds_to_one_folder_named_after_scene_and_rig(smoke):
+def test_a_package_unpacks_to_one_folder_named_after_scene_and_rig(smoke):
     package = smoke / "results/smoke/smoke_LFCuboid_1x1x1.tar"
     succeeding(smoke, "--cores", "1", package.relative_to(smoke))
     with tarfile.open(package) as file:
@@ -189,7 +197,7 @@ def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_p
 
 
 def unfinished_shards(folder):
-    """Return the journals of shards that have rendered views and not come to their end."""
+    """Return the journals of unfinished shards that have rendered views."""
     journals = folder.glob("work/smoke/*/render/*.journal.jsonl")
     return [
         path
@@ -198,8 +206,8 @@ def unfinished_shards(folder):
     ]
 
 
-def test_killed_while_it_renders_the_next_run_goes_on(smoke, other):
-    """To the same bytes with other shards, and on one core."""
+def test_after_a_kill_during_rendering_the_next_run_continues(smoke, other):
+    """The bytes are the same with other shards, and on one core."""
     rigs = ("LFPlane_3x2_equisolid", "LFLattice_2panos")
     chosen = ("scenes=smoke", f"rigs=[{','.join(rigs)}]", "preset=full", "views_per_shard=2")
     landed = 0
@@ -225,9 +233,30 @@ def test_killed_while_it_renders_the_next_run_goes_on(smoke, other):
 
 @pytest.mark.parametrize("preset", ["tiny", "full"])
 def test_the_default_scene_plans_its_stages(preset, smoke):
-    plan = succeeding(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
-    assert "build_scene" in plan
-    assert "check_blend" not in plan
+    rules = planned(smoke, "--config", f"preset={preset}")
+    assert "build_scene" in rules
+    assert "check_blend" not in rules
+
+
+def test_a_dry_run_ends_with_the_phases_and_their_sum(smoke):
+    result = snakemake(smoke, "-n", "--cores", "1", "--config", "preset=tiny")
+    before, _, table = result.stdout.partition("phase ")
+    assert len((result.stderr + before).splitlines()) <= 4
+    lines = table.splitlines()
+    rows = [line.split() for line in lines[1 : lines.index("")]]
+    assert [row[0] for row in rows] == [
+        *("scene", "cameras", "views", "reprojections", "exports", "validation", "report", "all")
+    ]
+    jobs = [int(row[1]) for row in rows]
+    assert jobs[-1] == sum(jobs[:-1])
+    assert [row[2] for row in rows if row[0] in ("views", "all")] == ["12", "12"]
+
+
+def test_a_run_ends_with_its_forecast(other):
+    folders = ("results=forecast/results", "work=forecast/work")
+    target = f"forecast/{CUBOID}/lightfield.json"
+    said = succeeding(other, "--cores", "1", "--config", *folders, "scenes=smoke", "--", target)
+    assert re.search(r"^1 job in \d+ s, \d+ s of CPU time; the forecast was 1 s$", said, re.M)
 
 
 @pytest.mark.parametrize(
@@ -242,6 +271,6 @@ def test_the_default_scene_plans_its_stages(preset, smoke):
         ("work/smoky/scene.blend", "work/smoky: no chosen scene; is smoke meant?"),
     ],
 )
-def test_what_there_is_not_is_named_beside_what_there_is(target, problem, other):
+def test_a_missing_target_is_named_with_the_existing_ones(target, problem, other):
     last = failing(other, "--dry-run", target).splitlines()[-1]
     assert last.startswith("error: ") and problem in last

@@ -1,18 +1,19 @@
-"""Scenes of which Cycles renders something wrong without an error: users_scenes.py FOLDER.
+"""Writes scenes that Cycles renders incorrectly without an error: users_scenes.py FOLDER.
 
 Each is a .blend in FOLDER, saved at frame 1, with a lamp:
-- aspect: a cube of 2 m, 4 m before the file's own camera, whose pixels are twice as wide as high.
-- wall: a wall square to y at 1.9 m.
-- pencil: the same, with a drawing with Grease Pencil of 2 m before it, and one of 10 m behind it.
-- simulations: what an unbaked simulation moves by frame 20, and what none moves: hair, particles
-  without physics, a rigid body that stands still.
-- baked: a rigid body and simulation nodes that move, with the frames up to 20 baked.
+- aspect: a cube of 2 m, 4 m in front of the file's own camera. The camera's pixels are twice as
+  wide as high.
+- wall: a wall across y at 1.9 m.
+- pencil: the wall, with a Grease Pencil drawing of 2 m in front of it, and one of 10 m behind it.
+- simulations: unbaked simulations that move something by frame 20, and some that do not move: hair,
+  particles without physics, a rigid body at rest.
+- baked: a rigid body and simulation nodes that move, baked for the frames up to 20.
 - fluid: a fluid that is not baked.
-- box: a closed box of 2 m about the origin. split_box: the same of faces that are not joined.
-  open_box: that without its side towards x. open_room: that with its normals inwards.
-- leaves: a ball of leaves about the origin, one mesh, half of which show their backs.
-- dome: a hemisphere of 5 m over a floor. backdrop: a floor and a wall behind it, whose normals face
-  away. floor: a plane of 20 m at 1 m below the origin, whose normal faces down.
+- box: a closed box of 2 m around the origin. split_box: the same with faces that are not joined.
+  open_box: the box without its side towards x. open_room: the open box with normals inwards.
+- leaves: a ball of leaves around the origin as one mesh. Half of the leaves show their backs.
+- dome: a hemisphere of 5 m over a floor. backdrop: a floor and a wall behind it, with normals that
+  face away. floor: a plane of 20 m at 1 m below the origin, with a normal that faces down.
 """
 
 import math
@@ -66,15 +67,15 @@ def falling(name, kind):
 
 
 def rigid_body(name, kind="ACTIVE"):
-    thing = cube(name, location=(0, 5, 5))
+    obj = cube(name, location=(0, 5, 5))
     bpy.ops.rigidbody.object_add(type=kind)
-    return thing
+    return obj
 
 
 def emitter(name, **settings):
     """Add an object with particles in the shape of a cube."""
-    thing = falling(name, "PARTICLE_SYSTEM")
-    particles = thing.particle_systems[0].settings
+    obj = falling(name, "PARTICLE_SYSTEM")
+    particles = obj.particle_systems[0].settings
     particles.render_type, particles.instance_object = "OBJECT", bpy.data.objects["seed"]
     for key, value in settings.items():
         setattr(particles, key, value)
@@ -93,9 +94,9 @@ def simulation_nodes(name):
     tree.links.new(first.outputs["Geometry"], move.inputs["Geometry"])
     tree.links.new(move.outputs["Geometry"], last.inputs["Geometry"])
     tree.links.new(last.outputs["Geometry"], tree.nodes.new("NodeGroupOutput").inputs[0])
-    thing = cube(name)
-    thing.modifiers.new("moves", "NODES").node_group = tree
-    return thing
+    obj = cube(name)
+    obj.modifiers.new("moves", "NODES").node_group = tree
+    return obj
 
 
 def simulations():
@@ -137,7 +138,7 @@ def box():
 
 
 def edit(remove):
-    """Remove the faces of the active mesh of which ``remove`` is true, and split all others."""
+    """Remove the active mesh's faces for which ``remove`` is true, and split the others."""
     mesh = bmesh.new()
     mesh.from_mesh(bpy.context.object.data)
     faces = [face for face in mesh.faces if remove(face)]
@@ -162,11 +163,16 @@ def split_box():
 
 
 def leaves():
-    """Split a ball into its faces, and turn every other one round."""
+    """Split a ball into its faces, and turn every other one round, as on a chessboard."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=3)
     edit(lambda face: face.calc_center_median().z > 2)
-    for face in list(bpy.context.object.data.polygons)[::2]:
-        face.flip()
+    # The faces' order differs from run to run, so it cannot say which to turn.
+    for face in bpy.context.object.data.polygons:
+        x, y, z = face.center.normalized()
+        column = math.floor(32 * math.atan2(y, x) / math.tau)
+        row = math.floor(16 * math.acos(z) / math.pi)
+        if (row + column) % 2:
+            face.flip()
 
 
 def floor():

@@ -1,4 +1,4 @@
-# What the rules of benchmark.smk ask of the configuration.
+# Functions for the rules of benchmark.smk.
 
 
 def full_sizes(wildcards):
@@ -13,6 +13,6 @@ def full_sizes(wildcards):
 
 
 def gpu_check_settings(wildcards):
-    """Return the settings file of a scene's check of the GPU: what is foretold of its rigs."""
+    """Return the settings file of a scene's GPU check: the full sizes of its rigs."""
     path = f"{WORK}/{wildcards.scene}/settings/gpu_check.json"
     return settings_file(path, {"full": full_sizes(wildcards)})

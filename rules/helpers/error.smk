@@ -1,11 +1,11 @@
-# What the rules of error.smk ask of the configuration.
+# Functions for the rules of error.smk.
 
 
 @cache
 def first_dataset(folder):
-    """Return the dataset of a scene's first rig, whose views are its probes.
+    """Return the dataset of a scene's first rig, whose views are the scene's probes.
 
-    A folder that is not being built is a scene's name, which means the scene at full size.
+    The folder of a scene that is not chosen is its name, and means the scene at full size.
     """
     for dataset in DATASETS.values():
         if dataset.scene_folder == folder:
@@ -15,7 +15,7 @@ def first_dataset(folder):
 
 
 def of_first(attribute):
-    """Return the function by which a rule asks for an attribute of that dataset."""
+    """Return an input function: it returns an attribute of that dataset."""
     return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
 
 

@@ -1,8 +1,8 @@
-# What the rules of package.smk ask of the configuration.
+# Functions for the rules of package.smk.
 
 
 def packed(wildcards):
-    """Return the datasets in an archive: a rig's, or one of each frame."""
+    """Return the datasets in an archive: that of a rig, or those of all its frames."""
     rigs = {}
     for dataset in DATASETS.values():
         name = f"{dataset.scene_folder}/{dataset.rig_name}"
@@ -12,9 +12,9 @@ def packed(wildcards):
 
 
 def packed_sums(wildcards):
-    """Return the checksums that say that everything in an archive is finished.
+    """Return the checksums that exist when everything in an archive is finished.
 
-    With a store also what is in it, and what lists it.
+    With a store, also return its files and their lists.
     """
     datasets = packed(wildcards)
     files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
@@ -26,7 +26,7 @@ def packed_sums(wildcards):
 
 
 def pack_settings(wildcards):
-    """Return the settings file of an archive: what is in it, its size, and what its card says."""
+    """Return the settings file of an archive: its datasets, its size, and its card's content."""
     datasets = packed(wildcards)
     settings = PackSettings.of(
         datasets=[dataset.name for dataset in datasets],

@@ -1,4 +1,4 @@
-# What the rules of report.smk ask of the configuration.
+# Functions for the rules of report.smk.
 
 
 def panorama_settings(dataset):
@@ -12,16 +12,16 @@ def panorama_settings(dataset):
 
 
 def panorama_memory(wildcards, attempt):
-    """Ask for the memory in MB that the panorama takes, and for more where that was too little."""
+    """Return the memory of the panorama in MB. Each retry requests more."""
     dataset = dataset_of(wildcards)
     need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
     return math.ceil(need / 1e6) * attempt
 
 
 def measurements(wildcards):
-    """Return the files of those measurements of interest to a dataset that have been made.
+    """Return the files of the finished measurements that concern a dataset.
 
-    They are no input, for a page must never start a measurement: that takes an hour.
+    They are not inputs: a page must never start a measurement, which takes an hour.
     """
     dataset = dataset_of(wildcards)
     stems = ["reprojection", "stability", f"error_vs_time/{dataset.scene_name}"]
@@ -36,17 +36,17 @@ def measurements(wildcards):
 
 
 def rebuilding(wildcards):
-    """Return the command that makes a dataset, to be shown on its page."""
+    """Return the command that makes a dataset, for its page."""
     dataset = dataset_of(wildcards)
     snakefile = os.path.relpath(FOLDER / "Snakefile")
-    words = [] if snakefile == "Snakefile" else ["-s", snakefile]
+    arguments = [] if snakefile == "Snakefile" else ["-s", snakefile]
     choice = [f"scenes={dataset.scene_name}", f"rigs={dataset.rig_name}"]
-    words += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
-    return shlex.join(["snakemake", *words])
+    arguments += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
+    return shlex.join(["snakemake", *arguments])
 
 
 def page_settings(wildcards):
-    """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
+    """Return the settings file of a page: the scene YAML's text, and the measurements to show."""
     dataset = dataset_of(wildcards)
     settings = PageSettings(
         rig=dataset.placed_rig,

@@ -1,8 +1,8 @@
-# What the rules of rig.smk ask of the configuration.
+# Functions for the rules of rig.smk.
 
 
 def free_places_settings(dataset):
-    """Return the settings of a random rig's places; ends the run for another rig."""
+    """Return the settings of a random rig's places. Ends the run for another rig."""
     if not dataset.places:
         sys.exit(
             f"error: {dataset.work}/places.json: is for rigs of type random; "
@@ -18,7 +18,7 @@ def free_places_settings(dataset):
 
 
 def poses_sum(dataset):
-    """Return the SHA-256 of the file from which a rig has its poses; None of other rigs."""
+    """Return the SHA-256 of a rig's file of poses. None for other rigs."""
     return sha256(dataset.rig.file) if isinstance(dataset.rig, Poses) else None
 
 
@@ -34,7 +34,7 @@ def lightfield_settings(dataset):
 
 
 def split_rigs(wildcards):
-    """Return the light fields of a scene whose rigs say what their views are for."""
+    """Return the light fields of those rigs of a scene that have a split."""
     return [
         f"{dataset.folder}/lightfield.json"
         for dataset in DATASETS.values()
@@ -43,6 +43,6 @@ def split_rigs(wildcards):
 
 
 def splits_settings(wildcards):
-    """Return the settings file of a scene's splits: which rigs they are of."""
+    """Return the settings file of a scene's splits, which lists its rigs."""
     path = f"{WORK}/{wildcards.scene}/settings/splits.json"
     return settings_file(path, {"lightfields": split_rigs(wildcards)})

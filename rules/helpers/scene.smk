@@ -1,8 +1,8 @@
-# What the rules of scene.smk ask of the configuration.
+# Functions for the rules of scene.smk.
 
 
 def build_settings(dataset):
-    """Return the settings of a built scene; ends the run for a scene without a builder."""
+    """Return the settings of a built scene. Ends the run for a scene without a builder."""
     if dataset.source.builder is None:
         sys.exit(
             f"error: {dataset.scene_work}/scene.blend: the scene YAML has no builder that makes it"
@@ -16,23 +16,23 @@ def build_settings(dataset):
 
 
 def inventory_settings(dataset):
-    """Return what a scene's inventory depends on of its scene YAML."""
+    """Return the settings of a scene's inventory: what it depends on in the scene YAML."""
     written = load_scene(dataset.scene_name)
     datasets = scene_datasets(dataset.scene_name)
     return {
-        # Raised when the program lists something else.
+        # Raise this number when the program lists something else.
         "version": 4,
         "scene_name": written.scene.scene_name,
         "view_layers": written.scene.view_layers,
         "allow_missing": written.scene.allow_missing,
         "motion_blur": written.render.motion_blur,
         "rendered_frames": rendered_frames(datasets),
-        # As the program has them: a rig without any changes nothing.
+        # Like the program, leave out rigs without frames.
         "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
 
 
 def blend_of(wildcards):
-    """Return a scene's .blend, which a user has where Snakemake runs."""
+    """Return a scene's .blend. A user's own file is on the machine that runs Snakemake."""
     dataset = scene_of(wildcards)
     return local(dataset.blend) if dataset.source.blend else dataset.blend

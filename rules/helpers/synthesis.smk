@@ -1,17 +1,17 @@
-# What the rules of synthesis.smk ask of the configuration.
+# Functions for the rules of synthesis.smk.
 
 
 def reach(dataset):
-    """Return how far a rig's cameras are from their middle, in metres."""
+    """Return the largest distance of a rig's cameras from their middle, in metres."""
     places = [pose.position for pose in dataset.rig.poses()]
     middle = [sum(axis) / len(places) for axis in zip(*places)]
     return max(math.dist(place, middle) for place in places)
 
 
 def held_out(dataset):
-    """Return the scene's chosen datasets whose cameras are all nearer together than a light field's.
+    """Return the scene's chosen datasets that reach less far than this one.
 
-    A rig whose cameras span no surface has nothing between them.
+    Empty for a rig whose cameras span no surface, because nothing lies between them.
     """
     if dataset.rig.cells() is None:
         return []
@@ -25,7 +25,7 @@ def held_out(dataset):
 
 
 def synthesis_settings(dataset):
-    """Return the settings of a measurement: with which datasets synthesised views are compared."""
+    """Return the settings of a measurement: the datasets to compare synthesised views with."""
     truths = held_out(dataset)
     return SynthesisSettings(truth=[truth.folder for truth in truths]).as_json()
 

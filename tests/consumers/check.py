@@ -1,9 +1,8 @@
-"""Read the exports with the consumers' own code, and learn a radiance field from them.
+"""Reads the exports with the consumers' own code, and learns a radiance field from them.
 
-The consumers are pycolmap, nerfstudio and OpenCV.
-
-Run by `make consumers` in an environment of theirs, on what export.py wrote. A line for each with
-the largest error found; anything beyond its limit ends in an AssertionError.
+The consumers are pycolmap, nerfstudio and OpenCV. `make consumers` runs this in an environment of
+its own, after export.py. Prints the largest error of each export. An error beyond its limit ends in
+an AssertionError.
 """
 
 import sys
@@ -13,17 +12,17 @@ import cv2
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-RADIUS = 3.0  # of the scene, a sphere around the origin
+RADIUS = 3.0  # The radius of the scene, a sphere around the origin.
 
 
-def angle(one, other):
+def angle(first, second):
     """Return the angle in radians between directions (..., 3)."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.arctan2(across, (one * other).sum(axis=-1))
+    across = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.arctan2(across, (first * second).sum(axis=-1))
 
 
 def ours(folder, name):
-    """Return names, camera-to-world matrices, and the rays of the pixels of a camera."""
+    """Return the names, the camera-to-world matrices, and the rays of the pixels of a camera."""
     saved = np.load(folder / f"{name}.npz")
     return saved["names"].tolist(), saved["matrices"], saved["rays"]
 
@@ -38,8 +37,8 @@ def colmap(folder, name):
         seen = [point for point in image.points2D if point.has_point3D()]
         fewest = min(fewest, len(seen))
         for point in seen:
-            found = image.project_point(model.points3D[point.point3D_id].xyz)
-            pixels = max(pixels, np.abs(found - point.xy).max())
+            projected = image.project_point(model.points3D[point.point3D_id].xyz)
+            pixels = max(pixels, np.abs(projected - point.xy).max())
         stem = image.name.removesuffix(".png")
         np.testing.assert_allclose(
             image.projection_center(), matrices[names.index(stem)][:3, 3], atol=1e-9
@@ -89,14 +88,14 @@ def nerfstudio(folder, name):
             )
             depth = cv2.imread(str(outputs.metadata["depth_filenames"][index]), cv2.IMREAD_ANYDEPTH)
             reach = depth * outputs.metadata["depth_unit_scale_factor"]
-            # As nerfstudio's datasets do: along the axis where rays have another length than 1.
+            # Scale as nerfstudio's datasets do: depth is along the axis, so rays are longer than 1.
             reach = reach * bundle.metadata["directions_norm"].numpy()[..., 0]
             world = matrix[:3, 3] + directions * reach[..., None]
-            known = depth > 0
-            metres = max(metres, np.abs(np.linalg.norm(world, axis=-1) - RADIUS)[known].max())
+            has_depth = depth > 0
+            metres = max(metres, np.abs(np.linalg.norm(world, axis=-1) - RADIUS)[has_depth].max())
             if outputs.mask_filenames:
                 mask = cv2.imread(str(outputs.mask_filenames[index]), cv2.IMREAD_GRAYSCALE)
-                assert ((mask > 0) == known).all()
+                assert ((mask > 0) == has_depth).all()
     counts = [len(outputs.image_filenames) for outputs in parts]
     print(
         f"nerfstudio, {name}: {counts} views; rays within {radians:.2g} rad, "
@@ -122,14 +121,14 @@ def opencv(folder, name):
         values, distortion = camera.params[:4], camera.params[4:]
     fx, fy, cx, cy = values
     rays = ours(folder, name)[2]
-    # Its undistortion gives no rays beyond 90 degrees, its projection none behind the camera.
+    # cv2.fisheye undistorts no rays beyond 90 degrees, and projects none behind the camera.
     local = rays[rays[..., 2] < -0.05] * [1, -1, -1]
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    found = cv2.fisheye.projectPoints(
+    projected = cv2.fisheye.projectPoints(
         local[:, None], np.zeros(3), np.zeros(3), matrix, np.array(distortion)
     )[0][:, 0]
     row, column = np.nonzero(rays[..., 2] < -0.05)
-    pixels = np.abs(found - np.column_stack([column, row]) - 0.5).max()
+    pixels = np.abs(projected - np.column_stack([column, row]) - 0.5).max()
     print(f"OpenCV {cv2.__version__}, {name}: {len(local)} rays within {pixels:.2g} pixels")
     assert pixels < 1e-3
 

@@ -1,6 +1,6 @@
-"""Export views of a scene that is known in closed form, for the consumers' own code to read.
+"""Exports views of a scene known in closed form, for the consumers' own code to read.
 
-Run by `make consumers` in the project's environment; check.py reads what this writes in another.
+`make consumers` runs this in the project's environment, before check.py.
 """
 
 import shutil
@@ -19,7 +19,7 @@ from lightfield.dataset.exports import settings_of  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
-# Views enough for a radiance field to learn from.
+# Enough views for a radiance field to learn from.
 LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv"),

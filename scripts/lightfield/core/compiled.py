@@ -11,19 +11,25 @@ def _hidden(*names: str) -> Iterator[None]:
     """Hide modules from the imports in this context, even modules that are loaded."""
     loaded = {name: sys.modules[name] for name in names if name in sys.modules}
     sys.modules.update(dict.fromkeys(names))  # type: ignore[arg-type]
-    yield
-    for name in names:
-        del sys.modules[name]
-    sys.modules.update(loaded)
+    try:
+        yield
+    finally:
+        for name in names:
+            del sys.modules[name]
+        sys.modules.update(loaded)
 
 
-# Numba imports YAML for its options, scipy for its version, and scipy's BLAS with its first kernel.
-# That takes longer than numba's own import, and no kernel needs any of them. An options file in the
-# folder where a program runs could even change what kernels compute.
-with _hidden("scipy", "scipy.linalg.cython_blas", "yaml"):
+# Numba imports scipy for its version, and YAML for its options. No kernel needs them, and a file of
+# options in the folder where a program runs could even change what kernels compute.
+with _hidden("scipy", "yaml"):
     import numba
-    import numba.np.arraymath
+    from numba.core import entrypoints
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime import rtsys
     from numba.extending import register_jitable
+
+# Numba would look through all installed packages for extensions of its own.
+entrypoints._already_initialized = True
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -32,13 +38,35 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
 
 
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """Loads a kernel's machine code at once.
+
+    Numba's own cache first loads all types and functions that numba can compile. That takes longer
+    than anything else, and only compiling needs them.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the kept machine code for the signature ``sig``. None if there is none."""
+        # Numba would import scipy's BLAS, which no kernel needs.
+        with _hidden("scipy.linalg.cython_blas"):
+            rtsys.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                if loaded := self._load_overload(sig, target_context):
+                    return loaded
+            target_context.refresh()
+        return None
+
+
 def kernel(function: _F) -> _F:
     """Compile a function, and keep the machine code for the next process.
 
     Numba compiles it again only when the function's own file changes. So define the functions that
     a kernel calls in the kernel's file.
     """
-    return cast(_F, numba.njit(cache=True, **_OPTIONS)(function))
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    # What the option `cache` does, with numba's own cache.
+    dispatcher._cache = _Cache(function)
+    return cast(_F, dispatcher)
 
 
 def inline(function: _F) -> _F:

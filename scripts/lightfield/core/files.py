@@ -275,9 +275,9 @@ def reading(place: Path | str, kind: str) -> Iterator[None]:
     except KeyError as error:
         raise UserError(f"{place}: {error.args[0]}: is missing") from None
     except DAMAGE as error:
-        raise UserError(f"{place}: is no {kind}: {error}") from None
+        raise UserError(f"{place}: is not a valid {kind}: {error}") from None
     except struct.error:
-        raise UserError(f"{place}: is no {kind}: it is cut short") from None
+        raise UserError(f"{place}: is not a valid {kind}: it is cut short") from None
 
 
 def read_json(path: Path | str) -> Any:

@@ -29,6 +29,8 @@ _REMOVED = (
     "MATERIALX_",
     "PXR_",
     "OIDN_",
+    # Plug-ins that check settings, of any package that is installed.
+    "PYDANTIC_",
     # The arithmetic of kernels, arrays and the C library: compiler and instructions.
     "NUMBA_",
     "NPY_",
@@ -59,8 +61,11 @@ def isolate() -> None:
     if _MARK not in sys._xoptions and _is_program():
         # -s also excludes the packages in the user's home.
         command = [sys.executable, "-s", "-X", _MARK, *sys.orig_argv[1:]]
-        folder = {"BLENDER_USER_RESOURCES": str(_folder_without_user_files())}
-        os.execve(sys.executable, command, cleaned(os.environ) | folder)
+        own_variables = {
+            "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
+            "PYDANTIC_DISABLE_PLUGINS": "__all__",
+        }
+        os.execve(sys.executable, command, cleaned(os.environ) | own_variables)
 
 
 def _is_program() -> bool:
@@ -90,6 +95,8 @@ def _harmless_folders(library_path: str) -> str:
     The loader would prefer the folder's library to the package's. On a cluster this may be another
     version of TBB or of the denoiser. The remaining folders may be needed by Python or a GPU.
     """
+    if not library_path:
+        return ""
     packages = Path(sysconfig.get_path("platlib"))
     libraries = {library.name for library in packages.glob("*/lib/*.so*")}
     return os.pathsep.join(

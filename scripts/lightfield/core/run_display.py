@@ -17,9 +17,9 @@ from typing import TextIO
 from lightfield.core import progress
 from lightfield.core.progress import duration
 
-# Seconds that a job takes beside its renders: to start a program, to read and write its files.
-JOB_SECONDS = 1.5
-# Without a terminal the first line of progress comes after so many seconds.
+# After so many seconds of work, the run's rate counts.
+SURE_AFTER = 2.0
+# Without a terminal the first line of progress comes after this many seconds.
 FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
 NEXT_LINE = 0.1
@@ -32,8 +32,8 @@ _FOR_THE_USER = re.compile(r"warning: |note: ")
 class Task:
     """A job: its rule, ``name``, phase and log.
 
-    ``views`` is the number of the dataset's views that it renders. ``seconds`` is the estimated
-    time of its renders on one core.
+    ``views`` is the number of the dataset's views that it renders. ``seconds`` is its estimated
+    time on one core, None if that is unknown.
     """
 
     rule: str
@@ -41,7 +41,7 @@ class Task:
     phase: str
     log: Path
     views: int = 0
-    seconds: float = 0.0
+    seconds: float | None = None
     began: float | None = None
     ended: float | None = None
     # From its log: pieces of work that an earlier run did, those done since, all pieces, and the
@@ -141,6 +141,23 @@ class RunDisplay:
             self.update()
             self.clear()
 
+    def summary(self, cpu_seconds: float | None) -> str:
+        """Return what the run did and took, and its forecast, if these are known."""
+        text = f"{_count(len(self._tasks), 'job')} in {duration(time.time() - self._began)}"
+        if cpu_seconds is None:
+            return text
+        text += f", {duration(cpu_seconds)} of CPU time"
+        if any(task.seconds is None for task in self._tasks.values()):
+            return text
+        return f"{text}; the forecast was {duration(self._expected_seconds())}"
+
+    def _expected_seconds(self) -> float:
+        """Return the estimated CPU seconds of the run, without the work of earlier runs."""
+        return sum(
+            (task.seconds or 0.0) * (1 - task.already / (task.total or 1))
+            for task in self._tasks.values()
+        )
+
     def clear(self) -> None:
         """Remove the line of progress from the terminal, so that other text can be written."""
         with self._lock:
@@ -239,20 +256,16 @@ class RunDisplay:
         done = 0.0
         remaining = 0.0
         for task in self._tasks.values():
-            rendering = slowness * task.seconds
-            done += rendering * task.part * (1 - task.already / (task.total or 1))
-            remaining += rendering * (1 - task.part)
-            if task.ended is None:
-                remaining += JOB_SECONDS
-            else:
-                done += JOB_SECONDS
+            seconds = slowness * (task.seconds or 0.0)
+            done += seconds * task.part * (1 - task.already / (task.total or 1))
+            remaining += seconds * (1 - task.part)
         elapsed = now - self._began
-        # Before anything is done, assume that all cores work.
-        rate = done / elapsed if done > JOB_SECONDS else float(self._cores)
+        # Before much is done, assume that all cores work.
+        rate = done / elapsed if done > SURE_AFTER else float(self._cores)
         seconds_by_logs = [
             (task.total - task.already - task.done) * task.each
             for task in self._open.values()
-            if not task.seconds and task.each is not None
+            if task.seconds is None and task.each is not None
         ]
         return max([remaining / rate, *seconds_by_logs])
 
@@ -263,7 +276,7 @@ class RunDisplay:
         for task in self._tasks.values():
             if task.views_made and task.each is not None:
                 spent += task.each * task.views_made
-                expected += task.seconds * task.views_made / task.views
+                expected += (task.seconds or 0.0) * task.views_made / task.views
         return spent / expected if expected else 1.0
 
     def _say(self, text: str) -> None:

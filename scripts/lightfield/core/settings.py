@@ -161,7 +161,7 @@ def _first_problem(errors: list[ErrorDetails], content: Any) -> str:
     if error["loc"][-1:] == ("[key]",):
         # `path` has no rigs that are somebody else's folders, so use the error's own location.
         *parents, name, _ = error["loc"]
-        return f"{'.'.join(map(str, parents))}: {name!r} is no name; must {_allowed(error)}"
+        return f"{'.'.join(map(str, parents))}: {name!r} is not a name; must {_allowed(error)}"
     allowed = dict.fromkeys(_allowed(error) for _, error in errors_of_key)
     return f"{prefix}is {_shown(value)}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
 
@@ -175,7 +175,7 @@ def _shown(value: Any) -> str:
 def _locate(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
     """Return the keys that lead to a wrong value, and the value.
 
-    Leaves out pydantic's names of types, which are no keys of ``content``.
+    Leaves out pydantic's names of types, which are not keys of ``content``.
     """
     path: list[int | str] = []
     for part in error["loc"]:

@@ -44,8 +44,8 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
     lens = camera["lens"]
     if lens["type"] != "PERSP":
         raise UserError(
-            f"the .blend's camera {camera['name']} is no perspective one; instead of lens: file, "
-            "give the rig's camera its lens"
+            f"the .blend's camera {camera['name']} is not a perspective one; instead of lens: "
+            "file, give the rig's camera its lens"
         )
     width, height = resolution
     fit = lens["sensor_fit"]

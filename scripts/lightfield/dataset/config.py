@@ -33,7 +33,8 @@ from lightfield.core.settings import (
     suggestion,
 )
 from lightfield.dataset import published
-from lightfield.dataset.exports import VIEWS, Export, Exports
+from lightfield.dataset.exports import Export, Exports
+from lightfield.dataset.names import VIEWS, builders
 from lightfield.dataset.passes import FLOW, PASSES, in_order
 from lightfield.dataset.reprojections import (
     ReprojectionOptions,
@@ -51,7 +52,6 @@ ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.
 OWN_SCENES = Path("configs", "scenes")
-BUILDERS = ROOT / "scripts" / "scenes"
 
 FLOW_PLACES = "needs views from two or more places"
 
@@ -249,7 +249,7 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(
-                    f"scenes: {name} is no name for a scene; no dots, and not {used_names}"
+                    f"scenes: {name} is not a name for a scene; no dots, and not {used_names}"
                 )
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
@@ -777,7 +777,7 @@ def load_config(content: Any) -> Configuration:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Read a config.yaml. Raises `UserError` if it is no mapping. Does not check its keys."""
+    """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
     content = read_yaml(path, path.name)
     if not isinstance(content, dict):
         raise UserError(f"{path}: must be a mapping of keys to values")
@@ -809,12 +809,6 @@ def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
     return checked(_SCENE, read_yaml(path, file), file)
-
-
-def builders() -> list[str]:
-    """Return the names of the scene builders: the folders of scripts/scenes/ except library."""
-    folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
-    return sorted(name for name in folders if name != "library")
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
@@ -931,19 +925,21 @@ def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
 def read_yaml(path: Path, file: str) -> Any:
     """Read a YAML file. Errors call it ``file``.
 
-    Raises `UserError` if it is no YAML, or too large. Repeated aliases count, too.
+    Raises `UserError` if it is not YAML, or too large. Repeated aliases count, too.
     """
     try:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_YAML + 1)
         if len(content) > LARGEST_YAML:
             raise UserError(
-                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is no settings"
+                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
             )
         loader = _UniqueKeyLoader(content.decode())
         node = loader.get_single_node()
         if _size(node, {}) > MOST_NODES:
-            raise UserError(f"{file}: its aliases (*name) repeat too much, so it is no settings")
+            raise UserError(
+                f"{file}: its aliases (*name) repeat too much, so it is not a settings file"
+            )
         return loader.construct_document(node) if node else None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark

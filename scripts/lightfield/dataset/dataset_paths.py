@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from lightfield.dataset import passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
-from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.names import VIEWS
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig

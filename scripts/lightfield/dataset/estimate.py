@@ -11,17 +11,18 @@ from lightfield.core.files import DAMAGE
 from lightfield.dataset import memory, passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset_paths import DatasetPaths
+from lightfield.dataset.unit_costs import (
+    CHECK_SECONDS,
+    COMPRESSED,
+    DENOISING_SAMPLES,
+    MOST_SHOWN_VIEWS,
+    READ_SECONDS,
+    REPORT_SECONDS,
+    REPROJECTION_SECONDS,
+    SECONDS_PER_SAMPLE,
+    START_UP_SECONDS,
+)
 
-# These are only for planning. They were measured on one core of a 2-core x86-64 machine.
-# Path tracing of one sample of one pixel.
-SECONDS_PER_SAMPLE = 6e-6
-# Start-up of bpy, the scene, and Cycles' acceleration structures.
-START_UP_SECONDS = 3.0
-# Reading a pixel of an imported view: EXR with depth, by benchmarks/reprojection.py with batches of
-# 16 views of 2048².
-READ_SECONDS = 4e-8
-# Computing a pixel of a reprojected view, measured in the same way.
-REPROJECTION_SECONDS = 1.5e-7
 # A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
 # Start-up takes at most this part of a shard's time.
@@ -32,8 +33,6 @@ USUAL_SHARDS = 64
 CLUSTER_JOB_MINUTES = 20
 # Planning more shards than this takes too long.
 MOST_SHARDS = 10_000
-# An EXR's size as a part of its uncompressed size, measured in the three scenes.
-COMPRESSED = 0.75
 # Bytes for a pixel of an 8-bit PNG.
 PNG_BYTES = 2
 
@@ -49,7 +48,7 @@ class Estimate:
         """Seconds that one core takes to render a view, by a probe or as a guess."""
         if self._probe:
             return self._probe[0]
-        return self.dataset.pixels * self._samples * SECONDS_PER_SAMPLE
+        return self.dataset.pixels * self._cost_samples * SECONDS_PER_SAMPLE
 
     @cached_property
     def view_bytes(self) -> float:
@@ -76,7 +75,7 @@ class Estimate:
         return size + reprojected_size
 
     def memory_bytes(self, pixels: int) -> int:
-        """Return the memory in bytes of a process that renders views of so many pixels.
+        """Return the memory in bytes of a process that renders views of this many pixels.
 
         The inventory measures the scene's part, to which this adds a fifth.
         """
@@ -97,6 +96,27 @@ class Estimate:
         """Seconds that one core takes for the panorama, which is twice as wide as high."""
         pixels = self.dataset.panorama_width**2 / 2
         return START_UP_SECONDS + self.view_seconds * pixels / self.dataset.pixels
+
+    def reprojection_seconds(self, name: str) -> float:
+        """Return the seconds that one core takes to read and reproject a view."""
+        read_pixels = self.dataset.pixels
+        return read_pixels * READ_SECONDS + self._reprojected_pixels(name) * REPROJECTION_SECONDS
+
+    @property
+    def import_seconds(self) -> float:
+        """Seconds that one core takes to import a view."""
+        return self.dataset.pixels * READ_SECONDS
+
+    @property
+    def check_seconds(self) -> float:
+        """Seconds that one core takes to validate or export all views and reprojections."""
+        return self.dataset.view_count * self._all_pixels * CHECK_SECONDS
+
+    @property
+    def report_seconds(self) -> float:
+        """Seconds that one core takes to draw the figures, or to write the page."""
+        shown_views = min(self.dataset.view_count, MOST_SHOWN_VIEWS)
+        return shown_views * self._all_pixels * REPORT_SECONDS
 
     @property
     def shard_count(self) -> int:
@@ -126,25 +146,24 @@ class Estimate:
         return min(limit, GUESSED_SAMPLES) if samples == FILE else int(samples)
 
     @property
-    def _samples(self) -> float:
-        """A pixel's samples, by the calibration if it has run."""
+    def _cost_samples(self) -> float:
+        """A pixel's cost in samples, with denoising, by the calibration if it has run."""
+        denoising = DENOISING_SAMPLES if self.dataset.render.get("denoise") else 0
         if not isinstance(self.dataset.calibration, str):
-            return self._planned_samples
+            return self._planned_samples + denoising
         try:
             calibration = json.loads(Path(self.dataset.calibration).read_bytes())
             return float(calibration["cost_samples"])
         except (OSError, *DAMAGE):
             # The file is missing, or broken, so that it will be made again.
-            return self._planned_samples
+            return self._planned_samples + denoising
 
     @property
     def _planned_view_seconds(self) -> float:
         """Seconds that one core takes to render a view, or to import and reproject one."""
         dataset = self.dataset
         if dataset.imported:
-            computed_pixels = sum(self._reprojected_pixels(name) for name in dataset.reprojections)
-            read_pixels = dataset.pixels * (1 + len(dataset.reprojections))
-            return read_pixels * READ_SECONDS + computed_pixels * REPROJECTION_SECONDS
+            return self.import_seconds + sum(map(self.reprojection_seconds, dataset.reprojections))
         return dataset.pixels * self._planned_samples * SECONDS_PER_SAMPLE
 
     @cached_property
@@ -171,6 +190,12 @@ class Estimate:
         except (OSError, *DAMAGE):
             pass
         return None
+
+    @property
+    def _all_pixels(self) -> int:
+        """The pixels of a view and its reprojections."""
+        reprojected_pixels = sum(map(self._reprojected_pixels, self.dataset.reprojections))
+        return self.dataset.pixels + reprojected_pixels
 
     def _reprojected_pixels(self, name: str) -> int:
         """Return the pixels of a view's reprojection. A cube map has six images."""

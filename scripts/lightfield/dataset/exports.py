@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 from pydantic import Field, model_validator
 
 from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.dataset.names import VIEWS
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -20,17 +21,15 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# The name of the rendered views in `sources`.
-VIEWS = "views"
 # The list of an export's files, which is written last.
 MANIFEST = "export.json"
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
 BOUNDS_VIEWS = 64
-"""The extent of a scene is measured in so many views."""
+"""The extent of a scene is measured in this many views."""
 BOUNDS_PIXELS = 64
-"""The views that measure a scene's extent have so many pixels along the longer side."""
+"""The views that measure a scene's extent have this many pixels along the longer side."""
 
 TO_RECTILINEAR = "reproject to rectilinear"
 
@@ -61,7 +60,7 @@ class Export(Settings):
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
-            return "has one view, of which none is left to test with"
+            return "has one view, so none is left to test with"
         return None
 
 
@@ -247,7 +246,7 @@ class Hci(Developed):
     def rig_refusal(self, rig: Rig) -> str | None:
         if isinstance(rig, Plane) and not rig.cube_map and rig.look_at is None:
             return None
-        return "is no plane of parallel cameras, which HCI's layout needs; export only planes"
+        return "is not a plane of parallel cameras, which HCI's layout needs; export only planes"
 
 
 class ScanNetPP(Developed):
@@ -262,7 +261,7 @@ class ScanNetPP(Developed):
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant) and lens.fov < math.pi:
             return None
-        return "is no equidistant fisheye below 180 degrees; reproject to one"
+        return "is not an equidistant fisheye below 180 degrees; reproject to one"
 
 
 class PosesCsv(Export):
@@ -310,9 +309,9 @@ def _odd_size_refusal(lens: Lens) -> str | None:
 
 
 def _centred_pinhole(lens: Lens) -> str | None:
-    """Return why a lens is no pinhole with a centred axis and square pixels. None if it is."""
+    """Return why a lens is not a pinhole with a centred axis and square pixels. None if it is."""
     if not isinstance(lens, Rectilinear):
-        return f"is no pinhole camera, the only one that this layout has; {TO_RECTILINEAR}"
+        return f"is not a pinhole camera, the only one that this layout has; {TO_RECTILINEAR}"
     if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
         return "has its axis off centre or oblong pixels, which this layout cannot describe"
     return None

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, PlainSerializer
 
 from lightfield.core.settings import Settings
-from lightfield.dataset.config import FILE, AtLeastOne, Credits, Parameters, builders
+from lightfield.dataset.config import FILE, AtLeastOne, Credits, Parameters
+from lightfield.dataset.names import builders
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 

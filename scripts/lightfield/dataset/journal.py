@@ -36,7 +36,7 @@ JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
 MOST_FAILURES = 3
 # A view is suspect if it took less than this part of the median time of its shard's views.
 SUSPECT_PART = 0.02
-# This needs at least so many other views.
+# This needs at least this many other views.
 SUSPECT_AFTER = 3
 
 # The keys of each kind of line. The first key shows the kind.

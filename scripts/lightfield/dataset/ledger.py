@@ -319,7 +319,7 @@ def _stamp(digest: Any, *numbers: Any) -> Stamp:
 def _checked(value: Any, kind: type) -> Any:
     """Return a value of a type. Raises TypeError for a value of another type."""
     if not isinstance(value, kind):
-        raise TypeError(f"is no {kind.__name__}")
+        raise TypeError(f"is not a {kind.__name__}")
     return value
 
 

@@ -16,7 +16,8 @@ from lightfield.dataset.config import (
 )
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.description import Cluster
-from lightfield.dataset.exports import VIEWS, Exports
+from lightfield.dataset.exports import Exports
+from lightfield.dataset.names import VIEWS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
@@ -121,6 +122,16 @@ def scene_datasets(
             )
             datasets.append(dataset)
     return datasets
+
+
+def rig_dataset(scene: str, rig: str | None) -> Dataset:
+    """Return the dataset of a scene's rig, or of its first. Raises `UserError` for another rig."""
+    datasets = scene_datasets(scene)
+    dataset = next((d for d in datasets if rig in (None, d.rig_folder)), None)
+    if dataset is None:
+        rig_names = ", ".join(d.rig_folder for d in datasets)
+        raise UserError(f"--rig: is {rig!r}; must be one of {rig_names}")
+    return dataset
 
 
 def _rig_of(scene: str, name: str, written: config.Scene, preset: str, limits: Preset) -> Rig:

@@ -13,7 +13,7 @@ UNKNOWN_SCENE = 6_000_000_000
 
 
 def needed(scene: int, pixels: int, denoise: bool) -> int:
-    """Return the bytes of a process that renders views of so many pixels.
+    """Return the bytes of a process that renders views of this many pixels.
 
     ``scene`` is the inventory's ``memory_bytes``: the memory for a view of very few pixels.
     """
@@ -21,7 +21,7 @@ def needed(scene: int, pixels: int, denoise: bool) -> int:
 
 
 def threads(cores: int, shards: int, need: int, available: int) -> int:
-    """Return how many cores each of so many ``shards`` takes. Each needs ``need`` bytes.
+    """Return how many cores each of this many ``shards`` takes. Each needs ``need`` bytes.
 
     A shard takes more than one core in two cases. There are fewer shards than cores, or a shard for
     each core would not fit into the ``available`` memory. A tenth is left to other programs.

@@ -17,7 +17,7 @@ NAME = "shards.json"
 
 
 def noted(work: str, dataset: str, views: int) -> int | None:
-    """Return the noted number of shards of a dataset with so many views, or None.
+    """Return the noted number of shards of a dataset with this many views, or None.
 
     ``work`` is the folder of the note. A broken note is ignored.
     """

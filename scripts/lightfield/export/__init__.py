@@ -77,7 +77,7 @@ def _files(path: Path) -> dict[str, str]:
         files = read_json(path)["files"]
         return {str(name): str(digest) for name, digest in files.items()}
     except (UserError, LookupError, TypeError, AttributeError):
-        raise UserError(f"{path}: is no JSON with files and their sha256") from None
+        raise UserError(f"{path}: is not JSON with files and their sha256") from None
 
 
 def _pictures(path: Path) -> list[str]:

@@ -26,7 +26,7 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
         return (*focal_pixels(lens), *lens.coefficients)
     if isinstance(lens, Equidistant):
         return (lens.width / lens.fov, lens.height / lens.fov, 0.0, 0.0, 0.0, 0.0)
-    raise TypeError(f"{type(lens).__name__} is no fisheye of OpenCV's")
+    raise TypeError(f"{type(lens).__name__} is not a fisheye of OpenCV's")
 
 
 def misreading(lens: Lens) -> str | None:

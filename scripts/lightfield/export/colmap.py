@@ -93,7 +93,7 @@ def model(source: SourceDataset, count: int) -> "Model":
     )
     visible = np.flatnonzero(view_counts)
     seen_once = int((view_counts == 1).sum())
-    print(f"{len(visible):,} points, of which one view alone sees {seen_once:,}")
+    print(f"{len(visible):,} points; one view alone sees {seen_once:,} of them")
     return Model(source, points, seen_points, visible)
 
 

@@ -18,7 +18,7 @@ def depth_range(depth: Floats) -> tuple[float, float]:
 def levels(
     depth: Floats, limits: tuple[float, float], bits: int, lowest: int
 ) -> NDArray[np.uint16]:
-    """Return normalised disparity in integers of so many ``bits``; 0 where depth is unknown.
+    """Return normalised disparity in integers of ``bits`` bits, 0 where depth is unknown.
 
     It is (1 / depth − 1 / far) / (1 / near − 1 / far), 0 to 1, of the ``limits`` near and far. What
     is known has the level ``lowest`` at least.

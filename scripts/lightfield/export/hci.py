@@ -56,7 +56,7 @@ def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
 def grid(lightfield: LightField) -> tuple[list[View], int, float]:
     """Return the views row by row, the number in a row, and their distance in metres.
 
-    Raises `UserError` if the views are no regular grid in the plane of their images.
+    Raises `UserError` if the views are not a regular grid in the plane of their images.
     """
     views = list(lightfield.views)
     rotations = lightfield.matrices[:, :3, :3]
@@ -71,7 +71,7 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
     )
     if not regular:
         raise UserError(
-            f"{lightfield.path}: frames: are no grid of cameras that look in parallel, "
+            f"{lightfield.path}: frames: are not a grid of cameras that look in parallel, "
             "as far apart across as down, which this layout is for"
         )
     order = np.lexsort((places[:, 0].round(9), -places[:, 1].round(9)))

@@ -1,16 +1,4 @@
-"""Writes transforms.json for instant-ngp, and the masks and copies of views that it needs.
-
-Frames come in the order and, with --scale and --offset, with the numbers of SILVR's
-generate_NERF_transforms.py. instant-ngp reads perspective views, fisheyes and full panoramas.
-
-instant-ngp does not hide the pixels outside a fisheye's image circle by itself. So PNG views with
-such pixels get a dynamic_mask_<name>.png beside them. instant-ngp refuses EXR files whose channels
-differ in type, as half colour and float depth do. It hides pixels of an EXR only if their colour is
-negative. So EXR views are copied to --exr-dir with R, G and B alone.
-
-Give instant-ngp the transforms.json itself. If it gets a folder, it opens every .json in it. It
-cannot read lightfield.json.
-"""
+"""Writes transforms.json for instant-ngp: the work of scripts/export_instant_ngp.py."""
 
 # How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``). It negates
 # the Y and Z axes of each camera. It maps a position p to p · ``scale`` + ``offset``. Then it
@@ -31,7 +19,6 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from lightfield.core.cli import above_zero, finite, refuse_beside_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
@@ -39,11 +26,11 @@ from lightfield.core.settings import checked, read_settings
 from lightfield.dataset.exports import (
     BOUNDS_PIXELS,
     BOUNDS_VIEWS,
-    VIEWS,
     ExportSettings,
     InstantNgp,
 )
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.names import VIEWS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
 from lightfield.geometry.depth import conventional_depth
@@ -74,74 +61,15 @@ def _pictures(path: Path) -> list[str]:
         depths = [frame["depth_path"] for frame in frames if "depth_path" in frame]
         return [str(frame["file_path"]) for frame in frames] + depths
     except (UserError, LookupError, TypeError):
-        raise UserError(f"{path}: is no JSON with frames, each with a file_path") from None
+        raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
 MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the flags of this export to a command line."""
-    add = parser.add_argument
-    add("--input-cfg", type=Path, required=True, help="the lightfield.json")
-    add("--output", type=Path, required=True, help="the transforms.json to write")
-    add("--settings", type=Path, metavar="JSON", help="settings file, as for scripts/export.py")
-    add("--image-dir", type=Path, help="folder of the views (default: that of --input-cfg)")
-    add(
-        "--exr-dir",
-        type=Path,
-        help="folder for the copies of EXR views (default: instant_ngp beside --output)",
-    )
-    add_settings_flags(parser)
-
-
-def add_settings_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that replace a settings file."""
-    add = parser.add_argument_group("Instead of --settings").add_argument
-    add("--image-suffix", choices=[".png", ".exr"], default=".png", help="suffix of the views")
-    add(
-        "--depth-dir",
-        type=Path,
-        help="write 16-bit depth PNGs there, in millimetres, from channel Z of the .exr views",
-    )
-    add("--scale", type=above_zero, help="metres to unit cubes (default: fitted to the scene)")
-    add(
-        "--offset",
-        type=finite,
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="where the mean camera lies in the unit cube, with --scale (default: 0.5 0.5 0.5)",
-    )
-    add(
-        "--depth-bounds",
-        action="store_true",
-        help="fit the unit cube to the cameras and nine tenths of the points in channel Z of the "
-        ".exr views (default: the rig fills a fifth of the cube, or all if it looks inward)",
-    )
-    add(
-        "--aabb-scale",
-        type=int,
-        choices=[1, 2, 4, 8, 16, 32, 64, 128],
-        help="side of the training volume in unit cubes (instant-ngp's default: 1)",
-    )
-    add(
-        "--render-aabb",
-        type=finite,
-        nargs=6,
-        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
-        help="the part of the unit cube that instant-ngp shows",
-    )
-    add(
-        "--placed-as",
-        metavar="TRANSFORMS",
-        help="take scale and offset from this transforms.json, which lists the training views",
-    )
-
-
 def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
     """Return the settings from --settings, or from the flags."""
     if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
         return read_settings(ExportSettings[InstantNgp], arguments.settings)
     if arguments.scale is None and arguments.offset is not None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
@@ -472,7 +400,7 @@ def _ftheta(lens: Lens) -> list[float]:
     radius = np.linspace(0, reach, 4001)
     in_front = radius[np.abs(_angles(lens, radius)[0]) <= math.pi / 2]
     if len(in_front) < 5:
-        raise UserError(_not_followed("its view is no fisheye's"))
+        raise UserError(_not_followed("its view is not a fisheye's"))
     # Chebyshev's nodes keep the largest error of a polynomial fit near its minimum.
     nodes = in_front[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
     across, down = _angles(lens, nodes)

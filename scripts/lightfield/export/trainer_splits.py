@@ -35,5 +35,5 @@ def splits(lightfield: LightField) -> Splits:
     )
     if not (train and test):
         missing = "test" if train else "train"
-        raise UserError(f"{lightfield.path}: frames: none is there to {missing}")
+        raise UserError(f"{lightfield.path}: frames: no view is left to {missing}")
     return Splits(train, validation or test, test)

@@ -41,7 +41,7 @@ class Cameras:
         """Return, in ascending order, all cameras as near as the nearest one elsewhere.
 
         "Elsewhere" means at least ``apart`` metres away. ``tie`` is a part of the distance: cameras
-        that are farther by no more than this count as equally far.
+        that are farther by at most this count as equally far.
         """
         count = 2
         while True:

@@ -3,13 +3,16 @@
 from typing import Any
 
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]
-from numba import types
-from numba.extending import intrinsic
 
 from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.images import HALF_MAX
+
+# isort: split
+# After `compiled`, which keeps from numba what could change a kernel, and what it need not import.
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import types
+from numba.extending import intrinsic
 
 
 def widen(red: Array, green: Array, blue: Array, alpha: Array | None = None) -> Array:

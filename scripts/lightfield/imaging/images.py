@@ -105,7 +105,7 @@ def is_readable(path: Path | str) -> bool:
 
 
 def read_header(path: Path | str) -> Header:
-    """Read only the header. Raises `UserError` for a file that is no image."""
+    """Read only the header. Raises `UserError` for a file that is not an image."""
     if header := _plain_exr_header(path):
         return header
     file = _open(path)
@@ -138,7 +138,7 @@ def read_image(
 
 
 def attribute(path: Path, name: str) -> Attribute | None:
-    """Return an attribute of a file's header. None if the file lacks it, or is no image."""
+    """Return an attribute of a file's header. None if the file lacks it, or is not an image."""
     try:
         return read_header(path).attributes.get(name)
     except UserError:
@@ -263,7 +263,7 @@ def _open(path: Path | str) -> Any:
     configuration.attribute("oiio:UnassociatedAlpha", 1)
     file = oiio.ImageInput.open(str(path), configuration)
     if file is None:
-        raise UserError(f"{path}: is no image that can be read: {oiio.geterror()}")
+        raise UserError(f"{path}: is not an image that can be read: {oiio.geterror()}")
     return file
 
 
@@ -282,7 +282,7 @@ def _plain_exr_header(path: Path | str) -> Header | None:
     except (OSError, struct.error, UnicodeDecodeError):
         return None
     except (RuntimeError, ValueError) as error:
-        raise UserError(f"{path}: is no image that can be read: {error}") from None
+        raise UserError(f"{path}: is not an image that can be read: {error}") from None
     (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
     attributes = {k: v for k, v in header.items() if isinstance(v, str | int | float)}
     return Header(right - left + 1, bottom - top + 1, _colour_first(names), attributes)
@@ -354,7 +354,7 @@ def _channel_names(path: Path | str, spec: Any) -> list[str]:
     try:
         return list(spec.channelnames)
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: is no image that can be read: {error}") from None
+        raise UserError(f"{path}: is not an image that can be read: {error}") from None
 
 
 def _runs(spec: Any, indices: Sequence[int]) -> list[tuple[int, int, str]]:

@@ -1,1 +1,1 @@
-"""How large the error of a render is, what it costs, and which settings reach a target."""
+"""Measures the error and the cost of renders, and finds settings that reach a target error."""

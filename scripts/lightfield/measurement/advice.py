@@ -26,7 +26,7 @@ from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, R
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 from lightfield.measurement.trials import Trials
 
-# The samples of a pixel with which changes are tried. The unchanged scene also has half and twice.
+# Changes are rendered with this many samples a pixel, the unchanged scene also with half and twice.
 SAMPLES = 8
 SEEDS = range(1, 5)
 # Adaptive sampling has no effect below about thirty samples.
@@ -58,7 +58,7 @@ COSTLY = (
     "procedural",
     "displacement",
 )
-# The table names at most this many of a kind.
+# The table names at most this many materials, objects or lights of a kind.
 MOST_NAMES = 8
 
 

@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.sampling import (
-    DENOISING_SAMPLES,
     FEWEST_SEEDS,
     MOST_SEEDS,
     PLAIN,
@@ -286,13 +286,15 @@ def calibrate(
     """
     target = render["target_error"]
     windows = maker.windows(size, count)
-    others = held_out_windows(maker, windows)
+    unseen_windows = held_out_windows(maker, windows)
     # The pilot renders first, because it sets up Cycles for the parts of light.
-    classes = strata.classes_of(maker, [*windows, *others])
+    classes = strata.classes_of(maker, [*windows, *unseen_windows])
     bench = Bench(maker, windows, PROBE_SEED, target)
     search = Search(bench.measure, target, render.get("most_samples"), render.get("denoise"))
     choice = search.choose()
-    held_out = Bench(maker, others, HELD_OUT_SEED, target, bench.experiment.references[0].exposure)
+    held_out = Bench(
+        maker, unseen_windows, HELD_OUT_SEED, target, bench.experiment.references[0].exposure
+    )
     for each in (bench, held_out):
         each.measure(choice.method)
     # An error far below the references' own may be measured as 0 or less by chance.
@@ -307,7 +309,7 @@ def calibrate(
         "probes": [window.name for window in windows],
         "held_out": [
             {"probe": window.name, "error": error}
-            for window, error in zip(others, held_out.errors(choice.method), strict=True)
+            for window, error in zip(unseen_windows, held_out.errors(choice.method), strict=True)
         ],
         "strata": errors_by_stratum([bench, held_out], classes, choice.method),
         "references": {

@@ -1,43 +1,4 @@
-"""Adds up the cost of a dataset, and extrapolates that of the full one: report/costs.json.
-
-Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
-from the journals of their shards. Journals survive kills. So they hold all the time that was spent,
-also on views that were lost or rendered again. Any other job counts with the time and memory of its
-last run, as Snakemake measured them. Snakemake looks every half second, and after a while every
-30 s. So processor time may be too short by as much. A job that ends before the first look counts as
-busy throughout.
-
-    {
-      "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
-      "shards": [{"shard", "views", "wall_seconds", "cpu_seconds", "peak_memory_bytes",
-                  "path_tracing_seconds",   Cycles' own render time of all its renderings
-                  "overhead_seconds",       the rest of wall_seconds
-                  "views_rendered",         renderings, repeated ones counted
-                  "runs",                   processes that worked on it
-                  "killed_runs",            those of them that did not end by themselves
-                  "repeated_seconds"}],     spent again: views rendered again, later start-ups
-      "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
-      "device", "cores", "watts", "price_per_kwh", "currency",
-      "energy_kwh", "price", "attribution",
-      "extrapolation": {"views", "resolution", "samples", "core_hours", "core_hours_uncertainty",
-                        "energy_kwh", "energy_kwh_uncertainty", "price", "price_uncertainty",
-                        "gigabytes", "basis"}
-    }
-
-Energy is the machine's wattage, times the wall time, times the busy part of its cores. The busy
-part is processor time over wall time and number of cores. While a graphics card renders, the whole
-machine counts. Waiting and idle time do not count.
-
-The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
-samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
-samples (see `lightfield.measurement.sampling`). The uncertainty is the standard error of that mean
-over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
-a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
-views and pixels. Everything else stays as it was. The first view of each process prepares the scene
-for Cycles, so it counts for neither. Gigabytes are those of the rendered views, in proportion to
-their pixels. They are an upper estimate, because larger views compress better. "device" and
-"extrapolation" are null if no journal has a rendered view. That happens if the working folder was
-deleted and the views were kept."""
+"""Adds up the cost of a dataset, and extrapolates that of the full one, for scripts/costs.py."""
 
 import csv
 import math
@@ -57,7 +18,8 @@ from lightfield.dataset.config import AtLeastOne, Energy
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
+from lightfield.measurement.sampling import cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work. Other stages come between.
 FIRST_STAGES = ("scene", "cameras", "render")
@@ -138,7 +100,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
     latest = {view["view"]: view["wall_seconds"] for view in views}
     wall = sum(run.wall_seconds for run in runs)
     path_tracing = sum(view["render_seconds"] for view in views)
-    again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
+    rendered_again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
     return _rounded(
         {
             "shard": name,
@@ -151,7 +113,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
             "views_rendered": len(views),
             "runs": len(runs),
             "killed_runs": sum(run.end is None for run in runs),
-            "repeated_seconds": again
+            "repeated_seconds": rendered_again
             + sum(run.start.get("start_up_seconds", 0.0) for run in runs[1:]),
         }
     )
@@ -180,7 +142,7 @@ def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
         try:
             wall, cpu, memory = job_times(path)
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
-            print(f"{path}: is no table of a job's time; the job is left out", file=sys.stderr)
+            print(f"{path}: is not a table of a job's time; the job is left out", file=sys.stderr)
             continue
         stage = stages.setdefault(name, Stage())
         stage.jobs += 1

@@ -66,7 +66,7 @@ FIGURES = (
     *("mse_seconds", "relative_mse_unexposed", "mrse", "psnr", "ssim", "flip"),
 )
 
-# The keys of a point that tell its method. All others are figures.
+# The keys of a point that name its method. All others are figures.
 METHOD_KEYS = ("method", "settings")
 
 

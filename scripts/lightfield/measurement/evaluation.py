@@ -66,7 +66,7 @@ def find(
     endings = " or ".join(suffixes)
     raise UserError(
         f"{folder}: has no {view.name}{endings}, nor {names[0]}{endings}; "
-        "it must have each view to test with"
+        "it must have every test view"
     )
 
 

@@ -3,10 +3,19 @@
 Every job reads this file with the rules, so it must import nothing that takes long.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from lightfield.dataset.estimate import COMPRESSED, SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.dataset.unit_costs import (
+    CHECK_SECONDS,
+    COMPRESSED,
+    DENOISING_SAMPLES,
+    JOB_SECONDS,
+    REPORT_SECONDS,
+    REPROJECTION_SECONDS,
+    SECONDS_PER_SAMPLE,
+    START_UP_SECONDS,
+)
 from lightfield.measurement.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,
@@ -17,47 +26,76 @@ from lightfield.measurement.sampling import (
     WINDOW_SIZE,
 )
 
-# The following were measured in the courtyard. A calibration's search makes this many renders of
-# each window.
+# These three were measured in the courtyard. A calibration's search renders each window this often.
 SEARCH_RENDERS = 9
-# Together they take this many times the samples that the target needs.
+# Together these renders take this many times the samples that the target needs.
 SEARCH_PART = 2.5
 # A render takes this many seconds beside its samples.
 WINDOW_SECONDS = 0.07
 
-# The formulas of the columns, which stand under the table.
+# The formulas of the columns, printed below the table.
 FORMULAS = f"""\
-CPU time = views × pixels × samples × {1e6 * SECONDS_PER_SAMPLE:g} µs \
-+ jobs × {START_UP_SECONDS:g} s, with the report's panorama.
+CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
+× {1e6 * SECONDS_PER_SAMPLE:g} µs + reprojected pixels × {1e6 * REPROJECTION_SECONDS:g} µs
++ pixels × {1e6 * CHECK_SECONDS:g} µs for the validation and each export \
++ shown pixels × {2e6 * REPORT_SECONDS:g} µs
++ jobs × {JOB_SECONDS:g} s, with Blender {START_UP_SECONDS:g} s.
 Size = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
 After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """The rendering of one rig or one calibration: views, seconds of one core, and bytes."""
+    """Some jobs: their number, the views that they render, seconds of one core, and bytes."""
 
     name: str
+    jobs: int
     views: int
     seconds: float
-    size: float = 0.0
+    size: float
 
 
-def forecast(works: Sequence[Work]) -> str:
-    """Return the table that ends a dry run, with the sums and the formulas below."""
-    total = Work(
-        "all",
+def forecast(phases: Iterable[Work], datasets: Iterable[Work]) -> str:
+    """Return the tables that end a dry run, with sums, and with the formulas below.
+
+    Works of the same name become one row. Several datasets have a table of their own.
+    """
+    rows = _sums(phases)
+    tables = [_table("phase", [*rows, _sum("all", rows)])]
+    dataset_rows = _sums(datasets)
+    if len(dataset_rows) > 1:
+        tables.append(_table("dataset", dataset_rows))
+    return "\n\n".join([*tables, FORMULAS])
+
+
+def _sums(works: Iterable[Work]) -> list[Work]:
+    """Return the sum of the works of each name, in the order of their first ones."""
+    by_name: dict[str, list[Work]] = {}
+    for work in works:
+        by_name.setdefault(work.name, []).append(work)
+    return [_sum(name, group) for name, group in by_name.items()]
+
+
+def _sum(name: str, works: Sequence[Work]) -> Work:
+    return Work(
+        name,
+        sum(work.jobs for work in works),
         sum(work.views for work in works),
         sum(work.seconds for work in works),
         sum(work.size for work in works),
     )
-    rows = [
-        f"{work.name:<40} {work.views or '':>8} {time_text(work.seconds):>12} "
-        f"{size_text(work.size) if work.size else '':>8}"
-        for work in [*works, *([total] if len(works) > 1 else [])]
-    ]
-    head = f"{'to render':<40} {'views':>8} {'CPU time':>12} {'size':>8}"
-    return "\n".join([head, *rows, FORMULAS])
+
+
+def _table(title: str, works: Sequence[Work]) -> str:
+    rows = [(title, "jobs", "views", "CPU time", "size")]
+    for work in works:
+        views = f"{work.views:,}" if work.views else ""
+        size = size_text(work.size) if work.size else ""
+        rows.append((work.name, f"{work.jobs:,}", views, time_text(work.seconds), size))
+    return "\n".join(
+        f"{name:<40} {jobs:>8} {views:>8} {seconds:>10} {size:>8}".rstrip()
+        for name, jobs, views, seconds, size in rows
+    )
 
 
 def calibration_seconds(target: float, size: int, most: int | None = None) -> float:

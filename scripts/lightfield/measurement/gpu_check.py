@@ -18,7 +18,7 @@ from lightfield.measurement.trials import Trial, Trials
 
 # The longer side of the view that both devices render, in pixels.
 SIZE = 128
-# Renders on each device, and the samples of each render.
+# The number of renders on each device, and the samples of each.
 SEEDS = 4
 SAMPLES = 16
 # Blocks of this many pixels along a side are compared, because means are less noisy than pixels.
@@ -159,13 +159,13 @@ def table(name: str, content: Mapping[str, Any]) -> str:
     rows = [f"| {dataset} | {hours:.3g} |" for dataset, hours in content["hours"].items()]
     return "\n".join(
         [
-            f"# {name}: the GPU beside the processor",
+            f"# {name}: the GPU compared with the processor",
             "",
-            f"{'The same' if content['same'] else 'Not the same'}: colours differ by "
-            f"{content['colour']:.2f} of what noise makes (at most {MOST_OF_NOISE:g}). All light "
-            f"differs by {abs(content['light']):.1f} standard errors (at most {MOST_ERRORS:g}). "
-            f"{content['depth']:.2%} of the depths differ by more than {SAME_DEPTH:g} of "
-            f"themselves (at most {SILHOUETTES:.1%}).",
+            f"{'Both' if content['same'] else 'They do not'} render the same picture. Colours "
+            f"differ {content['colour']:.2f} times as much as noise explains (at most "
+            f"{MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard errors "
+            f"(at most {MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by more than "
+            f"a part of {SAME_DEPTH:g} (at most {SILHOUETTES:.1%}).",
             f"A sample of a megapixel takes {content['gpu_seconds']:.3g} s on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",

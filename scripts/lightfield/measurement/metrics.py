@@ -54,8 +54,9 @@ OUTLIERS = 0.001
 TO_YCBCR = np.array(
     [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
 )
-# Of IV-PSNR: the weights of luma and of both colours, pixels of shift, and the difference of means.
+# IV-PSNR weights luma and both colour differences by these.
 IV_WEIGHTS = np.array([4.0, 1.0, 1.0]) / 6
+# IV-PSNR forgives shifts of this many pixels, and this difference of the mean colour.
 SHIFT = 2
 MOST_OFFSET = 0.01
 
@@ -206,9 +207,10 @@ def flip_map(truth: Array, shown: Array) -> Array:
 
 
 def solid_angles(lens: Lens) -> Array:
-    """Return the solid angle (h, w) of each pixel of a lens in steradians; 0 where it has no ray.
+    """Return the solid angle (h, w) of each pixel of a lens in steradians.
 
-    That of the plane between the pixel's corners: a corner beyond the lens's edge leaves nothing.
+    It is half the cross product of the diagonals between the rays of the pixel's corners. It is 0
+    if a corner has no ray.
     """
     rays = lens.rays(np.arange(lens.width + 1.0)[None, :], np.arange(lens.height + 1.0)[:, None])
     falling = rays[1:, 1:] - rays[:-1, :-1]
@@ -218,33 +220,35 @@ def solid_angles(lens: Lens) -> Array:
 
 
 def ws_psnr(truth: Array, shown: Array, weights: Array) -> float:
-    """Return the PSNR in decibel of pictures (h, w, 3) in [0, 1], by ``weights`` (h, w) of pixels.
+    """Return the PSNR in decibel of pictures (h, w, 3) in [0, 1], with pixel ``weights`` (h, w).
 
-    With `solid_angles` it is WS-PSNR. Source: Sun, Lu and Yu 2017, "Weighted-to-Spherically-Uniform
-    Quality Evaluation for Omnidirectional Video". A difference of nothing counts as 1e-10.
+    With `solid_angles` as weights it is WS-PSNR. Source: Sun, Lu and Yu 2017,
+    "Weighted-to-Spherically-Uniform Quality Evaluation for Omnidirectional Video". The mean square
+    counts as at least 1e-10, so equal pictures have 100 dB.
     """
     errors = ((truth - shown) ** 2).mean(axis=-1)
     return -10 * math.log10(max(float((weights * errors).sum() / weights.sum()), 1e-10))
 
 
 def iv_psnr(truth: Array, shown: Array, counted: NDArray[np.bool_]) -> float:
-    """Return the IV-PSNR in decibel of sRGB pictures (h, w, 3) in [0, 1], of pixels ``counted``.
+    """Return the IV-PSNR in decibel of sRGB pictures (h, w, 3) in [0, 1].
 
-    It forgives shifts of up to two pixels, and a difference of the mean colour of up to a
-    hundredth. Source: Dziembowski, Mieloch, Stankowski and Grzelka 2022, "IV-PSNR – The Objective
-    Quality Metric for Immersive Video Applications".
+    Only the ``counted`` pixels (h, w) count. The metric forgives shifts of up to two pixels, and
+    differences of the mean colour of up to a hundredth. Source: Dziembowski, Mieloch, Stankowski
+    and Grzelka 2022, "IV-PSNR – The Objective Quality Metric for Immersive Video Applications".
     """
-    pictures = [picture @ TO_YCBCR.T for picture in (truth, shown)]
-    one, other = pictures
-    offset = (one - other)[counted].mean(axis=0).clip(-MOST_OFFSET, MOST_OFFSET)
+    true_picture = truth @ TO_YCBCR.T
+    shown_picture = shown @ TO_YCBCR.T
+    offset = (true_picture - shown_picture)[counted].mean(axis=0)
+    shown_picture = shown_picture + offset.clip(-MOST_OFFSET, MOST_OFFSET)
     return min(
-        _iv_psnr(one, other + offset, counted),
-        _iv_psnr(other + offset, one, counted),
+        _iv_psnr(true_picture, shown_picture, counted),
+        _iv_psnr(shown_picture, true_picture, counted),
     )
 
 
 def _iv_psnr(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
-    """Return the PSNR of one direction: each pixel of a ``picture`` beside its best match."""
+    """Return the PSNR of a ``picture`` whose pixels are compared with their best matches."""
     height, width = counted.shape
     padded = np.pad(other, ((SHIFT, SHIFT), (SHIFT, SHIFT), (0, 0)), mode="edge")
     least = np.full(counted.shape, np.inf)
@@ -253,9 +257,9 @@ def _iv_psnr(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
         for column in range(2 * SHIFT + 1):
             squares = (picture - padded[row : row + height, column : column + width]) ** 2
             error = squares @ IV_WEIGHTS
-            nearer = error < least
-            least[nearer] = error[nearer]
-            best[nearer] = squares[nearer]
+            is_less = error < least
+            least[is_less] = error[is_less]
+            best[is_less] = squares[is_less]
     means = best[counted].mean(axis=0)
     return float(IV_WEIGHTS @ (-10 * np.log10(np.maximum(means, 1e-10))))
 
@@ -454,7 +458,7 @@ def disagreement(
     inliers = _inliers(both.mean(axis=-1))
     error_difference = errors[0] - errors[1]
     truth_difference = truths[0] - truths[1]
-    total, floor, added, sum_ = (
+    total, floor, added, sum_of_squares = (
         float(value[inliers].mean())
         for value in (
             (error_difference + truth_difference) ** 2 * weights,
@@ -467,5 +471,5 @@ def disagreement(
         total=math.sqrt(total),
         floor=math.sqrt(max(floor, 0.0)),
         added=math.sqrt(max(added, 0.0)),
-        share=added / sum_ if sum_ else 0.0,
+        share=added / sum_of_squares if sum_of_squares else 0.0,
     )

@@ -35,7 +35,7 @@ TARGET_ERROR = 0.01
 # A method that takes this many times as long as plain path tracing does not reach its error.
 OUT_OF_REACH = 1e4
 
-# The formulas of the columns, which stand under the table.
+# The formulas of the columns, printed below the table.
 FORMULAS = f"""\
 - time = views × s a view
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
@@ -106,7 +106,7 @@ def read_probe(path: Path | str) -> dict[str, Any]:
         if not all(0 <= number < 1e18 for number in [*numbers, *counts]):
             raise ValueError("a number is below 0, or far too large")
         if not all(isinstance(count, int) and count < 2**31 for count in counts):
-            raise ValueError("a count is no whole number")
+            raise ValueError("a count is not a whole number")
         if not (probe["view_seconds"] and probe["view_bytes"]):
             raise ValueError("no view was measured")
     return probe

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.files import read_keys, reading
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 
 # Keys of a `render` block that only its calibration reads: the target error, and a preset's limits.
 UNCALIBRATED = ("target_error", "most_samples", "denoise")
@@ -31,11 +32,6 @@ TRACED = "path tracing"
 DENOISED = "denoised"
 
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
-
-# Denoising a pixel costs as much as this many samples of it: 18 µs against 6. It was measured on
-# one core of an EPYC, in views of the garden of 256² and more. In small windows it costs up to
-# twice as much.
-DENOISING_SAMPLES = 3
 
 
 def cost_in_samples(samples: float, denoise: bool) -> float:

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-# The columns that name a row, and those of which rows have means: held-out views, synthesised.
+# The tables of synthesised views: the columns that name a row, and those that are averaged.
 COLUMNS = ("truth", "variant", "value")
 MEANS = (
     *("psnr", "psnr_black", "ws_psnr", "iv_psnr", "ssim", "flip", "flip_black"),
     *("holes", "source_bytes"),
 )
-# The places of views, by the largest part of the way from the middle of the cameras to the edge of
+# The places of views, and how far each reaches: 0 is the middle of the cameras, 1 is the edge of
 # their interpolation volume.
 PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}
-# The region of all pixels. The other regions are pixels that show most of a kind of light: glossy
-# is the light of metal and mirrors, transmission that of glass, volume that of fog and fire.
+# The region of all pixels. The other regions are named after the light that dominates their pixels:
+# glossy is the light of metal and mirrors, transmission that of glass, volume that of fog and fire.
 WHOLE = "all"
 
 

@@ -1,8 +1,8 @@
-"""The quality of a light field: held-out views, synthesised from the others, against the truth.
+"""Measures a light field's quality: synthesises held-out views from the others, and compares them.
 
 Each variant changes one thing: the number of views, how many of them make a picture, their
-resolution, or the precision of their depth. Two controls show what the synthesis itself adds: the
-nearest view without its depth, and views with the depth of other views.
+resolution, or the precision of their depth. Two controls show what the synthesis itself
+contributes: the nearest view without its depth, and views with the depth of other views.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,14 +25,17 @@ from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
 from lightfield.measurement.summaries import PLACES, WHOLE
-from lightfield.synthesis.view import BEST, Sources, reader
+from lightfield.synthesis.defaults import BEST
+from lightfield.synthesis.view import Sources, reader
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to synthesise: ``name`` is what it changes, ``value`` what it changes that to.
+    """One way to synthesise.
 
-    ``best`` is how many views make a picture, and ``size`` the bytes of the views that are read.
+    - ``name``, ``value``: what it changes, and to which value.
+    - ``best``: how many views make a picture.
+    - ``size``: the bytes of all its views.
     """
 
     name: str
@@ -43,7 +46,7 @@ class Variant:
 
 
 def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
-    """Yield the variants and controls of the ``views`` of a dataset, the plain one first."""
+    """Yield the variants and controls of a dataset's ``views``, the unchanged one first."""
     lens = source.lens
     read = reader(source)
     sizes = {view.name: source.path(view).stat().st_size for view in views}
@@ -95,16 +98,19 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
 
 
 def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
-    """Yield ever fewer of a dataset's ``views``: those of coarser spheres, or else halves."""
+    """Yield smaller and smaller subsets of a dataset's ``views``.
+
+    A sphere's subsets are the coarser spheres. Other rigs are halved.
+    """
     coarser = nested(len(views)) if lightfield.content.get("lf_type") == "SPHERE" else []
     spheres: list[Sequence[View]] = [[views[number] for number in numbers] for numbers in coarser]
     yield from spheres or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
 
 
 def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]:
-    """Return the pixels (h, w) of each region of a true view, of those ``inside`` the lens.
+    """Return the pixels (h, w) of each region of a true view, out of those ``inside`` the lens.
 
-    There is a region for each kind of light if the view has all of them as passes.
+    If the view has the passes of all kinds of light, each kind has a region.
     """
     by_region = {WHOLE: inside}
     if {*PARTS_OF_LIGHT} <= {render_pass.name for render_pass in truth.lightfield.passes}:
@@ -126,10 +132,10 @@ def compare(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
 
-    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes. Holes count as
-    they are filled; psnr_black and flip_black are those of the picture whose holes are black.
-    ``part`` is the region's part of the picture. ``to_edge`` is the view's distance from the middle
-    of the views ``around`` it, over the distance to the edge of their volume.
+    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes. Holes count
+    with their filling, but in psnr_black and flip_black they are black. ``part`` is the region's
+    part of the picture. ``to_edge`` is the view's distance from the middle of the views ``around``
+    it, over the distance to the edge of their volume.
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
     angles = metrics.solid_angles(truth.lens)
@@ -137,11 +143,11 @@ def compare(
     eyes = np.array([view.matrix for view in views])
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
     for view, to_edge in zip(views, parts.tolist(), strict=True):
-        made = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
+        synthesised = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
         true_picture = _developed(true, exposure, inside)
-        picture = _developed(made.colour, exposure, inside)
-        black = np.where(made.holes[..., None], 0, picture)
+        picture = _developed(synthesised.colour, exposure, inside)
+        black = np.where(synthesised.holes[..., None], 0, picture)
         similar = metrics.ssim_map(true_picture, picture)
         flips = metrics.flip_map(true_picture, picture)
         black_flips = metrics.flip_map(true_picture, black)
@@ -162,15 +168,15 @@ def compare(
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
                 "flip_black": float(black_flips[pixels].mean()),
-                "holes": float(made.holes[pixels].mean()),
+                "holes": float(synthesised.holes[pixels].mean()),
                 "source_bytes": variant.size,
             }
 
 
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
-    """Plot quality against bytes, the number of views, and how many of them make a picture.
+    """Plot quality over bytes, over the number of views, and over how many make a picture.
 
-    The rows are those of `summaries.means`. Of several truths, only the first one is drawn.
+    The rows are those of `summaries.means`. Draws only the first of several truths.
     """
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:

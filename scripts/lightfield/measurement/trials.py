@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core import processors
-from lightfield.core.cli import positive
 from lightfield.core.errors import UserError
 from lightfield.dataset import keys, passes
 from lightfield.dataset.inventory import read_inventory
@@ -29,7 +28,7 @@ from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, calibrated, without_target
+from lightfield.measurement.sampling import PLAIN, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
@@ -39,7 +38,7 @@ REFERENCE_SEED = 1000
 R2 = (0.7548776662466927, 0.5698402909980532)
 # A window has at least this part of its pixels in the image circle, if possible.
 FULL_ENOUGH = 0.75
-# At most this many places of a window are tried.
+# Tries at most this many places for a window.
 MOST_PLACES = 64
 
 # The kinds of surfaces that a pilot finds, and the features by which the inventory lists their
@@ -127,7 +126,7 @@ class Trials:
 
     @classmethod
     def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
-        """Return the trials for the arguments of `add_arguments`."""
+        """Return the trials for the arguments of `trial_flags.add_arguments`."""
         return cls(
             arguments.blend,
             arguments.inventory,
@@ -304,29 +303,6 @@ class Trials:
         self._started = True
 
 
-def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
-    """Add the arguments of a program that renders windows. ``lightfield`` is a help text."""
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
-    parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
-    parser.add_argument(
-        "--size",
-        type=positive,
-        default=WINDOW_SIZE,
-        help="pixels of a window's sides (default: %(default)s)",
-    )
-    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
-    parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
-    parser.add_argument("--cache", required=True, type=Path, help="folder that keeps the renders")
-
-
-def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Add the argument that `read_arguments` reads beside those of `add_arguments`."""
-    parser.add_argument(
-        "--calibration", type=Path, help="the file of scripts/calibrate.py for a target error"
-    )
-
-
 def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
     """Return the dataset with its final ``render`` settings, and its trials.
 
@@ -340,7 +316,7 @@ def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
     elif "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
-            "give --calibration, what scripts/calibrate.py chose for it"
+            "give --calibration, the file that scripts/calibrate.py wrote for it"
         )
     return lightfield, Trials.of(arguments, lightfield)
 

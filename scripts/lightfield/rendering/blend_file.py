@@ -116,7 +116,7 @@ def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> 
         for name in view_layers:
             if name not in all_layers:
                 names = ", ".join(layer.name for layer in all_layers)
-                raise UserError(f"view_layers: {name!r} is none of {names}")
+                raise UserError(f"view_layers: {name!r} is not one of {names}")
         layers = [all_layers[name] for name in view_layers]
     _join(layers)
     # Keyframes may turn view layers on and off.

@@ -211,7 +211,7 @@ def gpu(device: str) -> str | None:
     if device not in ("auto", "cpu"):
         raise UserError(
             f"device: this machine has no {device} device that Cycles can use; "
-            "use device=cpu, or device=auto to take what there is"
+            "use device=cpu, or device=auto to use the best device here"
         )
     return None
 

@@ -4,7 +4,7 @@ Blender gives each instance a random number. It depends only on the names and th
 that lead to the instance. So it is the same in every view, frame, process and machine. Cycles
 passes it to shaders as Object Info's Random. Here every material writes it into extra passes. As a
 float it has 24 bits: of n instances of an object, about n² / 5e7 pairs share a number. An object
-that is no instance has its pass index as number.
+that is not an instance has its pass index as number.
 """
 
 from dataclasses import dataclass

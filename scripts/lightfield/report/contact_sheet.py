@@ -64,7 +64,7 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
 def small_view(path: Path, width: int, height: int) -> Array:
     """Return a view's colour (height, width, 3) at a cell's size.
 
-    A view that cannot be read is black: validation reports it. Pixels that are no number are black.
+    An unreadable view is black: validation reports it. Pixels that are not numbers are black.
     """
     try:
         image = images.read_image(path, "RGB")

@@ -90,7 +90,7 @@ def _compare(
     if not regions:
         raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
     if not np.isfinite(shown.colour[regions["all"]]).all():
-        raise UserError(f"{path}: has colour that is no number where it is compared")
+        raise UserError(f"{path}: has colour that is not a number where it is compared")
     rows = [
         {"view": view.name, "region": region, **errors}
         for region, errors in evaluation.errors(shown, true, regions)

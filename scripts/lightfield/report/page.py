@@ -37,6 +37,7 @@ def write(output: Path, template: str, **content: Any) -> None:
     # A page has the modules that both share only once.
     only_of_walk = [module for module in walk_modules if module not in page_modules]
     environment.globals |= {
+        "index_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "index/main.js"))),
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
         "page_js": Markup(scripts.joined(page_modules)),
         "walk_js": Markup(scripts.joined(only_of_walk)),

@@ -1,4 +1,4 @@
-"""Collects what the page's walk needs beside the views: their rays, and the volume between them.
+"""Collects the walk's data beside the views: the rays, the volume between the cameras, constants.
 
 The walk in the browser (templates/walk/) chooses, draws and blends views as `synthesis.view` does.
 This module passes it the same constants.
@@ -15,6 +15,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.report.packing import packed_bytes
 from lightfield.synthesis import kernels
 from lightfield.synthesis import view as synthesis
+from lightfield.synthesis.defaults import BEST
 
 Array = NDArray[Any]
 
@@ -27,12 +28,12 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
 
     ``lens`` is that of the embedded views. ``places`` (n, 3) are the positions of all cameras.
     ``distances`` (m, height, width) are what the embedded views see, in metres.
-    ``fills_holes`` is as of `lightfield.synthesis.view.Sources`. Some of the keys:
+    ``fills_holes`` is that of `lightfield.synthesis.view.Sources`. Some of the keys:
 
     - ``rays``: the pixels' rays row by row, octahedral in two times 16 bits.
     - ``sight``: a byte for each direction of an octahedral map, 1 where the lens sees it.
-    - ``planes`` (m, 4): they bound the volume between the cameras, n · p + c ≤ 0.
-    - ``toRim``: a byte for each pixel, 255 where it is far from the edge of what the lens sees.
+    - ``planes`` (m, 4): the bounds n · p + c ≤ 0 of the volume between the cameras.
+    - ``toRim``: a byte for each pixel, 0 at the edge of the image circle, 255 far from it.
     - ``pixel``: the angle between two pixels, in radians.
     - ``nearest``: the first percentile of the distances.
     """
@@ -53,7 +54,7 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
         "steepest": float(synthesis.steepest(lens)),
         "distances": synthesis.typical(1 / positive).tolist() if positive.size else [1.0, 1.0],
         "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
-        "best": synthesis.BEST,
+        "best": BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": synthesis.DISTANCE,
         "sharp": synthesis.SHARP,
@@ -83,7 +84,7 @@ def _octahedral(rays: Array) -> Array:
 
 
 def _direction(points: Array) -> Array:
-    """Return the vectors (..., 3) of `_octahedral` points (..., 2). They are no unit vectors."""
+    """Return vectors (..., 3) in the directions of `_octahedral` points (..., 2)."""
     plane = 2 * points - 1
     z = 1 - np.abs(plane).sum(axis=-1)
     folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)

@@ -8,8 +8,19 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses import Array
 from lightfield.reprojection import kernels
-from lightfield.reprojection.filters import FILTERS
 from lightfield.reprojection.lens_map import LensMap
+
+# The kernel of each filter that fills one output pixel for each sample. kernels.py explains their
+# arguments. OpenImageIO does this for st_warp.
+_SAMPLE = {
+    "nearest": kernels.nearest,
+    "bilinear": kernels.interpolating(kernels.linear_weights),
+    "bicubic": kernels.interpolating(kernels.cubic_weights),
+    "lanczos": kernels.interpolating(kernels.lanczos_weights),
+    "adaptive": kernels.interpolating(kernels.cubic_weights),
+}
+# The kernel of each filter that averages as many samples as cover the whole pixel.
+_COVER = {"adaptive": kernels.covering(kernels.cubic_weights)}
 
 _STRIP = 64  # rows, or rows of samples, resampled at a time
 
@@ -34,8 +45,8 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
             f"expects {valid.shape[1]} × {valid.shape[0]}"
         )
     samples = lens_map.settings["samples"]
-    filter_ = FILTERS[lens_map.settings["filter"]]
-    if filter_.sample is None:
+    filter_name = lens_map.settings["filter"]
+    if filter_name == "st_warp":
         yield slice(0, height), _st_warp(source, lens_map)
         return
     step = max(1, _STRIP // samples)
@@ -45,12 +56,18 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
         coordinates = lens_map.coordinates[fine]
         flags = lens_map.flags[fine]
         out = np.empty((*flags.shape, 4), np.float32)
-        if filter_.cover and lens_map.footprints is not None and lens_map.counts is not None:
+        if (
+            filter_name in _COVER
+            and lens_map.footprints is not None
+            and lens_map.counts is not None
+        ):
             footprints = lens_map.footprints[rows]
             counts = lens_map.counts[rows]
-            filter_.cover(source, valid, coordinates, footprints, counts, flags, topology, out)
+            _COVER[filter_name](
+                source, valid, coordinates, footprints, counts, flags, topology, out
+            )
         else:
-            filter_.sample(source, valid, coordinates, flags, topology, out)
+            _SAMPLE[filter_name](source, valid, coordinates, flags, topology, out)
         if samples > 1:
             mean = np.empty((rows.stop - first, width, 4), np.float32)
             kernels.block_mean(out, samples, mean)

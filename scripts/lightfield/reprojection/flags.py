@@ -1,46 +1,49 @@
-"""SILVR's flags, which can replace the settings file of a reprojection.
+"""The flags of scripts/reproject.py and scripts/lens_map.py, as SILVR's tool has them.
 
 Lengths are in mm. Angles of lenses are in radians, or in degrees as in 120deg. A rotation is in
-degrees.
+degrees. `flag_settings` reads them.
 """
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import InstanceOf, TypeAdapter
-
-from lightfield.core.cli import above_zero, refuse_beside_settings, stops, white
-from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
-from lightfield.core.settings import checked, read_settings
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.reprojections import MOST_SAMPLES, ReprojectionSettings
-from lightfield.geometry.lenses import LENSES, Lens
-from lightfield.geometry.lenses.base import named_numbers
-from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.core.cli import above_zero, positive, stops, white
+from lightfield.geometry.lenses import LENSES
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
-# The longest side of an image, or of a cube map's strip of faces.
-MOST_PIXELS = 2**19
 
-
-class FlagSettings(ReprojectionSettings):
-    """Settings with a lens that a scene YAML's camera may not be able to describe.
-
-    Flags give angles in radians. --no-reproject with --scale gives the source's lens in another
-    size.
-    """
-
-    output_lens: InstanceOf[Lens]
-
-    def lens(self, source: Lens) -> Lens:
-        return self.output_lens
+def add_file_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that name files, and those that say how the program runs."""
+    files = parser.add_argument_group("Input and output")
+    source = files.add_mutually_exclusive_group(required=True)
+    source.add_argument("-i", "--input-dir", type=Path, help="folder of the images")
+    source.add_argument("--single", type=Path, metavar="FILE", help="one image")
+    files.add_argument("-o", "--output-dir", type=Path, required=True, help="folder to write to")
+    files.add_argument("--output-cfg", type=Path, metavar="JSON", help="lightfield.json to write")
+    files.add_argument(
+        "--record", type=Path, metavar="JSON", help="list of the files, written last"
+    )
+    files.add_argument(
+        "--source-record", type=Path, metavar="JSON", help="record that the images must match"
+    )
+    files.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
+    choice = parser.add_argument_group("Choice of files")
+    choice.add_argument("--filter-prefix", default="", help="only names that start with this")
+    choice.add_argument("--filter-suffix", default="", help="only names that end with this")
+    choice.add_argument(
+        "--views",
+        metavar="FIRST:END",
+        help="only these frames of --input-cfg, from 0, END excluded",
+    )
+    runtime = parser.add_argument_group("Runtime")
+    runtime.add_argument("--skip-if-exists", action="store_true", help="keep any existing output")
+    runtime.add_argument("-j", "--parallel", type=positive, default=1, help="images at a time")
+    runtime.add_argument("--dry-run", action="store_true", help="write only --output-cfg")
 
 
 def add_configuration_flags(parser: argparse.ArgumentParser) -> None:
-    """Add --settings, and the flags that `read_source` reads."""
+    """Add --settings, and the flags that `flag_settings.read_source` reads."""
     files = parser.add_argument_group("Configuration")
     files.add_argument(
         "--settings",
@@ -139,133 +142,3 @@ def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) ->
         if lens.form:
             choice.add_argument(f"--{prefix}{lens.flag()}", metavar=lens.form, help=lens.title)
     return choice
-
-
-def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
-    """Return the light field and lens that the flags of `add_configuration_flags` describe."""
-    if arguments.no_configs:
-        if arguments.input_cfg:
-            raise UserError("--no-configs: excludes --input-cfg")
-        width, height = _size(arguments.no_configs, "--no-configs")
-        lens = _lens(arguments, "i-", width, height)
-        if lens is None:
-            raise UserError("--no-configs: needs the input lens, one of the flags --i-…")
-        return LightField(lens.to_lightfield(), ()), lens
-    if _lens(arguments, "i-", 6, 1) is not None:
-        raise UserError("--i-…: the input lens comes from --input-cfg; or give --no-configs")
-    if not arguments.input_cfg:
-        raise UserError("--input-cfg: is missing; without one, give --no-configs and --i-…")
-    path: Path = arguments.input_cfg
-    content = read_json(path)
-    if isinstance(content, dict) and "frames" not in content:
-        lightfield = LightField(content, (), path)
-    else:
-        lightfield = LightField.read(path)
-    return lightfield, lightfield.lens
-
-
-def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
-    """Return the settings of a lens map, from --settings or from the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_lens_map_flags)
-        return read_settings(ReprojectionSettings, arguments.settings)
-    return _of_flags(_lens_map_content(arguments, source))
-
-
-def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
-    """Return the settings of a reprojection, from --settings or from the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_reproject_flags)
-        settings = read_settings(ReprojectionSettings, arguments.settings)
-        if not settings.formats:
-            raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
-        return settings
-    content = _lens_map_content(arguments, source)
-    content["formats"] = [name for name in ("exr", "png") if getattr(arguments, name)]
-    if not content["formats"]:
-        raise UserError("--exr, --png: give one of them, or both")
-    for name in ("bits", "exposure", "reinhard", "mask", "passes"):
-        content[name] = getattr(arguments, name)
-    if arguments.depth_png is not None:
-        content["depth_png"] = arguments.depth_png
-    return _of_flags(content)
-
-
-def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
-    return checked(TypeAdapter(FlagSettings), dict(content), "flags")
-
-
-def _lens_map_content(arguments: argparse.Namespace, source: Lens) -> dict[str, Any]:
-    """Return the part of the settings that a lens map depends on."""
-    if not 1 <= arguments.samples <= MOST_SAMPLES:
-        raise UserError(f"--samples {arguments.samples}: must be from 1 to {MOST_SAMPLES}")
-    return {
-        "output_lens": _output_lens(arguments, source),
-        "cube_map": arguments.cubemap is not None,
-        "rotation": _numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL"),
-        # The adaptive filter covers the pixel by itself. With --samples, use SILVR's default.
-        "filter": arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
-        "samples": arguments.samples,
-    }
-
-
-def _output_lens(arguments: argparse.Namespace, source: Lens) -> Lens:
-    width, height = _output_size(arguments, source)
-    if arguments.cubemap is not None:
-        if arguments.no_reproject:
-            raise UserError("--no-reproject: excludes an output lens")
-        if not 1 <= arguments.cubemap <= MOST_PIXELS // 6:
-            raise UserError(
-                f"--cubemap {arguments.cubemap}: must be from 1 to {MOST_PIXELS // 6} pixels"
-            )
-        return CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
-    lens = _lens(arguments, "", width, height)
-    if arguments.no_reproject:
-        if lens is not None:
-            raise UserError("--no-reproject: excludes an output lens")
-        return source.resized(width, height)
-    if lens is None:
-        raise UserError("--rectilinear, …: give the output lens, or --no-reproject")
-    return lens
-
-
-def _output_size(arguments: argparse.Namespace, source: Lens) -> tuple[int, int]:
-    """Return the width and height that --output-resolution or --scale gives."""
-    if arguments.output_resolution:
-        return _size(arguments.output_resolution, "--output-resolution")
-    width = int(source.width * arguments.scale)
-    height = int(source.height * arguments.scale)
-    if min(width, height) < 1:
-        raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
-    if max(width, height) > MOST_PIXELS:
-        raise UserError(f"--scale {arguments.scale:g}: makes a side of over {MOST_PIXELS}")
-    return width, height
-
-
-def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:
-    """Return the lens that a flag gives, at ``width`` × ``height``. None without such a flag."""
-    if prefix and arguments.i_cubemap:
-        return CubeMap(width=width, height=height)
-    attribute_prefix = prefix.replace("-", "_")
-    for lens in LENSES.values():
-        text = getattr(arguments, attribute_prefix + lens.name, None)
-        if text is not None:
-            try:
-                return lens.from_flag(text, width, height)
-            except UserError as error:
-                raise UserError(f"--{prefix}{lens.flag()} {text}: {error}") from None
-    return None
-
-
-def _numbers(text: str, flag: str, form: str) -> list[float]:
-    try:
-        return list(named_numbers(text, form).values())
-    except UserError as error:
-        raise UserError(f"{flag} {text}: {error}") from None
-
-
-def _size(text: str, flag: str) -> tuple[int, int]:
-    width, height = _numbers(text, flag, "WIDTH,HEIGHT")
-    if not all(side.is_integer() and 1 <= side <= MOST_PIXELS for side in (width, height)):
-        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {MOST_PIXELS}")
-    return int(width), int(height)

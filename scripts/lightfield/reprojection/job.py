@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.cli import positive, view_slice
+from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.dataset import lightfield, shard_files
 from lightfield.dataset.lightfield import LightField
@@ -28,35 +28,6 @@ from lightfield.reprojection.lens_map import LensMap
 # The version of the files, which every key has. Raise it if equal settings give other files.
 VERSION = 3
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
-
-
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that name files, and those that say how the program runs."""
-    files = parser.add_argument_group("Input and output")
-    source = files.add_mutually_exclusive_group(required=True)
-    source.add_argument("-i", "--input-dir", type=Path, help="folder of the images")
-    source.add_argument("--single", type=Path, metavar="FILE", help="one image")
-    files.add_argument("-o", "--output-dir", type=Path, required=True, help="folder to write to")
-    files.add_argument("--output-cfg", type=Path, metavar="JSON", help="lightfield.json to write")
-    files.add_argument(
-        "--record", type=Path, metavar="JSON", help="list of the files, written last"
-    )
-    files.add_argument(
-        "--source-record", type=Path, metavar="JSON", help="record that the images must match"
-    )
-    files.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
-    choice = parser.add_argument_group("Choice of files")
-    choice.add_argument("--filter-prefix", default="", help="only names that start with this")
-    choice.add_argument("--filter-suffix", default="", help="only names that end with this")
-    choice.add_argument(
-        "--views",
-        metavar="FIRST:END",
-        help="only these frames of --input-cfg, from 0, END excluded",
-    )
-    runtime = parser.add_argument_group("Runtime")
-    runtime.add_argument("--skip-if-exists", action="store_true", help="keep any existing output")
-    runtime.add_argument("-j", "--parallel", type=positive, default=1, help="images at a time")
-    runtime.add_argument("--dry-run", action="store_true", help="write only --output-cfg")
 
 
 @dataclass(frozen=True)

@@ -169,7 +169,7 @@ def _check_sampling(filter_name: str, samples: int) -> None:
         raise UserError(f"samples: {samples} must be at least 1")
     if filter_name not in FILTERS:
         raise UserError(f"filter: {filter_name!r} is not one of {', '.join(FILTERS)}")
-    if samples > 1 and FILTERS[filter_name].cover:
+    if samples > 1 and FILTERS[filter_name].covers:
         raise UserError(
             f"samples: the {filter_name} filter covers the whole pixel already; leave 1"
         )
@@ -185,7 +185,7 @@ def _measure_pixels(
     each strip of rows. Footprints and counts are empty if every pixel takes one sample.
     """
     reach = FILTERS[filter_name].reach
-    covers = FILTERS[filter_name].cover is not None
+    covers = FILTERS[filter_name].covers
     period = float(source.width) if _topology(source)[0] else 0.0
     # A cube map's face continues by one face at most.
     widest = float(source.height) if isinstance(source, CubeMap) else math.inf
@@ -357,7 +357,7 @@ def warnings(lens_map: LensMap) -> list[str]:
         )
     steps = math.ceil(1 / smallest)
     samples = lens_map.settings["samples"]
-    if not FILTERS[lens_map.settings["filter"]].cover and samples * 1.5 * smallest < 1:
+    if not FILTERS[lens_map.settings["filter"]].covers and samples * 1.5 * smallest < 1:
         texts.append(
             f"aliasing: one target pixel spans up to {1 / smallest:.3g} of the source's; "
             f"--filter adaptive or --samples {steps} helps"
@@ -443,7 +443,7 @@ def _strip_with_borders(source: CubeMap, border: int) -> Array:
     faces = [source.pixels(rays @ rotation.T) for rotation in CUBE_FACES.values()]
     exact = np.concatenate(faces, axis=1)
     strip = exact.astype(np.float32)
-    # Rounding must not move a pixel to the strip's next face, which is no neighbour in space.
+    # Rounding must not move a pixel to the strip's next face, which is not a neighbour in space.
     end = ((np.floor(exact[..., 0] / source.height) + 1) * source.height).astype(np.float32)
     strip[..., 0] = np.minimum(strip[..., 0], np.nextafter(end, np.float32(0)))
     return strip

@@ -64,8 +64,8 @@ def _check_apart(job: Job, views: list[SourceView]) -> None:
             for path in job.files(view, target):
                 if (resolve_folder(path.parent), path.name) in inputs:
                     raise UserError(
-                        f"--output-dir {job.arguments.output_dir}: would replace {path}, which is "
-                        "read; give another folder"
+                        f"--output-dir {job.arguments.output_dir}: would replace the input {path}; "
+                        "give another folder"
                     )
 
 

@@ -1,1 +1,1 @@
-"""Views from anywhere in a light field, made of the nearest of its views and their depth."""
+"""Synthesises views from anywhere in a light field, from its nearest views and their depth."""

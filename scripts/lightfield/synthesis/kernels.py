@@ -1,8 +1,8 @@
-"""The loops of view synthesis: where a surface tears, how it is drawn, how drawings are blended.
+"""The loops of view synthesis: they tear surfaces, draw them, blend the drawings, and fill holes.
 
-A view is a surface: a vertex at each pixel's centre, a triangle between neighbours that belong
-together. Pixels beside a tear are drawn one by one, too, as large as they are. ``inverse`` is
-1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray.
+A view becomes a surface. It has a vertex at each pixel's centre, and triangles between neighbours
+on one surface. Pixels beside a tear are also drawn one by one, at their own size. ``inverse`` is
+1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray. A larger inverse is nearer.
 """
 
 import math
@@ -13,29 +13,28 @@ import numpy as np
 from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
-# Neighbours that differ in inverse distance more than a surface does that is seen at the steepest
-# angle are one surface, even so, if their next neighbours differ nearly as much: on a plane the
-# inverse distance changes evenly.
+# On a plane the inverse distance changes evenly. So a large step between neighbours is a surface
+# too, if the steps before and after it differ from it by less than this part.
 EVEN = np.float32(0.5)
-# Drawings at one pixel are of one surface if their inverse distances differ by less than this part.
+# Drawings at a pixel show one surface if their inverse distances differ by less than this part.
 SAME = np.float32(0.03)
-# What is farther than a surface by this part is hidden by it; in between, it counts less and less.
+# A surface hides what is farther by this part. Between SAME and HIDDEN the weight falls to 0.
 HIDDEN = np.float32(0.1)
-# A surface hides what is behind it if its vertices are at least so certain.
+# A surface hides what is behind it if its vertices have at least this certainty.
 CERTAIN = np.float32(0.5)
-# Added to roots of colours before they are inverted, so that black has an inverse.
+# Added to the roots of colours before inverting them, so that black has an inverse.
 DARK = np.float32(0.03)
-# What is this small, in 1/m, is as far as the sky.
+# An inverse distance this small, in 1/m, counts as that of the sky.
 FAR = np.float32(1e-4)
-# A triangle that is larger than this part of the picture is an artefact at a lens's rim.
+# A triangle larger than this part of the picture is an artefact at a lens's rim.
 LARGEST = np.float32(0.25)
-# Of a triangle's width times its height: rounding moves its edges by no more.
+# Rounding moves a triangle's edges by at most this part of its width times its height.
 ROUNDING = np.float32(1e-6)
 
 
 @kernel
 def _is_one_surface(before: Any, a: Any, b: Any, after: Any, step_part: Any) -> bool:
-    """Whether two neighbours ``a`` and ``b`` in a row of inverse distances are of one surface."""
+    """Return whether two neighbours ``a`` and ``b`` in a row of inverses are on one surface."""
     step = b - a
     if not abs(step) < np.inf:
         return False
@@ -51,9 +50,9 @@ def _is_one_surface(before: Any, a: Any, b: Any, after: Any, step_part: Any) -> 
 
 @kernel
 def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> None:
-    """Mark the vertices (h, w) that are of one surface with the next to the right, and below.
+    """Mark the vertices (h, w) that share a surface with their right and their lower neighbour.
 
-    ``steepest`` is the part by which inverse distances of neighbours on one surface may differ.
+    ``steepest`` is the part by which the inverses of neighbours on one surface may differ.
     """
     height, width = inverse.shape
     nan = np.float32(np.nan)
@@ -73,14 +72,14 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 
 @kernel
 def _signed_weight(certainty: Any, worth: Any) -> Any:
-    """Return the weight of a drawn pixel, negative if it hides nothing behind it."""
+    """Return the weight of a drawn pixel. It is negative if the pixel hides nothing behind it."""
     weight = certainty * worth
     return weight if certainty >= CERTAIN else -weight
 
 
 @kernel
 def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
-    """Draw a triangle around a panorama's pole where nothing is drawn yet, in one colour."""
+    """Draw a triangle around a panorama's pole in one colour, where nothing is drawn yet."""
     height, width = inverse.shape
     first = 0
     end = min(int(bottom + np.float32(0.5)), height)
@@ -102,7 +101,7 @@ def _draw_triangle(
 ) -> None:
     """Draw a triangle where nothing nearer is drawn yet.
 
-    ``corners`` (3, 2) are pixels, ``values`` (3, 6) inverse distance, R, G, B, certainty, worth.
+    ``corners`` (3, 2) are in pixels. ``values`` (3, 6) are inverse, R, G, B, certainty and worth.
     """
     height, width = inverse.shape
     zero, half = np.float32(0), np.float32(0.5)
@@ -110,7 +109,7 @@ def _draw_triangle(
     x1, y1 = corners[1, 0], corners[1, 1]
     x2, y2 = corners[2, 0], corners[2, 1]
     if wraps:
-        # The shorter of the two paths around.
+        # Take the shorter of the two ways around.
         turn = np.float32(width)
         x1 -= turn * np.rint((x1 - x0) / turn)
         x2 -= turn * np.rint((x2 - x0) / turn)
@@ -118,14 +117,14 @@ def _draw_triangle(
             _draw_pole(min(y0, y1, y2), max(y0, y1, y2), values, inverse, drawn)
             return
     area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-    # Y points down: what was counterclockwise in the source is so here, or is seen from behind.
+    # Skip triangles seen from behind: they turn the other way round.
     if not area > 0:
         return
     left, right = min(x0, x1, x2), max(x0, x1, x2)
     top, bottom = min(y0, y1, y2), max(y0, y1, y2)
     if right - left > LARGEST * width or bottom - top > LARGEST * height:
         return
-    # A pixel's centre on an edge that two triangles share must be in one of them.
+    # A centre on an edge that two triangles share must lie in at least one of them.
     rounding = ROUNDING * (right - left) * (bottom - top)
     first = math.ceil(left - half)
     last = math.floor(right - half)
@@ -145,9 +144,9 @@ def _draw_triangle(
             total = w0 + w1 + w2
             w0, w1, w2 = w0 / total, w1 / total, w2 / total
             j = column % width if wraps else column
-            near = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
-            if near > inverse[i, j]:
-                inverse[i, j] = near
+            nearness = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
+            if nearness > inverse[i, j]:
+                inverse[i, j] = nearness
                 for c in range(3):
                     drawn[i, j, c] = (
                         w0 * values[0, c + 1] + w1 * values[1, c + 1] + w2 * values[2, c + 1]
@@ -169,10 +168,12 @@ def draw(
 ) -> None:
     """Draw a surface whose vertices (h, w) fall on ``pixels`` (h, w, 2).
 
-    ``values`` (h, w, 6) are as in `_draw_triangle`. ``inverse`` (H, W) is the inverse distance of
-    what is drawn, −1 where nothing is. ``drawn`` (H, W, 4) is R, G, B, and the weight: certainty
-    times worth, negative if the pixel hides nothing. ``wraps`` is whether the picture's left edge
-    continues its right one.
+    - ``values`` (h, w, 6): as in `_draw_triangle`.
+    - ``right``, ``down`` (h, w): as `link` marks them.
+    - ``wraps``: whether the picture's left edge continues its right one.
+    - ``inverse`` (H, W): that of what is drawn, −1 where nothing is drawn yet.
+    - ``drawn`` (H, W, 4): R, G, B and the weight, which is certainty times worth. The weight is
+      negative if the pixel hides nothing behind it.
     """
     height, width = pixels.shape[:2]
     corners = np.empty((3, 2), np.float32)
@@ -180,14 +181,14 @@ def draw(
     for i in range(height - 1):
         for j in range(width - 1):
             for lower in range(2):
-                # Of a quad, the triangle left above and the one right below.
+                # A quad has an upper left and a lower right triangle.
                 if lower:
-                    whole = right[i + 1, j] and down[i, j + 1]
+                    is_joined = right[i + 1, j] and down[i, j + 1]
                     places = ((i, j + 1), (i + 1, j + 1), (i + 1, j))
                 else:
-                    whole = right[i, j] and down[i, j]
+                    is_joined = right[i, j] and down[i, j]
                     places = ((i, j), (i, j + 1), (i + 1, j))
-                if not whole:
+                if not is_joined:
                     continue
                 for k in range(3):
                     row, column = places[k]
@@ -198,9 +199,9 @@ def draw(
 
 @kernel
 def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
-    """Draw single pixels of a view, whose corners (n, 4, 2) run clockwise from the upper left.
+    """Draw single pixels of a view. Their corners (n, 4, 2) run clockwise from the upper left.
 
-    ``values`` (n, 6) and the others are as in `draw`.
+    ``values`` (n, 6) are as in `_draw_triangle`, the other arguments as in `draw`.
     """
     corners = np.empty((3, 2), np.float32)
     corner_values = np.empty((3, 6), np.float32)
@@ -215,9 +216,10 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
 @kernel
 def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: Array) -> None:
-    """Subtract from each colour (h, w, 3) ``amount`` / 4 of its neighbours' differences from it.
+    """Write the sharpened colours of ``root`` (h, w, 3) into ``sharp``.
 
-    Only neighbours on one surface count, as `link` marks them.
+    Subtracts ``amount`` / 4 of each neighbour's difference. Only neighbours on one surface count,
+    as `link` marks them.
     """
     height, width = right.shape
     part = amount / np.float32(4)
@@ -225,55 +227,58 @@ def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: A
         for j in range(width):
             for c in range(3):
                 here = root[i, j, c]
-                apart = np.float32(0)
+                difference = np.float32(0)
                 if right[i, j]:
-                    apart += root[i, j + 1, c] - here
+                    difference += root[i, j + 1, c] - here
                 if j > 0 and right[i, j - 1]:
-                    apart += root[i, j - 1, c] - here
+                    difference += root[i, j - 1, c] - here
                 if down[i, j]:
-                    apart += root[i + 1, j, c] - here
+                    difference += root[i + 1, j, c] - here
                 if i > 0 and down[i - 1, j]:
-                    apart += root[i - 1, j, c] - here
-                sharp[i, j, c] = max(here - part * apart, np.float32(0))
+                    difference += root[i - 1, j, c] - here
+                sharp[i, j, c] = max(here - part * difference, np.float32(0))
 
 
 @kernel
-def _hidden_part(near: Any, front: Any) -> Any:
-    """Return how much of what is drawn at ``near`` a surface at ``front`` hides, from 0 to 1."""
-    behind = (front - near) / max(front, FAR)
+def _hidden_part(nearness: Any, front: Any) -> Any:
+    """Return how much a surface at ``front`` hides a drawing at ``nearness``, 0 to 1.
+
+    Both are inverse distances.
+    """
+    behind = (front - nearness) / max(front, FAR)
     return min(max((behind - SAME) / (HIDDEN - SAME), np.float32(0)), np.float32(1))
 
 
 @kernel
 def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: Array) -> Any:
-    """Add a sample's colour to ``light`` (3,); return its inverse distance, −1 if none sees it.
+    """Add a sample's colour to ``light`` (3,). Return its inverse distance, −1 if none sees it.
 
-    A weight is that of the drawing, divided by the squared distance: what is near hides what is
-    far, but at an edge no view alone decides what is near. Where a view is certain of a surface, it
-    hides what is behind. Colours are summed as the inverses of their roots: a highlight that one
-    view sees counts little.
+    A drawing's weight is divided by its squared distance. So near surfaces count most, but no
+    single view decides at an edge. A surface of which a view is certain hides what is behind it.
+    Colours are summed as the inverses of their roots, so that a highlight in one view counts
+    little.
     """
     count = len(inverses)
     nearest = front = np.float32(-1)
     for k in range(count):
-        near = inverses[k, row, column]
-        nearest = max(nearest, near)
+        nearness = inverses[k, row, column]
+        nearest = max(nearest, nearness)
         if drawn[k, row, column, 3] > 0:
-            front = max(front, near)
+            front = max(front, nearness)
     if nearest < 0:
         return nearest
     total = red = green = blue = np.float32(0)
-    parts = mean = np.float32(0)
+    nearness_weight = nearness_sum = np.float32(0)
     slack = max(SAME * nearest, FAR)
     for k in range(count):
-        near = inverses[k, row, column]
-        if near < 0:
+        nearness = inverses[k, row, column]
+        if nearness < 0:
             continue
         weight = abs(drawn[k, row, column, 3])
-        if near >= nearest - slack:
-            parts += weight
-            mean += weight * near
-        weight *= max(near, FAR) * max(near, FAR) * (1 - _hidden_part(near, front))
+        if nearness >= nearest - slack:
+            nearness_weight += weight
+            nearness_sum += weight * nearness
+        weight *= max(nearness, FAR) * max(nearness, FAR) * (1 - _hidden_part(nearness, front))
         red += weight / (drawn[k, row, column, 0] + DARK)
         green += weight / (drawn[k, row, column, 1] + DARK)
         blue += weight / (drawn[k, row, column, 2] + DARK)
@@ -281,94 +286,97 @@ def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: A
     light[0] += (total / red - DARK) ** 2
     light[1] += (total / green - DARK) ** 2
     light[2] += (total / blue - DARK) ** 2
-    return mean / parts
+    return nearness_sum / nearness_weight
 
 
 @kernel
-def _second(a: Any, b: Any, c: Any, d: Any) -> Any:
+def _second_largest(a: Any, b: Any, c: Any, d: Any) -> Any:
     """Return the second largest of four numbers."""
     return max(min(max(a, b), max(c, d)), min(a, b), min(c, d))
 
 
 @kernel
-def _of_one_surface(nears: Array) -> Any:
-    """Return the mean of those inverse distances (4,) that are of one surface, −1 being none.
+def _surface_inverse(samples: Array) -> Any:
+    """Return the mean of the inverse distances (4,) on the surface of the second nearest.
 
-    It is that of the second nearest: distances are not blended across an edge.
+    −1 stands for none. Other surfaces do not count, because distances must not blend across an
+    edge.
     """
-    middle = _second(nears[0], nears[1], nears[2], nears[3])
+    middle = _second_largest(samples[0], samples[1], samples[2], samples[3])
     if middle < 0:
-        middle = max(nears[0], nears[1], nears[2], nears[3])
-    mean = number = np.float32(0)
+        middle = max(samples[0], samples[1], samples[2], samples[3])
+    total = number = np.float32(0)
     for k in range(4):
-        if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
-            mean += nears[k]
+        if samples[k] >= 0 and abs(samples[k] - middle) <= max(SAME * middle, FAR):
+            total += samples[k]
             number += 1
-    return mean / number
+    return total / number
 
 
 @kernel
-def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, seen: Array) -> None:
-    """Blend drawings (n, 2h, 2w), as `draw` makes them, to ``colour`` (h, w, 3).
+def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, coverage: Array) -> None:
+    """Blend the drawings (n, 2h, 2w) of `draw` into ``colour`` (h, w, 3).
 
-    A pixel is the mean of 2 × 2 samples. ``inverse`` (h, w) is its inverse distance, ``seen``
-    (h, w) the part of its samples that any of the n views sees.
+    A pixel is the mean of 2 × 2 samples. ``inverse`` (h, w) gets its inverse distance. ``coverage``
+    (h, w) gets the part of its samples that any of the n views sees.
     """
-    height, width = seen.shape
-    nears = np.empty(4, np.float32)
+    height, width = coverage.shape
+    samples = np.empty(4, np.float32)
     light = np.empty(3, np.float32)
     for i in range(height):
         for j in range(width):
             count = 0
             light[:] = 0
             for k in range(4):
-                nears[k] = _blend_sample(inverses, drawn, 2 * i + k // 2, 2 * j + k % 2, light)
-                if nears[k] >= 0:
+                samples[k] = _blend_sample(inverses, drawn, 2 * i + k // 2, 2 * j + k % 2, light)
+                if samples[k] >= 0:
                     count += 1
-            seen[i, j] = np.float32(0.25) * count
+            coverage[i, j] = np.float32(0.25) * count
             if count == 0:
                 colour[i, j] = inverse[i, j] = np.nan
                 continue
             for c in range(3):
                 colour[i, j, c] = light[c] / count
-            inverse[i, j] = _of_one_surface(nears)
+            inverse[i, j] = _surface_inverse(samples)
 
 
 @kernel
 def shrink(
     colour: Array,
     inverse: Array,
-    seen: Array,
+    coverage: Array,
     small: Array,
     small_inverse: Array,
-    small_seen: Array,
+    small_coverage: Array,
 ) -> None:
-    """Average 2 × 2 pixels to one of the next coarser level: what is behind counts most.
+    """Average 2 × 2 pixels to one of the next coarser level. The farthest pixels count most.
 
-    ``seen`` (h, w) is how much is known of a pixel, from 0 to 1.
+    ``coverage`` (h, w) is the weight of each pixel, from 0 for a hole to 1.
     """
-    height, width = seen.shape
-    for i in range(small_seen.shape[0]):
-        for j in range(small_seen.shape[1]):
+    height, width = coverage.shape
+    for i in range(small_coverage.shape[0]):
+        for j in range(small_coverage.shape[1]):
             behind = np.float32(np.inf)
             for row in range(2 * i, min(2 * i + 2, height)):
                 for column in range(2 * j, min(2 * j + 2, width)):
-                    if seen[row, column] > 0:
+                    if coverage[row, column] > 0:
                         behind = min(behind, inverse[row, column] + FAR)
-            total = parts = near = red = green = blue = np.float32(0)
+            total = coverage_sum = inverse_sum = red = green = blue = np.float32(0)
             for row in range(2 * i, min(2 * i + 2, height)):
                 for column in range(2 * j, min(2 * j + 2, width)):
-                    if seen[row, column] > 0:
-                        weight = seen[row, column] * (behind / (inverse[row, column] + FAR)) ** 2
+                    if coverage[row, column] > 0:
+                        weight = (
+                            coverage[row, column] * (behind / (inverse[row, column] + FAR)) ** 2
+                        )
                         total += weight
-                        parts += seen[row, column]
-                        near += weight * inverse[row, column]
+                        coverage_sum += coverage[row, column]
+                        inverse_sum += weight * inverse[row, column]
                         red += weight * colour[row, column, 0]
                         green += weight * colour[row, column, 1]
                         blue += weight * colour[row, column, 2]
-            small_seen[i, j] = min(parts, np.float32(1))
+            small_coverage[i, j] = min(coverage_sum, np.float32(1))
             if total > 0:
-                small_inverse[i, j] = near / total
+                small_inverse[i, j] = inverse_sum / total
                 small[i, j, 0] = red / total
                 small[i, j, 1] = green / total
                 small[i, j, 2] = blue / total
@@ -376,19 +384,19 @@ def shrink(
 
 @kernel
 def enlarge(
-    small: Array, small_inverse: Array, wraps: bool, colour: Array, inverse: Array, seen: Array
+    small: Array, small_inverse: Array, wraps: bool, colour: Array, inverse: Array, coverage: Array
 ) -> None:
-    """Fill pixels of which not all is known from the next coarser level, which is full.
+    """Fill pixels with ``coverage`` below 1 from the next coarser level, which has no holes.
 
-    Of the four nearest coarse pixels, what is behind counts most, as in `shrink`.
+    Each takes its four nearest coarse pixels. The farthest count most, as in `shrink`.
     """
-    height, width = seen.shape
+    height, width = coverage.shape
     rows, columns = small_inverse.shape
     one, near_part, far_part = np.float32(1), np.float32(0.75), np.float32(0.25)
     for i in range(height):
         for j in range(width):
-            known = seen[i, j]
-            if known >= one:
+            covered = coverage[i, j]
+            if covered >= one:
                 continue
             row, column = i // 2, j // 2
             other_row = min(max(row + 2 * (i % 2) - 1, 0), rows - 1)
@@ -396,22 +404,22 @@ def enlarge(
             if wraps:
                 other_column %= columns
             other_column = min(max(other_column, 0), columns - 1)
-            total = near = red = green = blue = np.float32(0)
+            total = inverse_sum = red = green = blue = np.float32(0)
             for k in range(4):
                 y = other_row if k // 2 else row
                 x = other_column if k % 2 else column
                 weight = (far_part if k // 2 else near_part) * (far_part if k % 2 else near_part)
                 weight /= (small_inverse[y, x] + FAR) ** 2
                 total += weight
-                near += weight * small_inverse[y, x]
+                inverse_sum += weight * small_inverse[y, x]
                 red += weight * small[y, x, 0]
                 green += weight * small[y, x, 1]
                 blue += weight * small[y, x, 2]
-            if known == 0:
+            if covered == 0:
                 colour[i, j] = inverse[i, j] = np.float32(0)
-            rest = one - known
-            inverse[i, j] = known * inverse[i, j] + rest * near / total
-            colour[i, j, 0] = known * colour[i, j, 0] + rest * red / total
-            colour[i, j, 1] = known * colour[i, j, 1] + rest * green / total
-            colour[i, j, 2] = known * colour[i, j, 2] + rest * blue / total
-            seen[i, j] = one
+            rest = one - covered
+            inverse[i, j] = covered * inverse[i, j] + rest * inverse_sum / total
+            colour[i, j, 0] = covered * colour[i, j, 0] + rest * red / total
+            colour[i, j, 1] = covered * colour[i, j, 1] + rest * green / total
+            colour[i, j, 2] = covered * colour[i, j, 2] + rest * blue / total
+            coverage[i, j] = one

@@ -1,9 +1,9 @@
-"""A view from anywhere: the surfaces that the best of a dataset's views see, drawn and blended.
+"""Synthesises a view from anywhere: draws the surfaces of the best views, and blends them.
 
-Each of the chosen views is drawn as a surface that is torn where depth jumps. At each of 2 × 2
-samples a pixel, the views are blended by angle and distance, as in Buehler et al. 2001,
-"Unstructured Lumigraph Rendering". Pixels that no view sees are marked, and filled with what is
-around and behind them (push-pull: Gortler et al. 1996, "The Lumigraph").
+Each chosen view is drawn as a surface that is torn where depth jumps. The drawings are blended by
+angle and distance, at 2 × 2 samples a pixel, as in Buehler et al. 2001, "Unstructured Lumigraph
+Rendering". Pixels that no view sees are marked as holes. They are filled from their surroundings,
+mostly from the background (push-pull: Gortler et al. 1996, "The Lumigraph").
 """
 
 from collections import OrderedDict
@@ -22,24 +22,22 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 from lightfield.synthesis import kernels
+from lightfield.synthesis.defaults import BEST
 
-# So many views a picture is made of, where nothing else is said.
-BEST = 6
-# A view is chosen by how well it sees points in so many directions across and down the picture, at
-# two distances that are typical of the scene.
+# Views are chosen by how well they see points in this many directions across and down the picture,
+# at two distances that are typical of the scene.
 DIRECTIONS = 12
-# Of a source's penalty: the weight of its distance from the surface beside that of its angle.
+# The weight of a view's distance from the surface in its penalty. Its angle has the weight 1.
 DISTANCE = 0.1
-# An angle in radians that is as good as none.
+# Added to the penalty: an angle in radians that is hardly worse than none.
 SHARP = 0.05
-# The tangent of the angle of incidence beyond which neighbours are taken for different surfaces.
+# Neighbours count as different surfaces beyond the angle of incidence with this tangent.
 STEEPEST = 6.0
-# Vertices beside a tear have the colour of two surfaces: they count less, and most where nothing
-# else is.
+# Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
 TORN_WEIGHT = 0.1
-# Towards its edge, over so many pixels, a view counts less and less: its edge is not seen.
+# A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
 RIM = 12
-# So much of a colour's difference from its neighbours is added to it: interpolation takes it away.
+# Sharpens a view's colours by this amount, because interpolation will blur them.
 SHARPENED = 0.7
 # Samples across and down a pixel.
 SAMPLES = 2
@@ -47,11 +45,12 @@ SAMPLES = 2
 
 @dataclass(frozen=True)
 class Synthesised:
-    """A picture: linear ``colour`` (h, w, 3); ``distance`` (h, w) in metres, inf where nothing was
-    hit, NaN in holes; ``holes`` (h, w), which pixels no view sees, or the lens does not.
+    """A synthesised picture.
 
-    Holes that the lens sees have the colour of what is around and behind them, or are black; others
-    are NaN. If no view sees anything, all are black.
+    - ``colour`` (h, w, 3): linear. Holes that the lens sees are filled or black, others are NaN. If
+      no view sees anything, all are black.
+    - ``distance`` (h, w): in metres, inf where nothing was hit, NaN in holes.
+    - ``holes`` (h, w): the pixels that no view sees, or that the lens does not see.
     """
 
     colour: Array
@@ -63,21 +62,24 @@ class Synthesised:
         return float(self.holes[np.isfinite(rays[..., 0])].mean())
 
     def channels(self, depth: str, rays: Array) -> dict[str, Array]:
-        """Return R, G, B, A and Z, which is "z" or "distance", as an EXR has them."""
+        """Return an EXR's channels R, G, B, A and Z. ``depth``, "z" or "distance", is Z's kind."""
         with np.errstate(over="ignore"):
             colour = np.nan_to_num(self.colour.clip(max=images.HALF_MAX)).astype(np.float16)
         distance = z_from_distance(self.distance, rays) if depth == "z" else self.distance
-        named = dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True))
-        return named | {"A": (~self.holes).astype(np.float16), "Z": distance.astype(np.float32)}
+        channels = dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True))
+        return channels | {"A": (~self.holes).astype(np.float16), "Z": distance.astype(np.float32)}
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A view as it is drawn: ``inverse`` distance (h, w), the ``root`` of colour (h, w, 3), and
-    ``certainty`` (h, w), how much each vertex counts.
+    """A view as a surface with a vertex for each pixel.
 
-    ``right`` and ``down`` (h, w) are where neighbours are of one surface. The vertices ``torn``
-    (h, w) have one that is not; ``corners`` (n, 4, 3) are the rays of their pixels' corners.
+    - ``inverse`` (h, w): 1 / distance.
+    - ``root`` (h, w, 3): the sharpened root of the colour.
+    - ``certainty`` (h, w): how much each vertex counts.
+    - ``right``, ``down`` (h, w): whether the right and the lower neighbour are on the same surface.
+    - ``torn`` (h, w): the vertices beside a tear.
+    - ``corners`` (n, 4, 3): the rays of the corners of the n torn pixels.
     """
 
     inverse: Array
@@ -93,7 +95,10 @@ Reader = Callable[[View], tuple[Array, Array]]
 
 
 def reader(source: SourceDataset) -> Reader:
-    """Return what reads views of a dataset for `Sources`; raises `UserError` without depth."""
+    """Return the function that reads a dataset's views for `Sources`.
+
+    Raises `UserError` if the dataset has no depth.
+    """
     if source.lightfield.depth is None:
         raise UserError(f"{source.lightfield.path}: depth: is null; a synthesis needs it")
 
@@ -105,10 +110,11 @@ def reader(source: SourceDataset) -> Reader:
 
 
 class Sources:
-    """The ``views`` that pictures are made of, through one ``lens``; ``most`` are held in memory.
+    """The ``views`` that pictures are made of, all with the same ``lens``.
 
-    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres. Holes are
-    black unless ``fills_holes``: what views without a background do not see is most often nothing.
+    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres. At most
+    ``most`` views stay in memory. Without ``fills_holes`` holes stay black. That suits views
+    without a background, which have nothing in most holes.
     """
 
     def __init__(
@@ -130,16 +136,17 @@ class Sources:
 
     @cached_property
     def rays(self) -> Array:
+        """The rays (h, w, 3) of the lens's pixels."""
         return self.lens.pixel_rays().astype(np.float32)
 
     @cached_property
     def distances(self) -> Array:
-        """Those that are typical of what some of the views see."""
-        some = range(0, len(self.views), max(1, len(self.views) // 4))
-        return typical(np.concatenate([self.surface(index).inverse.ravel() for index in some]))
+        """Two distances in metres that are typical of the scene, from some of the views."""
+        sample = range(0, len(self.views), max(1, len(self.views) // 4))
+        return typical(np.concatenate([self.surface(index).inverse.ravel() for index in sample]))
 
     def surface(self, index: int) -> Surface:
-        """Return a view as a surface, from memory if it was one of the last."""
+        """Return a view as a surface. Keeps the latest views in memory."""
         if index not in self._held:
             self._held[index] = self._surface(*self.read(self.views[index]))
             if len(self._held) > self.most:
@@ -154,12 +161,12 @@ class Sources:
         right = np.empty(inverse.shape, bool)
         down = np.empty(inverse.shape, bool)
         kernels.link(inverse, steepest(self.lens), right, down)
-        torn = np.isfinite(inverse) & ~_is_amid(right, down)
+        torn = np.isfinite(inverse) & ~_has_all_triangles(right, down)
         certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
         kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
-        # Sharpened, the mixed colours beside a tear would be farther from those of their surface.
+        # Sharpening would move the mixed colours beside a tear away from those of their surface.
         sharp[torn] = root[torn]
         row, column = np.nonzero(torn)
         corners = self.lens.rays(
@@ -173,11 +180,11 @@ class Sources:
         return to_rim(self.lens)
 
     def best(self, target: Array, lens: Lens, count: int) -> list[int]:
-        """Return the ``count`` views that together see best what a ``target`` (4, 4) looks at.
+        """Return the ``count`` views that together best see what a ``target`` (4, 4) looks at.
 
-        One after the other is taken that adds most to the sum over all directions, by a logarithm
-        of what the views taken so far are worth there: to see all directions counts for more than
-        to see some of them perfectly.
+        Repeatedly takes the view that adds most. The gain is summed over all directions. It is the
+        logarithm of what the views taken so far are worth there. So seeing all directions counts
+        more than seeing some of them perfectly.
         """
         x = (np.arange(DIRECTIONS) + 0.5) * lens.width / DIRECTIONS
         y = (np.arange(DIRECTIONS) + 0.5) * lens.height / DIRECTIONS
@@ -188,8 +195,8 @@ class Sources:
         quality = np.zeros((len(self.views), len(points)))
         for index, matrix in enumerate(self.matrices):
             offset = points - matrix[:3, 3]
-            _, _, seen = pixel_indices(self.lens, offset @ matrix[:3, :3])
-            quality[index] = np.where(seen, 1 / penalty(away, offset), 0)
+            _, _, is_seen = pixel_indices(self.lens, offset @ matrix[:3, :3])
+            quality[index] = np.where(is_seen, 1 / penalty(away, offset), 0)
         chosen: list[int] = []
         worth = np.zeros(len(points))
         for _ in range(min(count, len(self.views))):
@@ -214,11 +221,11 @@ class Sources:
             self._draw(surface, self.matrices[index], target, fine, inverses[place], drawn[place])
         colour = np.empty((lens.height, lens.width, 3), np.float32)
         inverse = np.empty((lens.height, lens.width), np.float32)
-        seen = np.empty((lens.height, lens.width), np.float32)
-        kernels.blend(inverses, drawn, colour, inverse, seen)
+        coverage = np.empty((lens.height, lens.width), np.float32)
+        kernels.blend(inverses, drawn, colour, inverse, coverage)
         outside = np.isnan(lens.pixel_rays()[..., 0])
-        seen[outside] = 0
-        holes = seen == 0
+        coverage[outside] = 0
+        holes = coverage == 0
         inverse[holes] = np.nan
         with np.errstate(divide="ignore"):
             distance = 1 / inverse
@@ -238,11 +245,14 @@ class Sources:
         inverse: Array,
         drawn: Array,
     ) -> None:
-        """Draw what a view ``here`` (4, 4) sees; ``inverse`` and ``drawn`` as in `kernels.draw`."""
+        """Draw the surface of a view with the pose ``here`` (4, 4), seen from ``target`` (4, 4).
+
+        Writes ``inverse`` and ``drawn`` as `kernels.draw` does.
+        """
         wraps = _wraps(lens)
-        pixels, seen = self._projected(self.rays, surface.inverse, here, target, lens)
-        length = np.linalg.norm(seen, axis=-1)
-        worth = 1 / penalty(seen, self.rays @ _turn(here)) ** 2
+        pixels, offsets = self._projected(self.rays, surface.inverse, here, target, lens)
+        length = np.linalg.norm(offsets, axis=-1)
+        worth = 1 / penalty(offsets, self.rays @ _turn(here)) ** 2
         values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
         values = values.astype(np.float32, copy=False)
         kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)
@@ -256,51 +266,51 @@ class Sources:
     ) -> tuple[Array, Array]:
         """Return the pixels (..., 2) of points at 1 / ``inverse`` (...) along ``rays`` (..., 3).
 
-        And the points as the target sees them, in units of their distances ``here``, so that
-        infinity is a number as any.
+        Also returns the vectors from the target to the points. Their unit is the point's distance
+        from ``here``, so that infinitely far points need no special case.
         """
         offset = (here[:3, 3] - target[:3, 3]).astype(np.float32)
-        seen = rays @ _turn(here) + inverse[..., None] * offset
-        pixels: Array = lens.pixels(seen @ _turn(target).T)
-        return pixels.astype(np.float32, copy=False), seen
+        offsets = rays @ _turn(here) + inverse[..., None] * offset
+        pixels: Array = lens.pixels(offsets @ _turn(target).T)
+        return pixels.astype(np.float32, copy=False), offsets
 
 
-def fill(colour: Array, inverse: Array, seen: Array, wraps: bool) -> None:
-    """Fill pixels of which only a part, or nothing, is ``seen`` (h, w) from coarser levels.
+def fill(colour: Array, inverse: Array, coverage: Array, wraps: bool) -> None:
+    """Fill pixels with ``coverage`` (h, w) below 1 from coarser levels.
 
-    ``colour`` (h, w, 3) and ``inverse`` (h, w), the inverse distance, are filled in place. Source:
-    Gortler et al. 1996, section 3.4; what is behind a hole's edge counts more than what is before.
+    Fills ``colour`` (h, w, 3) and ``inverse`` (h, w), the inverse distance, in place. Source:
+    Gortler et al. 1996, section 3.4. Unlike there, the background counts more than the foreground.
     """
-    if (seen >= 1).all():
+    if (coverage >= 1).all():
         return
-    if seen.size == 1:
-        colour[seen == 0] = inverse[seen == 0] = 0
+    if coverage.size == 1:
+        colour[coverage == 0] = inverse[coverage == 0] = 0
         return
-    shape = tuple(-(-side // 2) for side in seen.shape)
+    shape = tuple(-(-side // 2) for side in coverage.shape)
     small, small_inverse = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
-    small_seen = np.zeros(shape, np.float32)
-    kernels.shrink(colour, inverse, seen, small, small_inverse, small_seen)
-    fill(small, small_inverse, small_seen, wraps)
-    kernels.enlarge(small, small_inverse, wraps, colour, inverse, seen)
+    small_coverage = np.zeros(shape, np.float32)
+    kernels.shrink(colour, inverse, coverage, small, small_inverse, small_coverage)
+    fill(small, small_inverse, small_coverage, wraps)
+    kernels.enlarge(small, small_inverse, wraps, colour, inverse, coverage)
 
 
 def typical(inverse: Array) -> Array:
-    """Return two distances in metres: a quarter and three quarters of ``inverse`` are nearer."""
+    """Return the two distances in metres at the upper and the lower quartile of ``inverse``."""
     distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
     return distances
 
 
 def _turn(matrix: Array) -> Array:
-    """Return what turns a camera's vectors (..., 3), as rows, into the world's."""
+    """Return the matrix (3, 3) by which a camera's row vectors become the world's."""
     return np.asarray(matrix[:3, :3].T, np.float32)
 
 
 def to_rim(lens: Lens) -> Array:
-    """Return how far each pixel (h, w) is from the edge of what a lens sees: 0 to 1, in `RIM`."""
-    seen = np.pad(np.isfinite(lens.pixel_rays()[..., 0]), 1, constant_values=_wraps(lens))
+    """Return each pixel's distance (h, w) from the image circle's edge, in `RIM`, at most 1."""
+    is_seen = np.pad(np.isfinite(lens.pixel_rays()[..., 0]), 1, constant_values=_wraps(lens))
     pixels: Array = (
-        distance_transform_cdt(seen)[1:-1, 1:-1]
-        if not seen.all()
+        distance_transform_cdt(is_seen)[1:-1, 1:-1]
+        if not is_seen.all()
         else np.full((lens.height, lens.width), RIM)
     )
     return (pixels / RIM).clip(max=1)
@@ -317,35 +327,38 @@ def steepest(lens: Lens) -> np.float32:
     return np.float32(STEEPEST * pixel_angle(lens))
 
 
-def penalty(seen: Array, source: Array) -> Array:
-    """Return how unlike (...) a point looks from a source that sees it along ``source`` (..., 3).
+def penalty(from_target: Array, from_view: Array) -> Array:
+    """Return how differently (...) a target and a view see a point. Less is better.
 
-    ``seen`` (..., 3) is from the target's camera to the point, in the same unit.
+    The vectors (..., 3) lead from the target's and from the view's camera to the point, in the same
+    unit.
     """
-    here = np.linalg.norm(seen, axis=-1)
-    there = np.linalg.norm(source, axis=-1)
+    target_distance = np.linalg.norm(from_target, axis=-1)
+    view_distance = np.linalg.norm(from_view, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        angle = np.linalg.norm(seen / here[..., None] - source / there[..., None], axis=-1)
-        farther: Array = np.maximum(there / here - 1, 0)
-    unlike: Array = angle + DISTANCE * farther + SHARP
-    return unlike
+        target_direction = from_target / target_distance[..., None]
+        view_direction = from_view / view_distance[..., None]
+        angle = np.linalg.norm(target_direction - view_direction, axis=-1)
+        farther: Array = np.maximum(view_distance / target_distance - 1, 0)
+    sum_of_penalties: Array = angle + DISTANCE * farther + SHARP
+    return sum_of_penalties
 
 
 def _wraps(lens: Lens) -> bool:
-    """Whether the left edge of a lens's picture continues its right one."""
+    """Return whether the left edge of a lens's picture continues its right one."""
     return isinstance(lens, Equirectangular) and lens.is_full
 
 
-def _is_amid(right: Array, down: Array) -> Array:
-    """Return which vertices (h, w) have all triangles around them that the picture has room for.
+def _has_all_triangles(right: Array, down: Array) -> Array:
+    """Return which vertices (h, w) have all the triangles around them that fit into the picture.
 
-    A triangle is there where its corner at the right angle is of one surface with the other two.
+    A triangle is drawn if its corner at the right angle shares a surface with the other two.
     """
     upper = right[:-1, :-1] & down[:-1, :-1]
     lower = right[1:, :-1] & down[:-1, 1:]
-    whole = np.ones(right.shape, bool)
-    whole[:-1, :-1] &= upper
-    whole[:-1, 1:] &= upper & lower
-    whole[1:, :-1] &= upper & lower
-    whole[1:, 1:] &= lower
-    return whole
+    complete = np.ones(right.shape, bool)
+    complete[:-1, :-1] &= upper
+    complete[:-1, 1:] &= upper & lower
+    complete[1:, :-1] &= upper & lower
+    complete[1:, 1:] &= lower
+    return complete

@@ -284,7 +284,7 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
     names = [view.name or "" for view in exported.views]
     for part in exported.parts:
         for name in sorted(set(part.names).difference(names)):
-            yield f"{part.place}: has {name}, which is none of its views"
+            yield f"{part.place}: has {name}, which is not one of its views"
     # The lists of NeRF's synthetic scenes are compared as parts of the split.
     if all(view.file == first.file for view in exported.views):
         expected_names = set(expected.numbers)

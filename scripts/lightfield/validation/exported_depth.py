@@ -225,9 +225,10 @@ class ExportedDepth:
             gaps[sought] = np.fmin(gaps[sought], _gaps_in_all(cloud.positions[sought], source, ask))
         wrong = sought[~(gaps[sought] <= limit[sought])]
         for point in wrong[:MOST_NAMED]:
-            yield f"{cloud.name(point)}: is no point of a view's depth{_describe_gap(gaps[point])}"
+            gap = _describe_gap(gaps[point])
+            yield f"{cloud.name(point)}: is not a point of a view's depth{gap}"
         if len(wrong) > MOST_NAMED:
-            yield f"{cloud.file}: {len(wrong)} of {count} points are none of a view's depth"
+            yield f"{cloud.file}: {len(wrong)} of {count} points are not points of a view's depth"
 
 
 def _describe_gap(gap: float) -> str:

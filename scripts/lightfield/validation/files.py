@@ -101,7 +101,7 @@ class ImageSet:
 class File:
     """An image file: its ``path`` relative to the dataset, its set, and its view.
 
-    Masks, depth maps and pictures for trainers are no views: their ``view`` is −1. They only need
+    Masks, depth maps and pictures for trainers are not views: their ``view`` is −1. They only need
     to be readable and of their set's size. ``of_pass`` is the pass of the view that the file holds.
     """
 
@@ -338,11 +338,11 @@ def _listed_files(dataset: Path, path: Path, manifest: Manifest) -> _ListedFiles
         if target.is_file() and target.is_relative_to(dataset):
             listed.pictures.append(target.relative_to(dataset))
         else:
-            listed.problems.append(f"{list_name}: {name} is no file of the dataset")
+            listed.problems.append(f"{list_name}: {name} is not a file of the dataset")
     for name, digest in sums.items():
         target = path.parent / name
         if not target.resolve().is_relative_to(dataset) or not target.is_file():
-            listed.problems.append(f"{list_name}: {name} is no file of the dataset")
+            listed.problems.append(f"{list_name}: {name} is not a file of the dataset")
         elif sha256(target) != digest:
             listed.problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
         else:
@@ -355,7 +355,7 @@ def listing(
 ) -> tuple[list[str], Check]:
     """Return the files that the dataset publishes, and a check that fails if there are others."""
     published, strays = _sorted_out(dataset, sets, owned)
-    problems = [f"{path}: is no file of this dataset" for path in strays]
+    problems = [f"{path}: is not a file of this dataset" for path in strays]
     return published, Check("files", not strays, f"{len(published)} files", problems=problems)
 
 
@@ -422,7 +422,7 @@ def checksums(
     faults = dict(altered_files)
     for path, (size, digest) in sorted(recorded.items()):
         if path not in sums:
-            faults[path] = "is recorded but is no image of this dataset"
+            faults[path] = "is recorded but is not an image of this dataset"
         elif size != sums[path][0]:
             faults[path] = f"has {sums[path][0]} bytes, but its record says {size}"
         elif digest != sums[path][1]:

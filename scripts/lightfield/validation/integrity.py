@@ -74,7 +74,7 @@ class Integrity:
         was_finished = self._published or self._is_noted(self.dataset / SUMS)
         present = set(self._present()) if was_finished else set()
         for path in sorted(present - expected.keys()):
-            yield Fault(path, "is no file of this dataset, or has no checksum")
+            yield Fault(path, "is not a file of this dataset, or has no checksum")
         for path in sorted(self._required_views(present) - expected.keys() - present):
             yield Fault(path, "is missing")
         wrong = {path for path, problem in problems.items() if problem}

@@ -205,7 +205,7 @@ class Examiner:
         if view_pass.kind == "normal":
             lengths = np.linalg.norm(pixels, axis=0)
             wrong = int(((np.abs(lengths - 1) > NOT_UNIT) & (lengths != 0)).sum())
-            facts.fault("passes", f"{wrong} normals are no unit vectors", wrong)
+            facts.fault("passes", f"{wrong} normals are not unit vectors", wrong)
         if view_pass.kind == "id":
             unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(view_pass))
             path = f"{view_pass.name}/{NAMES}"
@@ -424,7 +424,7 @@ def _has_one_colour(colour: NDArray[Any], in_circle: Bools) -> bool:
 
 
 def _shows_nothing(image: images.Image, in_circle: Bools, is_rendered: bool) -> bool:
-    """Return whether a transparent view shows no more than a few pixels.
+    """Return whether a transparent view shows at most a few pixels.
 
     The image circle touches the image's edge. At its rim Cycles makes black samples opaque. A
     reprojection spreads that rim, so only the colour counts there.

@@ -39,7 +39,7 @@ class Scene:
         return max(least, round(full * self.detail**0.5))
 
     def count(self, full: float, least: int = 1) -> int:
-        """The number of small objects (leaves, blades, props), of which detail 1 has `full`."""
+        """The number of small objects (leaves, blades, props). Detail 1 has `full`."""
         return max(least, round(full * self.detail))
 
     def lathe(self, profile: Points, segments: float = 24, capped: bool = True) -> Shape:

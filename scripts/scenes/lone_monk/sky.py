@@ -33,7 +33,7 @@ def sky(scene: Scene) -> None:
 
 
 def swallows(scene: Scene) -> None:
-    """Swallows over the court: what there is to see straight above."""
+    """Swallows over the court, so that the view straight up is not empty."""
     body = scene.lathe([(0, -0.09), (0.018, -0.04), (0.02, 0.02), (0.012, 0.07), (0, 0.09)], 8)
     body = body.transformed(transform(rotation=(0, np.pi / 2, 0)))
     right = [

@@ -187,7 +187,7 @@ def _wall(outside: Array, thickness: float) -> Array:
 
 
 def _wine(outside: Array, thickness: float, level: float) -> Array:
-    """The profile of what fills a vessel; it reaches into the wall, so that no air is between."""
+    """The profile of a vessel's filling. It reaches into the wall, so that no air is between."""
     wet = _inside(outside, 0.6 * thickness)
     wet = wet[wet[:, 1] < level]
     return np.concatenate([wet, [[wet[-1, 0], level]]])

@@ -40,7 +40,7 @@ class CubeMap(Lens):
 
     On disk each face is an image of its own. In memory they form one strip, six times as wide as
     high. Face i begins at column i · height. A kernel must not reach across a face's border, where
-    the strip's neighbours are no neighbours in space. Source: Greene 1986.
+    the strip's neighbours are not neighbours in space. Source: Greene 1986.
     """
 
     name = "cube_map"

@@ -26,7 +26,7 @@ class Grid(Rig):
 
     @staticmethod
     def count(cameras: tuple[int, ...]) -> int:
-        """Return the number of positions that so many cameras along each axis make."""
+        """Return the number of positions that this many cameras along each axis make."""
         return math.prod(cameras)
 
     @property

@@ -11,7 +11,7 @@ from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 
-# The curve's length is measured over so many pieces between two keys. Its error is below 1e-6.
+# The curve's length is measured over this many pieces between two keys. Its error is below 1e-6.
 _PIECES = 2000
 
 

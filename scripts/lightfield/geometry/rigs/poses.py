@@ -132,7 +132,7 @@ def _read_checked(path: Path, _modified_ns: int) -> PosesFile:
     for frame in frames:
         check_name(f"{path}: {frame.where}: name", frame.name)
         if frame.name in names:
-            raise UserError(f"{path}: {frame.where}: name: {frame.name!r} is there twice")
+            raise UserError(f"{path}: {frame.where}: name: {frame.name!r} occurs twice")
         names.add(frame.name)
     matrices = _stacked([frame.matrix for frame in frames], (4, 4))
     positions = _stacked([frame.position for frame in frames], (3,))
@@ -326,7 +326,7 @@ def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[float], str]]:
                 raise ValueError
             yield f"image {number}", numbers, name
     except (struct.error, ValueError):
-        raise UserError(f"{path}: is no images.bin of COLMAP's, or is cut short") from None
+        raise UserError(f"{path}: is not COLMAP's images.bin, or is cut short") from None
 
 
 _READERS = {".csv": _read_csv, ".json": _read_json, ".txt": _read_colmap, ".bin": _read_colmap}

@@ -23,7 +23,7 @@ class Chosen(Settings):
             raise ValueError("must have every, or test and validation with names of views")
         for name in self.names:
             if self.names.count(name) > 1:
-                raise ValueError(f"must have each view once, but {name!r} is there twice")
+                raise ValueError(f"must have each view once, but {name!r} occurs twice")
         return self
 
     @property

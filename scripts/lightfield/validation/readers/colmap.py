@@ -137,12 +137,12 @@ def exported_model(model: Model, pictures: Path) -> Exported:
     for image in model.images:
         place = f"image {image.number}"
         if image.number in numbers_so_far:
-            exported.faults.append(f"{images_file}: {place}: is there twice")
+            exported.faults.append(f"{images_file}: {place}: occurs twice")
         numbers_so_far.add(image.number)
         if image.camera not in model.cameras:
             exported.faults.append(f"{images_file}: {place}: has no camera {image.camera}")
         if not (pictures / image.name).is_file():
-            exported.faults.append(f"{images_file}: {place}: {image.name} is no file")
+            exported.faults.append(f"{images_file}: {place}: {image.name} is not a file")
         matrix = np.eye(4)
         matrix[:3, :3] = image.rotation.T @ _FLIP
         matrix[:3, 3] = -image.rotation.T @ image.translation
@@ -245,7 +245,7 @@ def _require_end(content: bytes, place: int) -> None:
 
 
 def _lines(path: Path) -> Iterator[tuple[str, str]]:
-    """Yield the place and the text of each line that is no comment."""
+    """Yield the place and the text of each line that is not a comment."""
     with path.open(encoding="utf-8") as file:
         for number, line in enumerate(file, 1):
             if not line.startswith("#"):

@@ -132,7 +132,7 @@ class Exported:
             self.faults.append(f"{place}: is {actual!r}; must be {expected!r}")
 
     def expect_picture(self, place: str, path: Path, view: str, picture: str) -> None:
-        """Note a fault if ``path`` is no file, or does not have the name of the view's picture.
+        """Note a fault if ``path`` is not a file, or does not have the name of the view's picture.
 
         ``picture`` is that name, with braces in place of the view's name: "{}_depth.png".
         """

@@ -27,7 +27,7 @@ def lens_of(camera: dict[str, Any]) -> Camera:
     if projection == "Fisheye_Equidistant":
         fov = math.radians(number(camera["Fov"]))
         return OpenCVFisheye(width, height, width / fov, height / fov, width / 2, height / 2)
-    raise ValueError(f"Projection: {projection!r} is no projection of it")
+    raise ValueError(f"Projection: {projection!r} is not a projection of it")
 
 
 def depth_range_of(place: str, view: str, camera: dict[str, Any]) -> DepthRange:

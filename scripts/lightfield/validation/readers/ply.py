@@ -38,7 +38,7 @@ def read_ply(path: Path, transform: Floats | None = None) -> tuple[Cloud, list[s
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(normals, axis=-1)
     wrong = np.flatnonzero(~((np.abs(lengths - 1) < _NOT_UNIT) | (lengths == 0)))
-    faults = [f"{path}: vertex {index}: its normal is no unit vector" for index in wrong]
+    faults = [f"{path}: vertex {index}: its normal is not a unit vector" for index in wrong]
     if transform is not None and not np.array_equal(transform, np.eye(4)):
         positions = positions @ transform[:3, :3].T + transform[:3, 3]
     return Cloud(path, "vertex", np.arange(len(vertices)), positions), faults

@@ -1,13 +1,13 @@
-// Which views an eye is drawn from.
+// Chooses the views from which an eye's picture is drawn.
 
 import { clamp, minus } from "../page/vectors.js";
 import { WALK, walk } from "./state.js";
 
-// While the eye moves, views are chosen anew once it has moved by more than this part of the rig's extent, or turned
-// by more than so many radians.
+// In motion, views are chosen again only if the eye has moved by more than this part of the rig's extent, or turned by
+// more than this many radians.
 export const IN_MOTION = 0.03;
 
-// Whether a source sees in a direction of its own axes.
+// Return whether a source sees in a direction, given in its own axes.
 function isSeen(x, y, z) {
   const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);
   let [u, v] = [x / sum, y / sum];
@@ -17,7 +17,7 @@ function isSeen(x, y, z) {
   return walk.sight[line * WALK.side + column] === 1;
 }
 
-// Unit directions all over what the eye sees, in the world.
+// Return unit directions in the world that cover the eye's picture evenly.
 function directionsOfEye([right, up, back], [spreadX, spreadY]) {
   const count = WALK.directions;
   const directions = [];
@@ -33,7 +33,7 @@ function directionsOfEye([right, up, back], [spreadX, spreadY]) {
   return directions;
 }
 
-// How well a view sees the point that is so far from the eye in a direction: 0 where it does not.
+// Return how well a view sees the point at a distance from the eye in a direction. 0 if it does not see it.
 function quality({ at, right, up, ahead }, eye, direction, distance) {
   const x = eye[0] + distance * direction[0] - at[0];
   const y = eye[1] + distance * direction[1] - at[1];
@@ -54,14 +54,14 @@ function qualities(view, at, directions) {
   return values;
 }
 
-// The sum over all directions of the logarithm of what the views taken so far, and this one, are worth.
+// Return the sum over all directions of the logarithm of the worth of this view and the views taken so far.
 function gainOf(values, sums) {
   let gain = 0;
   for (let place = 0; place < sums.length; place++) gain += Math.log1p(sums[place] + values[place]);
   return gain;
 }
 
-// The views that together see best what the eye looks at: one after the other, that which adds most.
+// Return the views that together best see what the eye looks at. Repeatedly takes the view that adds most.
 export function bestViews(sources, count, at, eyeAxes, spread) {
   const directions = directionsOfEye(eyeAxes, spread);
   const valued = sources.map((source) => ({ source, values: qualities(source.view, at, directions) }));
@@ -79,27 +79,27 @@ export function bestViews(sources, count, at, eyeAxes, spread) {
   return chosen;
 }
 
-// The first view that is wanted and not on the graphics card yet.
-export const missing = () => walk.wanted.find((source) => !source.isThere);
+// Return the first wanted view that is not on the graphics card yet.
+export const missing = () => walk.wanted.find((source) => !source.isLoaded);
 
-// Whether the last choice does for an eye: nothing has come in since, and the eye has hardly moved.
-function isStillRight(last, now, slack) {
-  if (!last || last.there.length !== now.there.length || last.count !== now.count) return false;
-  const change = (one, other) => Math.hypot(...minus(one, other));
+// Return whether the last choice still fits: no source was loaded since, and the eye has hardly moved.
+function stillFits(last, now, slack) {
+  if (!last || last.loaded.length !== now.loaded.length || last.count !== now.count) return false;
+  const change = (before, after) => Math.hypot(...minus(before, after));
   return change(last.at, now.at) <= slack * walk.extent &&
     now.axes.every((axis, number) => change(last.axes[number], axis) <= slack) &&
     now.spread.every((value, number) => value === last.spread[number]);
 }
 
-// Choose what an eye wants to be drawn of, and what it is drawn of while some of that is missing. An eye that has
-// moved by no more than `slack` keeps the last choice.
+// Choose the views that an eye wants. While some of these are missing, choose others to draw. An eye that has moved by
+// at most `slack` keeps the last choice.
 export function choose(count, eyeAxes, spread, slack) {
-  const there = walk.order.filter((source) => source.isThere);
-  const now = { at: walk.at, axes: eyeAxes, spread, there, count };
-  if (isStillRight(walk.lastChoice, now, slack)) return;
+  const loaded = walk.order.filter((source) => source.isLoaded);
+  const now = { at: walk.at, axes: eyeAxes, spread, loaded, count };
+  if (stillFits(walk.lastChoice, now, slack)) return;
   walk.lastChoice = now;
   walk.choices += 1;
   walk.wanted = bestViews(walk.order, walk.sources, walk.at, eyeAxes, spread);
-  // They were taken one after the other: the first are the best of fewer, too.
-  walk.chosen = missing() ? bestViews(there, count, walk.at, eyeAxes, spread) : walk.wanted.slice(0, count);
+  // They were taken one after the other, so the first few are also the best few.
+  walk.chosen = missing() ? bestViews(loaded, count, walk.at, eyeAxes, spread) : walk.wanted.slice(0, count);
 }

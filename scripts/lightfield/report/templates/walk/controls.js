@@ -1,14 +1,14 @@
-// What the walk's buttons, keys and pointers do.
+// Listens to the walk's buttons, keys and pointers.
 
 import { element } from "../page/document.js";
 import { drawWalkSoon } from "./drawing.js";
 import { fieldOfView } from "./eye.js";
 import { listenForHeadset } from "./headset.js";
 import { goHome, placeHash, showMode } from "./home.js";
-import { TURNING, WALKING, ZOOMING, moved, turned, walkOn } from "./motion.js";
+import { TURNING, WALKING, ZOOMING, keepMoving, moveEye, turnEye } from "./motion.js";
 import { MODES, walk } from "./state.js";
 
-// One finger looks around, two walk.
+// One finger turns the eye, two fingers move it.
 function listenToPointers(overlay) {
   const pointers = new Map();
   overlay.addEventListener("pointerdown", (event) => {
@@ -19,21 +19,21 @@ function listenToPointers(overlay) {
   overlay.addEventListener("pointermove", (event) => {
     const last = pointers.get(event.pointerId);
     if (!last) return;
-    const way = [event.clientX - last[0], event.clientY - last[1]];
+    const offset = [event.clientX - last[0], event.clientY - last[1]];
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     const side = Math.max(overlay.clientWidth, overlay.clientHeight);
     const wide = fieldOfView(...walk.size) / walk.zoom;
-    if (pointers.size === 1) turned(...way.map((value) => (-value * wide) / side));
-    else moved((0.5 * way[1]) / side, (-0.5 * way[0]) / side, 0);
+    if (pointers.size === 1) turnEye(...offset.map((value) => (-value * wide) / side));
+    else moveEye((0.5 * offset[1]) / side, (-0.5 * offset[0]) / side, 0);
   });
   for (const name of ["pointerup", "pointercancel"]) {
     overlay.addEventListener(name, (event) => pointers.delete(event.pointerId));
   }
-  const towards = (event) => {
+  const moveForward = (event) => {
     event.preventDefault();
-    moved(-0.0005 * event.deltaY, 0, 0);
+    moveEye(-0.0005 * event.deltaY, 0, 0);
   };
-  overlay.addEventListener("wheel", towards, { passive: false });
+  overlay.addEventListener("wheel", moveForward, { passive: false });
 }
 
 const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
@@ -43,7 +43,7 @@ function listenToKeys(overlay) {
     const key = keyOf(event);
     if (!(key in WALKING || key in TURNING || key in ZOOMING)) return;
     event.preventDefault();
-    if (!walk.keys.size) walkOn(performance.now());
+    if (!walk.keys.size) keepMoving(performance.now());
     walk.keys.add(key);
   });
   overlay.addEventListener("keyup", (event) => walk.keys.delete(keyOf(event)));
@@ -61,7 +61,7 @@ function listenToButtons() {
   element("exposure").addEventListener("input", drawWalkSoon);
 }
 
-// The frames of a sequence: each is a page of its own.
+// Each frame of a sequence is a page of its own: the slider opens it.
 function listenToFrames() {
   const slider = element("walk-frame");
   if (!slider) return;

@@ -1,4 +1,4 @@
-// When the walk is drawn, of how many sources, and what lies over it.
+// Schedules the drawing of the walk, chooses its quality, and draws the overlay.
 
 import { DATA } from "../page/data.js";
 import { element, fitted, onceAFrame, polyline } from "../page/document.js";
@@ -8,17 +8,17 @@ import { NEAR, axes, metresToEdge, scales } from "./eye.js";
 import { drawEye } from "./layers.js";
 import { MOST_SOURCES, walk } from "./state.js";
 
-// Where a whole picture takes more milliseconds than this, one in motion is made of few sources.
+// If a full picture takes more milliseconds than this, a picture in motion uses few sources.
 const SLOW = 100;
 export const FEW = Math.min(2, MOST_SOURCES);
-// Samples across and down a pixel of a picture that stands. One in motion has this part of its pixels across and down,
-// which the browser enlarges.
+// A still picture has this many samples across and down a pixel.
 const FINE = 2;
+// A picture in motion has this part of the pixels across and down. The browser enlarges it.
 const COARSE = 0.4;
-// So many milliseconds after the last motion it stands.
+// The picture counts as still this many milliseconds after the last motion.
 const REST = 200;
 
-// Give the canvas this part of its pixels across and down; return their numbers.
+// Resize the canvas to a part of its pixels across and down. Return its new width and height.
 function sizeCanvas(part) {
   const { canvas } = walk;
   const [width, height] = walk.size.map((side) => Math.max(2, Math.round(part * side)));
@@ -26,7 +26,7 @@ function sizeCanvas(part) {
   return [width, height];
 }
 
-// Draw once, from where the eye is: as well as it can be, or quickly.
+// Draw one picture from the eye's place. In motion, draw it quickly, else as well as possible.
 function drawWalk(isInMotion = false) {
   const eyeAxes = axes();
   const spread = scales(...walk.size);
@@ -38,14 +38,14 @@ function drawWalk(isInMotion = false) {
   walk.frames += 1;
 }
 
-// Where a point of the world falls on the overlay; null behind the eye.
+// Return the function that projects a point of the world onto the overlay. It returns null behind the eye.
 function overlayProjection([right, up, back], [spreadX, spreadY]) {
   const [width, height] = [walk.overlay.clientWidth, walk.overlay.clientHeight];
   return (point) => {
-    const way = minus(point, walk.at);
-    const depth = -dot(way, back);
+    const offset = minus(point, walk.at);
+    const depth = -dot(offset, back);
     if (depth < NEAR) return null;
-    const [x, y] = [(spreadX * dot(way, right)) / depth, (spreadY * dot(way, up)) / depth];
+    const [x, y] = [(spreadX * dot(offset, right)) / depth, (spreadY * dot(offset, up)) / depth];
     return [(width / 2) * (1 + x), (height / 2) * (1 - y)];
   };
 }
@@ -74,7 +74,7 @@ function drawCameras(context, project) {
   }
 }
 
-// Over the picture: the edge of the volume, and the cameras; those in use are marked.
+// Draw the volume's edge and the cameras over the picture. Mark the cameras in use.
 function drawOverlay(eyeAxes, spread) {
   const context = fitted(walk.overlay);
   if (walk.showsCameras) {
@@ -98,7 +98,7 @@ export const drawWalkSoon = onceAFrame(() => {
   if (walk.slow) walk.rest = setTimeout(drawAllSources, REST);
 });
 
-// Draw of all sources, and see how long that takes: it is done when a pixel can be read.
+// Draw from all sources, and measure how long that takes. Reading a pixel waits until the drawing is done.
 function drawAllSources() {
   if (missing()) return;
   const { gl } = walk;

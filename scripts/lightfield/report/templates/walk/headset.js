@@ -1,4 +1,4 @@
-// A headset: each eye is drawn as the page is, from where the head is in the volume.
+// Draws both eyes for a headset, from the head's place in the volume.
 
 import { element } from "../page/document.js";
 import { along } from "../page/vectors.js";
@@ -8,7 +8,7 @@ import { insideVolume } from "./eye.js";
 import { drawEye } from "./layers.js";
 import { walk } from "./state.js";
 
-// Draw both eyes of a headset's frame. `start` is where the walk stood when the session began.
+// Draw both eyes of a headset's frame. `start` is the eye's place when the session began.
 function drawHeadset(session, space, start, frame) {
   const pose = frame.getViewerPose(space);
   if (!pose) return;
@@ -16,7 +16,7 @@ function drawHeadset(session, space, start, frame) {
   for (const view of pose.views) {
     const { x, y, width, height } = layer.getViewport(view);
     const matrix = view.transform.matrix;
-    // WebXR's Y is up, its −Z ahead: ours are Z and Y.
+    // In WebXR Y is up and −Z is ahead. Here Z is up and Y is ahead.
     const column = (number) => [matrix[4 * number], -matrix[4 * number + 2], matrix[4 * number + 1]];
     const axes = [column(0), column(1), column(2)];
     walk.at = insideVolume(along(start, column(3), 1));

@@ -1,4 +1,4 @@
-// Where the walk begins, and where it goes on in another frame of a sequence.
+// Places the eye: at the start of the walk, and after a change to another frame of a sequence.
 
 import { DATA } from "../page/data.js";
 import { element } from "../page/document.js";
@@ -13,11 +13,11 @@ export function showMode(mode) {
   drawWalkSoon();
 }
 
-// Another frame of a sequence is another page, which goes on from where the eye was.
+// Another frame of a sequence is another page. The address carries the eye's place to it.
 const PLACE = "#walk=";
 export const placeHash = () => PLACE + [...walk.at, walk.yaw, walk.pitch, walk.mode].join(",");
 
-export function goWhereItWas() {
+export function restorePlace() {
   if (!location.hash.startsWith(PLACE)) return;
   const [x, y, z, yaw, pitch, mode] = location.hash.slice(PLACE.length).split(",").map(Number);
   if (![x, y, z, yaw, pitch].every(Number.isFinite) || !(mode in MODES)) return;
@@ -30,25 +30,25 @@ function meanVector(vectors) {
   return [0, 1, 2].map((axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0) / vectors.length);
 }
 
-// Whether the cameras look at what is amid them.
-function doLookInwards(views, centre) {
+// Return whether the cameras look at something in their middle.
+function camerasLookInwards(views, centre) {
   const cosines = views.map((view) => {
-    const way = minus(centre, view.at);
-    return dot(view.ahead, way) / (Math.hypot(...way) || 1);
+    const offset = minus(centre, view.at);
+    return dot(view.ahead, offset) / (Math.hypot(...offset) || 1);
   });
   return cosines.reduce((sum, cosine) => sum + cosine, 0) > views.length / 2;
 }
 
-// The walk begins where the cameras see something: amid them, unless they look inwards. Amid those
-// is what they look at, so it begins before one of them, and looks as that does.
+// Put the eye in the middle of the cameras. If they look inwards, what they look at is there. Then put the eye in front
+// of the first camera, with the camera's direction.
 export function goHome() {
   const views = walk.order.map(({ view }) => view);
   const centre = meanVector(views.map((view) => view.at));
   const first = DATA.views[DATA.embedded[DATA.first].view];
   const [x, y, z] = first.ahead;
-  const lookInwards = doLookInwards(views, centre);
+  const lookInwards = camerasLookInwards(views, centre);
   const lookAlike = Math.hypot(...meanVector(views.map((view) => view.ahead))) > 0.5;
-  // Away from the edge, but not into what is seen.
+  // Move away from the volume's edge, but not into the nearest surface.
   const step = Math.min(walk.extent, WALK.nearest) / 4;
   walk.at = insideVolume(lookInwards ? along(first.at, first.ahead, step) : centre);
   const isSteep = Math.hypot(x, y) <= 0.1;

@@ -1,14 +1,14 @@
-// What an eye sees: each source drawn into a layer of its own, and the layers blended.
+// Draws an eye's picture: each source into a layer of its own, then the blended layers.
 
 import { DATA } from "../page/data.js";
 import { viewer } from "../page/state.js";
 import { clamp, minus } from "../page/vectors.js";
 import { NEAR, metresToEdge } from "./eye.js";
-import { APART } from "./sources.js";
+import { ROW_GAP } from "./sources.js";
 import { MOST_SOURCES, WALK, walk } from "./state.js";
 import { bindTextures, texture } from "./webgl.js";
 
-// A framebuffer of two textures: colours (half floats), and inverse distances.
+// Return a framebuffer of two textures, colours and inverse distances. `attach` attaches them.
 function framebufferOf(attach) {
   const { gl } = walk;
   const framebuffer = gl.createFramebuffer();
@@ -18,14 +18,14 @@ function framebufferOf(attach) {
   return framebuffer;
 }
 
-// A picture of light and inverse distances that a shader can draw.
+// Return a picture of light and inverse distances that a shader can draw into.
 function createPicture(width, height) {
   const { gl } = walk;
   const image = (format, layout, type) =>
     texture(gl, gl.TEXTURE_2D, format, width, height, 0, layout, type, null);
   const colours = image(gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT);
   const inverses = image(gl.R32F, gl.RED, gl.FLOAT);
-  // One that is smaller than what it is shown on is enlarged smoothly.
+  // Enlarge a picture smoothly if it is smaller than the canvas.
   gl.bindTexture(gl.TEXTURE_2D, colours);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
@@ -36,7 +36,7 @@ function createPicture(width, height) {
   return { width, height, colours, inverses, framebuffer };
 }
 
-// A layer for each source.
+// Return a layer for each source.
 function createLayers(width, height) {
   const { gl } = walk;
   const array = (format, layout, type) =>
@@ -58,7 +58,7 @@ function createStage(width, height, samples) {
   const levels = [];
   for (let [w, h] = [width, height]; ; [w, h] = [Math.ceil(w / 2), Math.ceil(h / 2)]) {
     const level = createPicture(w, h);
-    // The coarsest level has nothing to be filled from.
+    // No coarser level fills the coarsest one.
     if (w * h === 1) {
       levels.push({ level, filled: level });
       break;
@@ -80,16 +80,16 @@ function deleteStage({ layers, levels }) {
   for (const { framebuffer } of pictures) gl.deleteFramebuffer(framebuffer);
 }
 
-// What a picture of this size is drawn in. Two are kept: for pictures in motion, and for those that stand.
+// Return the layers and levels for a picture of this size. Keeps two stages: for motion and for still pictures.
 function stageOf(width, height, samples) {
-  const isRight = (stage) => stage.width === width && stage.height === height && stage.samples === samples;
-  const stage = walk.stages.find(isRight) ?? createStage(width, height, samples);
+  const fits = (stage) => stage.width === width && stage.height === height && stage.samples === samples;
+  const stage = walk.stages.find(fits) ?? createStage(width, height, samples);
   walk.stages = [stage, ...walk.stages.filter((other) => other !== stage)];
   if (walk.stages.length > 2) deleteStage(walk.stages.pop());
   return stage;
 }
 
-// Draw one part of a source, its surface or its torn pixels, into the layer that is bound, which is so wide.
+// Draw a part of a source into the bound layer of this width: its surface or its torn pixels.
 function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width, kind = walk.gl.TRIANGLES) {
   const { gl } = walk;
   const { view } = source;
@@ -100,8 +100,8 @@ function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width,
     inverses: [gl.TEXTURE_2D, source.inverses],
     light: [gl.TEXTURE_2D, source.light],
   });
-  gl.uniform1i(uniforms.stride, DATA.size[0] + APART);
-  // Columns: the source's axes in the world, and the world's axes in the eye.
+  gl.uniform1i(uniforms.stride, DATA.size[0] + ROW_GAP);
+  // The columns are the source's axes in the world, and the world's axes in the eye.
   gl.uniformMatrix3fv(uniforms.turn, false, [...view.right, ...view.up, ...view.ahead.map((value) => -value)]);
   gl.uniformMatrix3fv(uniforms.back, false, [0, 1, 2].flatMap((axis) => [right[axis], up[axis], back[axis]]));
   gl.uniform3fv(uniforms.offset, minus(view.at, eye.at));
@@ -140,8 +140,8 @@ function drawSources(layers, eye, isCoarse) {
   gl.disable(gl.CULL_FACE);
 }
 
-// Run a program over all of a picture.
-function drawWhole({ linked, uniforms }, picture, textures) {
+// Set a program up to run over all of a picture. Return its uniforms.
+function startPass({ linked, uniforms }, picture, textures) {
   const { gl } = walk;
   gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
   gl.viewport(0, 0, picture.width, picture.height);
@@ -155,7 +155,7 @@ const drawTriangle = () => walk.gl.drawArrays(walk.gl.TRIANGLES, 0, 3);
 
 function blendLayers({ layers, levels, samples }, count) {
   const { gl } = walk;
-  const uniforms = drawWhole(walk.blended, levels[0].level, {
+  const uniforms = startPass(walk.blended, levels[0].level, {
     colours: [gl.TEXTURE_2D_ARRAY, layers.colours],
     inverses: [gl.TEXTURE_2D_ARRAY, layers.inverses],
   });
@@ -167,20 +167,20 @@ function blendLayers({ layers, levels, samples }, count) {
   drawTriangle();
 }
 
-// Fill what no source sees from coarser levels (push-pull: Gortler et al. 1996).
+// Fill holes from coarser levels (push-pull: Gortler et al. 1996).
 function fillHoles({ levels }) {
   const { gl } = walk;
   for (let number = 1; number < levels.length; number++) {
     const { colours, inverses } = levels[number - 1].level;
     const textures = { colours: [gl.TEXTURE_2D, colours], inverses: [gl.TEXTURE_2D, inverses] };
-    const uniforms = drawWhole(walk.shrunk, levels[number].level, textures);
+    const uniforms = startPass(walk.shrunk, levels[number].level, textures);
     gl.uniform1i(uniforms.isFirst, number === 1);
     drawTriangle();
   }
   for (let number = levels.length - 2; number >= 0; number--) {
     const { level, filled } = levels[number];
     const coarse = levels[number + 1].filled;
-    const uniforms = drawWhole(walk.enlarged, filled, {
+    const uniforms = startPass(walk.enlarged, filled, {
       colours: [gl.TEXTURE_2D, level.colours],
       inverses: [gl.TEXTURE_2D, level.inverses],
       coarseColours: [gl.TEXTURE_2D, coarse.colours],
@@ -215,9 +215,9 @@ function showPicture({ levels }, eye, target, corner, size) {
   drawTriangle();
 }
 
-// Draw what an eye sees into `target`, from its `corner` on. Of the eye: where it is (`at`), its `axes`, its
-// `lens` (scales across and up, and shifts), and the `sources` that it is drawn from. `samples` are those across
-// and down a pixel; of coarse sources fewer triangles are drawn.
+// Draw what an eye sees into `target`, from its `corner` on. The eye has a place (`at`), `axes`, a `lens` (scales and
+// shifts across and up), and the `sources` to draw from. `samples` is the number of samples across and down a pixel.
+// `isCoarse` draws fewer triangles.
 export function drawEye(eye, target, corner, size, samples, isCoarse) {
   const stage = stageOf(...size, samples);
   drawSources(stage.layers, eye, isCoarse);

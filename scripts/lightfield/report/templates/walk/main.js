@@ -1,5 +1,5 @@
-// A walk inside the light field: the views near the eye, drawn as surfaces that tear where depth jumps, and blended
-// where they show the same. It is synthesis/view.py once more, on the graphics card.
+// Starts the walk inside the light field. Like synthesis/view.py, but on the graphics card, it draws the views near the
+// eye as surfaces that tear where depth jumps, and blends them.
 
 import { DATA } from "../page/data.js";
 import { element } from "../page/document.js";
@@ -9,7 +9,7 @@ import { bestViews, missing } from "./choice.js";
 import { listen } from "./controls.js";
 import { FEW, drawWalkSoon } from "./drawing.js";
 import { axes, scales } from "./eye.js";
-import { goHome, goWhereItWas } from "./home.js";
+import { goHome, restorePlace } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
 import coarseShader from "./shaders/coarse.glsl";
 import drawnShader from "./shaders/drawn.glsl";
@@ -24,11 +24,10 @@ import { unfolded, upload } from "./sources.js";
 import { WALK, walk } from "./state.js";
 import { program, texture } from "./webgl.js";
 
-// Bring in all sources one after the other, those first that the eye wants; `begin` as soon as
-// a few are there.
-async function bringSources(begin) {
+// Load all sources one after the other, first those that the eye wants. Call `begin` as soon as a few are loaded.
+async function loadSources(begin) {
   for (let number = 0; number < walk.order.length; number++) {
-    const source = missing() || walk.order.find((other) => !other.isThere);
+    const source = missing() || walk.order.find((other) => !other.isLoaded);
     const { light, depth } = source.entry;
     upload(source, ...(await Promise.all([decoded(light), decoded(depth)])));
     if (number + 1 === Math.min(FEW, walk.order.length)) begin();
@@ -36,7 +35,7 @@ async function bringSources(begin) {
   }
 }
 
-// The unit ray of each pixel in the camera's axes: x, y, z, 0.
+// Return the unit ray of each pixel in the camera's axes: x, y, z, 0.
 function unpackedRays() {
   const codes = new Uint16Array(bytesOf(WALK.rays).buffer);
   const rays = new Float32Array(2 * codes.length);
@@ -88,10 +87,10 @@ async function startWalk() {
   prepareDrawing(gl);
   prepareSources();
   goHome();
-  goWhereItWas();
+  restorePlace();
   const fieldOfView = scales(walk.canvas.clientWidth, walk.canvas.clientHeight);
   walk.wanted = bestViews(walk.order, walk.sources, walk.at, axes(), fieldOfView);
-  await bringSources(() => {
+  await loadSources(() => {
     walk.ready = true;
     listen();
   });

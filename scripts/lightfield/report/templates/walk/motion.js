@@ -1,27 +1,27 @@
-// How the eye moves: by keys, pointers and the wheel.
+// Moves the eye: by keys, pointers and the wheel.
 
 import { along, clamp } from "../page/vectors.js";
 import { drawWalkSoon } from "./drawing.js";
 import { STEEPEST_PITCH, axes, insideVolume } from "./eye.js";
 import { walk } from "./state.js";
 
-// Move the eye by parts of the rig's extent: on the level ahead, sideways, and upwards.
-export function moved(forward, sideways, upwards) {
+// Move the eye forward, sideways and upwards, in parts of the rig's extent. Forward and sideways are level.
+export function moveEye(forward, sideways, upwards) {
   const [right] = axes();
   const level = [-Math.sin(walk.yaw), Math.cos(walk.yaw), 0];
-  const way = [0, 1, 2].map((axis) => forward * level[axis] + sideways * right[axis] + (axis === 2 ? upwards : 0));
-  walk.at = insideVolume(along(walk.at, way, walk.extent));
+  const offset = [0, 1, 2].map((axis) => forward * level[axis] + sideways * right[axis] + (axis === 2 ? upwards : 0));
+  walk.at = insideVolume(along(walk.at, offset, walk.extent));
   drawWalkSoon();
 }
 
 // Turn the eye, by radians.
-export function turned(x, y) {
+export function turnEye(x, y) {
   walk.yaw -= x;
   walk.pitch = clamp(walk.pitch - y, -STEEPEST_PITCH, STEEPEST_PITCH);
   drawWalkSoon();
 }
 
-// What each key adds to `moved`, and to `turned`.
+// The arguments of `moveEye` and of `turnEye` for each key, before the factor of time.
 export const WALKING = {
   w: [1, 0, 0],
   s: [-1, 0, 0],
@@ -34,24 +34,24 @@ export const WALKING = {
 };
 export const TURNING = { ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
-// What each key multiplies the zoom by, in a second.
+// The factor by which each key changes the zoom in a second.
 export const ZOOMING = { "+": 2, "=": 2, "-": 0.5 };
 
-// Enlarge the picture, between the default field of view and an eighth of it.
-export function zoomed(factor) {
+// Enlarge the picture: from the default field of view to an eighth of it.
+export function zoomBy(factor) {
   walk.zoom = clamp(factor * walk.zoom, 1, 8);
   drawWalkSoon();
 }
 
-// Move in each frame, for as long as a key is held.
-export function walkOn(before) {
+// Move in each frame for as long as a key is held.
+export function keepMoving(before) {
   requestAnimationFrame((now) => {
     const seconds = clamp((now - before) / 1000, 0, 0.1);
     for (const key of walk.keys) {
-      if (key in WALKING) moved(...WALKING[key].map((value) => 0.6 * seconds * value));
-      else if (key in ZOOMING) zoomed(ZOOMING[key] ** seconds);
-      else turned(...TURNING[key].map((value) => 1.2 * seconds * value));
+      if (key in WALKING) moveEye(...WALKING[key].map((value) => 0.6 * seconds * value));
+      else if (key in ZOOMING) zoomBy(ZOOMING[key] ** seconds);
+      else turnEye(...TURNING[key].map((value) => 1.2 * seconds * value));
     }
-    if (walk.keys.size) walkOn(now);
+    if (walk.keys.size) keepMoving(now);
   });
 }

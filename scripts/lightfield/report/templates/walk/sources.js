@@ -1,22 +1,22 @@
-// A source view on the graphics card: its colours, its inverse distances, and the triangles that hold.
+// Brings a source view onto the graphics card: its colours, inverse distances and triangles.
 
 import { DATA } from "../page/data.js";
 import { LIGHT, depthCode } from "../page/packing.js";
 import { WALK, walk } from "./state.js";
 import { texture, triangles } from "./webgl.js";
 
-// Between the last vertex of a row and the first of the next so many numbers are left out: what draws
-// without a graphics card keeps a vertex by its number modulo 64, where the one below would drop it.
-export const APART = 32;
+// This many vertex numbers stay unused after each row. A software renderer caches vertices by their number modulo 64.
+// Without the gap, a vertex would often replace the one above it there.
+export const ROW_GAP = 32;
 
-// The largest block of pixels, along a side, that is drawn as two triangles in motion, and the part of its inverse
-// distance by which it may be bent.
+// In motion, a flat block of at most this many pixels along a side is drawn as two triangles.
 const LARGEST_BLOCK = 8;
+// A block is flat if its inverse distances differ from the two triangles' by less than this part.
 const FLAT = 0.03;
 
 const ROOTS = LIGHT.map(Math.sqrt);
 
-// Of the unit square's point, the unit vector (Cigolle et al. 2014).
+// Return the unit vector of an octahedral point in the unit square (Cigolle et al. 2014).
 export function unfolded(u, v) {
   let [x, y] = [2 * u - 1, 2 * v - 1];
   const z = 1 - Math.abs(x) - Math.abs(y);
@@ -25,7 +25,7 @@ export function unfolded(u, v) {
   return [x / length, y / length, z / length];
 }
 
-// Whether two neighbours a and b in a row of inverse distances are of one surface.
+// Return whether two neighbours a and b in a row of inverse distances are on one surface.
 function isOneSurface(before, a, b, after) {
   const step = b - a;
   if (Number.isNaN(step)) return false;
@@ -35,7 +35,7 @@ function isOneSurface(before, a, b, after) {
   return Math.abs(a - before - step) < even && Math.abs(after - b - step) < even;
 }
 
-// The inverse distance from the camera of each pixel, NaN outside the lens.
+// Return each pixel's inverse distance from the camera, NaN outside the lens.
 function inverseDistances(depth) {
   const [width, height] = DATA.size;
   const inverses = new Float32Array(width * height);
@@ -46,7 +46,7 @@ function inverseDistances(depth) {
   return inverses;
 }
 
-// For each pixel, whether it is of one surface with the pixel on its right, and with that below it.
+// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below.
 function joins(inverses) {
   const [width, height] = DATA.size;
   const at = (i, j) => (i < 0 || j < 0 || i >= height || j >= width ? NaN : inverses[i * width + j]);
@@ -62,10 +62,10 @@ function joins(inverses) {
   return { right, down };
 }
 
-// The number of a pixel's vertex.
-const vertexOf = (i, j) => i * (DATA.size[0] + APART) + j;
+// Return the number of a pixel's vertex.
+const vertexOf = (i, j) => i * (DATA.size[0] + ROW_GAP) + j;
 
-// The corners of the triangles between pixels that are of one surface.
+// Return the corners of the triangles between pixels on one surface.
 function surfaceTriangles({ right, down }) {
   const [width, height] = DATA.size;
   const corners = new Uint32Array(6 * width * height);
@@ -86,13 +86,13 @@ function surfaceTriangles({ right, down }) {
   return corners.subarray(0, count);
 }
 
-// Whether all quads of a block are of one surface, and the block is flat enough to be drawn as two triangles.
-function isFlat(inverses, isWhole, first, side) {
+// Return whether all quads of a block are complete, and the block is flat enough for two triangles.
+function isFlat(inverses, isComplete, first, side) {
   const width = DATA.size[0];
   for (let line = 0; line < side; line++) {
-    for (let column = 0; column < side; column++) if (!isWhole(first + line * width + column)) return false;
+    for (let column = 0; column < side; column++) if (!isComplete(first + line * width + column)) return false;
   }
-  // Two triangles of a quad in place of eight: nobody sees that in motion.
+  // Two triangles replace eight here, which nobody sees in motion.
   if (side === 2) return true;
   const corner = (i, j) => inverses[first + i * side * width + j * side];
   for (let i = 0; i <= 2; i++) {
@@ -106,18 +106,18 @@ function isFlat(inverses, isWhole, first, side) {
   return true;
 }
 
-// The corners of fewer triangles, for pictures in motion: flat blocks of 8, 4 or 2 pixels have two.
+// Return the corners of fewer triangles, for pictures in motion. Flat blocks of 8, 4 or 2 pixels have two.
 function coarseTriangles(inverses, { right, down }) {
   const [width, height] = DATA.size;
   const corners = [];
   const upper = (pixel) => right[pixel] && down[pixel];
   const lower = (pixel) => right[pixel + width] && down[pixel + 1];
-  const isWhole = (pixel) => upper(pixel) && lower(pixel);
+  const isComplete = (pixel) => upper(pixel) && lower(pixel);
   const addBlock = (i, j, side) => {
     if (i + 1 >= height || j + 1 >= width) return;
     const pixel = i * width + j;
     const fits = i + side < height && j + side < width;
-    if (side > 1 && !(fits && isFlat(inverses, isWhole, pixel, side))) {
+    if (side > 1 && !(fits && isFlat(inverses, isComplete, pixel, side))) {
       const half = side / 2;
       for (const [line, column] of [[0, 0], [0, half], [half, 0], [half, half]]) addBlock(i + line, j + column, half);
       return;
@@ -132,10 +132,10 @@ function coarseTriangles(inverses, { right, down }) {
   return Uint32Array.from(corners);
 }
 
-// The pixels that lack a triangle for which the picture has room: they are drawn one by one.
+// Return the pixels without all of the triangles that fit into the picture around them. They are drawn one by one.
 function tornPixels(inverses, { right, down }) {
   const [width, height] = DATA.size;
-  // Whether a pixel and three around it have the triangle left above, and the one right below.
+  // Whether the quad right of and below a pixel has its upper left triangle, and its lower right one.
   const upper = (pixel) => right[pixel] && down[pixel];
   const lower = (pixel) => right[pixel + width] && down[pixel + 1];
   const torn = [];
@@ -143,17 +143,17 @@ function tornPixels(inverses, { right, down }) {
     for (let j = 0; j < width; j++) {
       const pixel = i * width + j;
       const [hasLeft, hasRight, hasAbove, hasBelow] = [j > 0, j + 1 < width, i > 0, i + 1 < height];
-      const isAmid =
+      const hasAllTriangles =
         (!(hasRight && hasBelow) || upper(pixel)) && (!(hasLeft && hasAbove) || lower(pixel - width - 1)) &&
         (!(hasLeft && hasBelow) || (upper(pixel - 1) && lower(pixel - 1))) &&
         (!(hasRight && hasAbove) || (upper(pixel - width) && lower(pixel - width)));
-      if (!isAmid && !Number.isNaN(inverses[pixel])) torn.push(pixel);
+      if (!hasAllTriangles && !Number.isNaN(inverses[pixel])) torn.push(pixel);
     }
   }
   return torn;
 }
 
-// The corners of two triangles for each of these pixels: pixels.glsl places four vertices for one.
+// Return the corners of two triangles for each of these pixels. pixels.glsl places a pixel's four vertices.
 function pixelTriangles(pixels) {
   const width = DATA.size[0];
   return Uint32Array.from(pixels.flatMap((pixel) => {
@@ -162,8 +162,8 @@ function pixelTriangles(pixels) {
   }));
 }
 
-// The roots of a picture's colours, sharpened as synthesis/kernels.py's sharpen does, and a fourth number:
-// how much each pixel counts.
+// Return the roots of a picture's colours, sharpened as by `sharpen` in synthesis/kernels.py. The fourth number is the
+// certainty of each pixel.
 function sharpRoots(light, { right, down }, torn) {
   const [width, height] = DATA.size;
   const roots = Float32Array.from(light, (code) => ROOTS[code]);
@@ -173,12 +173,12 @@ function sharpRoots(light, { right, down }, torn) {
     const [j, row] = [pixel % width, 4 * width];
     const [joinsLeft, joinsAbove] = [j > 0 && right[pixel - 1], pixel >= width && down[pixel - width]];
     for (let at = 4 * pixel; at < 4 * pixel + 3; at++) {
-      let apart = 0;
-      if (right[pixel]) apart += roots[at + 4] - roots[at];
-      if (joinsLeft) apart += roots[at - 4] - roots[at];
-      if (down[pixel]) apart += roots[at + row] - roots[at];
-      if (joinsAbove) apart += roots[at - row] - roots[at];
-      sharp[at] = Math.max(roots[at] - part * apart, 0);
+      let difference = 0;
+      if (right[pixel]) difference += roots[at + 4] - roots[at];
+      if (joinsLeft) difference += roots[at - 4] - roots[at];
+      if (down[pixel]) difference += roots[at + row] - roots[at];
+      if (joinsAbove) difference += roots[at - row] - roots[at];
+      sharp[at] = Math.max(roots[at] - part * difference, 0);
     }
     sharp[4 * pixel + 3] = walk.toRim[pixel] / 255;
   }
@@ -190,7 +190,7 @@ function sharpRoots(light, { right, down }, torn) {
   return sharp;
 }
 
-// Bring a source onto the graphics card: colours, inverse distances, and the triangles that hold.
+// Bring a source onto the graphics card: colours, inverse distances and triangles.
 export function upload(source, light, depth) {
   const { gl } = walk;
   const inverses = inverseDistances(depth);
@@ -209,6 +209,6 @@ export function upload(source, light, depth) {
     coarse: triangles(gl, coarseTriangles(inverses, joined)),
     pixels: triangles(gl, pixelTriangles(torn)),
     points: triangles(gl, Uint32Array.from(torn, (pixel) => vertexOf(Math.floor(pixel / DATA.size[0]), pixel % DATA.size[0]))),
-    isThere: true,
+    isLoaded: true,
   });
 }

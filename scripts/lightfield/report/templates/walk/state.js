@@ -1,4 +1,4 @@
-// Where the eye of the walk is, and what is drawn of it. report/walk.py says what `DATA.walk` holds.
+// The state of the walk: the eye, the mode, and the chosen sources. report/walk.py says what `DATA.walk` holds.
 
 import { DATA } from "../page/data.js";
 import { element } from "../page/document.js";
@@ -10,7 +10,7 @@ export const MODES = ["colour", "depth", "holes", "sources"];
 export const walk = {
   canvas: element("walk"),
   overlay: element("walk-overlay"),
-  // Pixels across and down of a picture that stands.
+  // The pixels across and down of a still picture.
   size: [2, 2],
   at: null,
   fadeFrom: 0,

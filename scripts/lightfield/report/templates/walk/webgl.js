@@ -1,4 +1,4 @@
-// WebGL 2: programs, textures and triangles.
+// Creates WebGL 2 programs, textures and triangles.
 
 export function program(gl, vertex, fragment) {
   const linked = gl.createProgram();
@@ -19,7 +19,7 @@ export function program(gl, vertex, fragment) {
   return { linked, uniforms };
 }
 
-// A texture that is read by texel; `image` holds the arguments of texImage2D or texImage3D after the level.
+// Return a texture that shaders read by texel. `image` holds the arguments of texImage2D or texImage3D after the level.
 export function texture(gl, kind, ...image) {
   const created = gl.createTexture();
   gl.bindTexture(kind, created);
@@ -32,7 +32,7 @@ export function texture(gl, kind, ...image) {
   return created;
 }
 
-// Triangles without attributes: a shader finds all by the number of a vertex.
+// Return triangles without attributes. A shader looks everything up by a vertex's number.
 export function triangles(gl, corners) {
   const vertices = gl.createVertexArray();
   gl.bindVertexArray(vertices);
@@ -42,7 +42,7 @@ export function triangles(gl, corners) {
   return { vertices, count: corners.length };
 }
 
-// Give a program its textures: for each uniform's name, the kind and the texture.
+// Bind a program's textures. `textures` has the kind and the texture by the uniform's name.
 export function bindTextures(gl, uniforms, textures) {
   Object.entries(textures).forEach(([name, [kind, bound]], unit) => {
     gl.activeTexture(gl.TEXTURE0 + unit);

@@ -1,20 +1,20 @@
 #version 300 es
-// The layers of all sources, blended: synthesis/kernels.py's blend. A pixel is the mean of
-// samples × samples texels of the layers.
+// Blends the layers of all sources, like `blend` in synthesis/kernels.py. A pixel is the mean of samples × samples
+// texels of the layers.
 precision highp float;
 precision highp int;
 precision highp sampler2DArray;
 uniform sampler2DArray colours, inverses;
 uniform int count, samples;
 uniform float same, hidden, far, dark;
-// Linear light, and the part of the sources that show the nearest surface: 0 in a hole.
+// Linear light; alpha is the part of the sources that show the nearest surface, 0 in a hole.
 layout(location = 0) out vec4 colour;
 layout(location = 1) out float inverse;
 
 float sum, number, used;
 vec3 light;
 
-// Return the inverse distance of the nearest surface of one sample, −1 in a hole; add to the sums.
+// Add a sample's colour to the sums. Return the inverse distance of its nearest surface, −1 in a hole.
 float addSample(ivec2 texel) {
   float nearest = -1.0, front = -1.0, total = 0.0, parts = 0.0, mean = 0.0;
   vec3 inverted = vec3(0.0);
@@ -34,7 +34,7 @@ float addSample(ivec2 texel) {
       mean += weight * near;
       used += 1.0;
     }
-    // What is behind a surface of which a source is certain counts less and less, and then not at all.
+    // A surface of which a source is certain hides what is behind it, first partly, then completely.
     float behind = (front - near) / max(front, far);
     weight *= max(near, far) * max(near, far) * (1.0 - clamp((behind - same) / (hidden - same), 0.0, 1.0));
     inverted += weight / (drawn.rgb + dark);
@@ -59,7 +59,7 @@ void main() {
     else nears.w = near;
   }
   colour = number > 0.0 ? vec4(light / number, used / (number * float(count))) : vec4(0.0);
-  // Distances are not blended across an edge: those count that are of one surface with the second nearest.
+  // Average only distances on the surface of the second nearest, because distances must not blend across an edge.
   vec2 larger = max(nears.xz, nears.yw), smaller = min(nears.xz, nears.yw);
   float second = max(min(larger.x, larger.y), max(smaller.x, smaller.y));
   float middle = second >= 0.0 ? second : max(larger.x, larger.y);

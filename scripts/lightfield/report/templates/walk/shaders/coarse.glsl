@@ -1,5 +1,5 @@
 #version 300 es
-// What is drawn of one source in motion: light is read for each pixel, for triangles are larger than the source's.
+// Shades one source in motion. Reads the light at each pixel, because triangles cover several of the source's pixels.
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D light;

@@ -1,6 +1,6 @@
 #version 300 es
-// What is drawn of one source: its light, its weight, and its inverse distance from the eye. The weight is
-// negative where the source is not certain enough to hide what is behind.
+// Shades one source: its light, its weight, and its inverse distance from the eye. The weight is negative if the source
+// is not certain enough to hide what is behind it.
 precision highp float;
 uniform float certain;
 in vec4 shade;

@@ -1,5 +1,5 @@
 #version 300 es
-// A level of a picture, filled from the next coarser one: synthesis/kernels.py's enlarge.
+// Fills a level of a picture from the next coarser one, like `enlarge` in synthesis/kernels.py.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

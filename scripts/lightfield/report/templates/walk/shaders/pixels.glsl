@@ -1,6 +1,6 @@
-// Pixels beside a tear, one by one: a corner's ray is the mean of those around it.
+// Places the corners of single pixels beside a tear. A corner's ray is the mean of those around it.
 
-// A neighbour that has a ray, or else the pixel itself.
+// Return a neighbour that has a ray, or else the pixel itself.
 ivec2 beside(ivec2 pixel, ivec2 way) {
   ivec2 other = clamp(pixel + way, ivec2(0), textureSize(rays, 0) - 1);
   return texelFetch(inverses, other, 0).r < 0.0 ? pixel : other;

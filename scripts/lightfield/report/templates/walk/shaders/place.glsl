@@ -1,18 +1,18 @@
 #version 300 es
-// Where vertices fall: put before surface.glsl and pixels.glsl. Positions are in units of their distance from
-// the source, so that what is infinitely far is a number as any: clip coordinates are homogeneous.
+// Places vertices; surface.glsl and pixels.glsl follow it. Positions are in units of their distance from the source. So
+// infinitely far points need no special case, because clip coordinates are homogeneous.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D rays, inverses;
-// The roots of colours, and how certain a pixel is of its surface.
+// The roots of colours; alpha is the certainty of a pixel.
 uniform sampler2D light;
 uniform int stride;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
 uniform float near, spread, sharp;
-// How many pixels wide a source's pixel is at the distance 1.
+// The width of a source's pixel at the distance 1, in pixels of the picture.
 uniform float pointSize;
 out vec4 shade;
 out vec2 spot;

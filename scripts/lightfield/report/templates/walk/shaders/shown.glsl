@@ -1,5 +1,5 @@
 #version 300 es
-// The picture as it is shown: its light, or what else is asked for, on the whole viewport.
+// Shows the picture on the whole viewport: its light, depth, holes or sources, by `mode`.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -29,6 +29,6 @@ void main() {
   } else if (mode == 3) {
     colour = hole ? vec3(0.0) : texture(palette, vec2(used, 0.5)).rgb;
   }
-  // The edge of the volume is felt: colour fades towards it, from where the walk begins at most.
+  // Colours fade towards the volume's edge, so that the user notices it. They never fade at the start of the walk.
   result = vec4(mix(colour, vec3(dot(colour, vec3(1.0 / 3.0))) * 0.5, edge), 1.0);
 }

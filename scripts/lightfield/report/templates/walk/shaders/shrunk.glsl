@@ -1,5 +1,5 @@
 #version 300 es
-// The next coarser level of a picture: synthesis/kernels.py's shrink. What is behind counts most.
+// Makes the next coarser level of a picture, like `shrink` in synthesis/kernels.py. The farthest pixels count most.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,4 +1,4 @@
-// The vertices of a source's triangles, one for each pixel.
+// Places the vertices of a source's triangles, one for each pixel.
 
 void main() {
   ivec2 pixel = ivec2(gl_VertexID % stride, gl_VertexID / stride);

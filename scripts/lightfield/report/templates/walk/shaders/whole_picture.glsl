@@ -1,5 +1,5 @@
 #version 300 es
-// One triangle that covers the picture.
+// Places one triangle that covers the picture.
 void main() {
   gl_Position = vec4(4 * (gl_VertexID & 1) - 1, 2 * (gl_VertexID & 2) - 1, 0, 1);
 }

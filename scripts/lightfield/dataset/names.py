@@ -1,0 +1,27 @@
+"""Names that programs offer in their --help. The models of settings would load slowly for that."""
+
+from pathlib import Path
+
+# The name of the rendered views among a dataset's reprojections.
+VIEWS = "views"
+
+# The formats of scripts/export.py. instant-ngp has a program of its own.
+EXPORTS = (
+    "colmap",
+    "nerfstudio",
+    "nerf_synthetic",
+    "opendibr",
+    "miv",
+    "hci",
+    "scannetpp",
+    "poses_csv",
+    "point_cloud",
+)
+
+BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
+
+
+def builders() -> list[str]:
+    """Return the names of the scene builders: the folders of scripts/scenes/ except library."""
+    folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
+    return sorted(name for name in folders if name != "library")

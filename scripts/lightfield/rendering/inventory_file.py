@@ -1,0 +1,113 @@
+"""Writes the inventory of a .blend: scripts/inventory.py's work."""
+
+import os.path
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.dataset import blend, config
+from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.loading import rendered_frames, scene_datasets
+from lightfield.dataset.view_store import ViewStore
+from lightfield.geometry.rigs import BlendCamera
+from lightfield.rendering import (
+    blend_facts,
+    blend_file,
+    external_files,
+    light,
+    pruning,
+    scene_memory,
+    simulations,
+)
+from lightfield.rendering.inventory import FEATURES, inventory
+
+
+def write(path: Path, scene: str | None, output: Path) -> None:
+    """Write the inventory of the .blend at ``path``, and print warnings and a summary.
+
+    ``scene`` names a file in configs/scenes/ that uses it. Raises `UserError` for a scene that
+    cannot be rendered.
+    """
+    written = config.load_scene(scene) if scene else None
+    chosen = written.scene.model_dump() if written else {}
+    layers = blend_file.open_scene(path, chosen)
+    datasets = scene_datasets(scene) if scene else []
+    saved_frame = bpy.context.scene.frame_current
+    chosen_frames = rendered_frames(datasets) or [saved_frame]
+    frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
+    contents: dict[str, Any] = {}
+    if chosen.get("blend"):
+        camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
+        contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+    if written and written.render and written.render.motion_blur is not None:
+        bpy.context.scene.render.use_motion_blur = written.render.motion_blur
+    _refuse_fluids(path)
+    contents |= inventory(frames)
+    if contents["missing"] and not chosen.get("allow_missing"):
+        raise UserError(_refusal(path, contents["missing"]))
+    if not light.may_be_lit():
+        raise UserError(
+            f"{path}: has no light, so all views would be black: no lamp shines, no "
+            "material emits, and the world is black; give it one of these, as a world with a colour"
+        )
+    if store := ViewStore.configured():
+        external_files.put(path, contents["external_files"], store)
+    warnings = list(simulations.warnings(frames))
+    leave_out = pruning.left_out(contents)
+    contents["left_out"] = leave_out
+    # Close the scene, because the measurement opens it again.
+    blend_file.new_scene()
+    contents["memory_bytes"] = scene_memory.measure(path, contents, chosen)
+    write_json(output, contents)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if chosen.get("blend"):
+        _print_notes(path, contents, datasets, output)
+    print(
+        f"{contents['objects']} objects, {contents['triangles']} triangles, with instances "
+        f"{contents['triangles_with_instances']}; {', '.join(n for n in FEATURES if contents[n])}"
+    )
+    for name in leave_out:
+        print(f"left out: {name}: {pruning.REASONS[name]}")
+
+
+def _print_notes(
+    path: Path, contents: Mapping[str, Any], datasets: Sequence[Dataset], inventory_file: Path
+) -> None:
+    """Print what a user's .blend says, and what the ``datasets`` take from it."""
+    resolved = [dataset.resolved(inventory_file) for dataset in datasets]
+    shown = sorted({int(dataset.source.frame) for dataset in resolved})
+    own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
+    notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera)
+    print(f"note: {path}: {' · '.join(notes)}")
+
+
+def _refuse_fluids(path: Path) -> None:
+    """Raise `UserError` where the open .blend shows fluids that are not baked."""
+    if fluids := simulations.unbaked_fluids():
+        # Blender aborts at its exit if such a file is still open.
+        blend_file.new_scene()
+        raise UserError(
+            f"{path}: {', '.join(fluids[:8])}{' …' if len(fluids) > 8 else ''}: fluids that are "
+            "not baked cannot be simulated here; bake them in Blender and save the .blend"
+        )
+
+
+def _refusal(path: Path, problems: list[dict[str, str]]) -> str:
+    """Return which files of a .blend are missing or cannot be read, and what to do about them."""
+    descriptions = []
+    for entry in problems[:8]:
+        file = os.path.normpath(path.parent / entry["path"])
+        descriptions.append(f"the {entry['kind']} {entry['name']} at {file} ({entry['problem']})")
+    more = " …" if len(problems) > 8 else ""
+    return (
+        f"{path}: {len(problems)} of the files that it shows are missing or cannot be read: "
+        f"{'; '.join(descriptions)}{more}; mend them, pack them into the "
+        ".blend (in Blender: File, External Data), or render without them: scene: "
+        "{allow_missing: true}"
+    )

@@ -1,0 +1,80 @@
+"""A run of scripts/synthesize.py: its cameras, and the files of each picture."""
+
+import argparse
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import keep_apart
+from lightfield.core.progress import Progress
+from lightfield.dataset.config import read_yaml
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images, pictures
+from lightfield.imaging.video import video
+from lightfield.synthesis.view import Sources, reader
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Synthesise the views, and print how much of them are holes."""
+    keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
+    source = SourceDataset(arguments.dataset, arguments.reprojection, ".exr")
+    views = source.lightfield.views
+    targets = _poses(arguments.poses)
+    if targets is None:
+        parts = splits(source.lightfield)
+        views = parts.train
+        targets = source.lightfield.changed(views=parts.test)
+    sources = Sources(
+        source.lens,
+        views,
+        reader(source),
+        fills_holes=not source.lightfield.transparent,
+        most=4 * arguments.best,
+    )
+    lens = targets.lens
+    depth = targets.lens.usual_depth
+    targets.changed(depth=depth).write(arguments.output / NAME)
+    rays = lens.pixel_rays()
+    exposure = arguments.exposure
+    holes = []
+    path = arguments.output / "walk.mp4"
+    progress = Progress(len(targets.views), "synthesize", "views")
+    size = (lens.width, lens.height)
+    with video(path, size, arguments.rate) if arguments.video else nullcontext() as add_to_video:
+        for view in targets.views:
+            made = sources.synthesise(view.matrix, lens, arguments.best)
+            if exposure is None:
+                exposure = pictures.exposure_for(made.colour[~made.holes])
+            images.write_exr(
+                arguments.output / "exr" / f"{view.name}.exr", made.channels(depth, rays)
+            )
+            picture = pictures.develop(np.nan_to_num(made.colour), exposure)
+            opaque = np.where(np.isfinite(made.colour[..., 0]), 255, 0).astype(np.uint8)
+            images.write_png(
+                arguments.output / "png" / f"{view.name}.png", np.dstack([picture, opaque])
+            )
+            if add_to_video:
+                add_to_video(picture)
+            holes.append(made.hole_fraction(rays))
+            progress.done()
+    print(
+        f"{len(holes)} views of {arguments.best} each; holes: {np.mean(holes):.3%} of their "
+        f"pixels, at most {max(holes):.3%} of one"
+    )
+
+
+def _poses(path: Path | None) -> LightField | None:
+    """Return the cameras of a lightfield.json or of a rig's YAML; None without a file."""
+    if path is None:
+        return None
+    if path.suffix == ".json":
+        return LightField.read(path)
+    rig = rigs.from_settings(read_yaml(path, str(path)), str(path))
+    if rig.camera is None:
+        raise UserError(f"{path}: camera: is missing; it is what the views are seen through")
+    return LightField.from_rig(rig, lenses.from_camera(rig.camera))
