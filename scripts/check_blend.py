@@ -5,7 +5,6 @@ configs/scenes/<scene>.lock.json. Later files must have the same SHA-256.
 """
 
 import argparse
-from importlib.metadata import version
 from pathlib import Path
 
 from lightfield.core.cli import run
@@ -23,6 +22,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from importlib.metadata import version
+
     from lightfield.dataset import config
 
     source = config.load_scene(arguments.scene).scene

@@ -123,8 +123,8 @@ def test_a_dry_run_forecasts_the_cost_of_a_calibration(tmp_path):
     )
     table = result.stdout.split("phase")[1]
     # 16 windows of 24² pixels, 6 µs a sample: two references of 256 samples, 85 samples of plain
-    # path tracing, and 125 of the search. Add 70 ms for each of 41 renders, and
-    # two starts, one of them to choose the views.
+    # path tracing, and 125 of the search. Add 70 ms for each of 41 renders, and two starts, one of
+    # which chooses the views.
     assert re.search(r"^calibration +2 +92 s$", table, re.M), table
 
 

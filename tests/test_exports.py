@@ -19,8 +19,9 @@ from lightfield import export
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset.config import Scene
-from lightfield.dataset.exports import settings_of
+from lightfield.dataset.exports import Exports, settings_of
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.names import EXPORTS
 from lightfield.export import disparity
 from lightfield.export.points import evenly
 from lightfield.export.source import SourceDataset, Surface
@@ -106,6 +107,10 @@ class Colmap:
         else:
             directions = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
         return np.column_stack([directions.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
+
+
+def test_the_program_offers_every_export_of_a_scene_yaml():
+    assert {*EXPORTS, "instant_ngp"} == set(Exports.model_fields)
 
 
 @pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])

@@ -163,10 +163,10 @@ def split_box():
 
 
 def leaves():
-    """Split a ball into its faces, and turn every other one round, as on a chessboard."""
+    """Split a ball into its faces, and flip every other one, as on a chessboard."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=3)
     edit(lambda face: face.calc_center_median().z > 2)
-    # The faces' order differs from run to run, so it cannot say which to turn.
+    # The order of faces differs from run to run, so it cannot tell which to flip.
     for face in bpy.context.object.data.polygons:
         x, y, z = face.center.normalized()
         column = math.floor(32 * math.atan2(y, x) / math.tau)

@@ -1,6 +1,7 @@
 """What programs in scripts/ share: how they end, the types of their flags, and --views."""
 
 import argparse
+import atexit
 import gc
 import math
 import os
@@ -20,8 +21,7 @@ def run(main: Callable[[], None]) -> None:
 
     Do the same if memory runs out, or if the system refuses access to a file or folder.
     """
-    # Imports make many objects and no garbage. Looking for it among them takes a tenth of a start.
-    gc.set_threshold(100_000)
+    _expect_little_garbage()
     sys.argv[1:] = map(_as_value, sys.argv[1:])
     try:
         main()
@@ -37,6 +37,16 @@ def run(main: Callable[[], None]) -> None:
         sys.exit(1)
     except OSError as error:
         sys.exit(f"error: {_refusal(error)}")
+
+
+def _expect_little_garbage() -> None:
+    """Let Python look for garbage rarely, and not once more before it ends.
+
+    Imports make many objects that are never garbage. To go through them takes longer than all that
+    --help does.
+    """
+    gc.set_threshold(100_000)
+    atexit.register(gc.freeze)
 
 
 def _refusal(error: OSError) -> str:

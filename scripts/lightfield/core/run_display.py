@@ -17,7 +17,7 @@ from typing import TextIO
 from lightfield.core import progress
 from lightfield.core.progress import duration
 
-# After so many seconds of work, the run's rate counts.
+# After this many seconds of work, the run's rate counts.
 SURE_AFTER = 2.0
 # Without a terminal the first line of progress comes after this many seconds.
 FIRST_LINE = 30.0

@@ -3,9 +3,9 @@
 import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
-from lightfield.geometry.rigs.rig import ONE_PLACE
 
 # A point is hidden if the other view sees a surface that is nearer by more than this part.
 HIDDEN = 0.01

@@ -15,6 +15,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST
 from lightfield.geometry.rotations import Floats
 
+# Cameras are at one place if they are nearer to each other than this, in metres.
+ONE_PLACE = 1e-6
+
 # In bytes, because the name becomes a file's.
 LONGEST_NAME = 200
 

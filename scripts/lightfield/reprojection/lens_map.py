@@ -11,7 +11,6 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from statistics import fmean
 from tokenize import TokenError
 from typing import Any
 
@@ -373,7 +372,7 @@ def report(lens_maps: Sequence[LensMap]) -> None:
         "min": min(summary["min"] for summary in with_source),
         "max": max(summary["max"] for summary in with_source),
         "median": float(np.median([summary["median"] for summary in with_source])),
-        "covered": fmean(summary["covered"] for summary in summaries),
+        "covered": float(np.mean([summary["covered"] for summary in summaries])),
     }
     print(
         f"magnification: {overall['min']:.3g} to {overall['max']:.3g}, "

@@ -15,6 +15,7 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
+from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
 from lightfield.geometry.rigs.split_setting import Chosen, Part, Split, part_of
@@ -28,9 +29,6 @@ from lightfield.geometry.rotations import (
 Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
-
-# Cameras are at one place if they are nearer to each other than this, in metres.
-ONE_PLACE = 1e-6
 
 
 @dataclass(frozen=True)
