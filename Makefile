@@ -3,6 +3,7 @@
 # make test-other  runs the tests that are not slow with the other supported Python and its own lock
 # make consumers   reads exports with the consumers' own code, in an environment of its own
 # make learn       learns radiance fields from exported files, in the same environment
+# make docs        builds the documents as a site with a search, in site/
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -14,7 +15,7 @@ VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:
 OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test test-other check consumers learn soak locks
+.PHONY: all test test-other check consumers learn soak docs locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -54,6 +55,12 @@ learn: .venv/complete .venv-consumers/complete
 	snakemake --cores $(CORES) learn $(LEARNED)
 	snakemake --cores $(CORES) $(LEARNED)
 
+# The search needs a server: python -m http.server --directory site
+docs: export NO_MKDOCS_2_WARNING = 1
+docs: .venv-docs/complete
+	.venv-docs/bin/mkdocs build --strict --quiet
+	@echo "site/index.html"
+
 # Builds that are killed, damaged and left with full disks.
 soak: .venv/complete
 	python benchmarks/soak.py
@@ -92,6 +99,11 @@ soak: .venv/complete
 		-r envs/requirements-s3-server.txt
 	@touch $@
 
+.venv-docs/complete: .venv/complete envs/requirements-docs.txt
+	.venv/bin/python -m venv --clear .venv-docs
+	.venv-docs/bin/pip -qq --disable-pip-version-check install --require-hashes -r envs/requirements-docs.txt
+	@touch $@
+
 # Add new packages to the locks. Delete a lock to renew all its packages. Needs uv.
 locks:
 	for version in 3.13 3.11; do \
@@ -102,6 +114,7 @@ locks:
 		done; \
 	done
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
+	$(LOCK) --universal --python-version 3.11 envs/requirements-docs.in -o envs/requirements-docs.txt
 	$(LOCK) --universal --python-version 3.11 envs/requirements-consumers.in -o envs/requirements-consumers.txt
 	echo nerfstudio==1.1.5 | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
 	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt

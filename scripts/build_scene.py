@@ -49,7 +49,7 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--builder", choices=builders())
+    flags.add_argument("--builder", choices=builders(), help="builder of the scene")
     flags.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
     flags.add_argument("--detail", type=float, default=1.0, help="up to 1, which is full (default)")
 

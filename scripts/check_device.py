@@ -8,7 +8,9 @@ from lightfield.core.cli import run
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "device", choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"]
+        "device",
+        choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"],
+        help="device to look for",
     )
     device = parser.parse_args().device
 

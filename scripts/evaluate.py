@@ -2,7 +2,7 @@
 
 RENDERS has <view>.png or <view>.exr for each test view of the dataset's split. Without a split,
 every eighth view tests. RENDERS may also have normal/<view>.exr. The rig's name may precede each
-view's, as in exports: <rig>_<view>.png. See docs/evaluation.md.
+view's, as in exports: <rig>_<view>.png. See docs/how-to/evaluate-renders.md.
 """
 
 import argparse

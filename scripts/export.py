@@ -17,7 +17,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("format", choices=EXPORTS)
+    parser.add_argument("format", choices=EXPORTS, help="format to write")
     parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")

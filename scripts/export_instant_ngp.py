@@ -48,7 +48,7 @@ def main(words: Sequence[str] | None = None) -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that replace a settings file."""
     add = parser.add_argument_group("Instead of --settings").add_argument
-    add("--image-suffix", choices=[".png", ".exr"], default=".png")
+    add("--image-suffix", choices=[".png", ".exr"], default=".png", help="suffix of the views")
     add(
         "--depth-dir",
         type=Path,

@@ -23,7 +23,9 @@ def main() -> None:
         default=":",
         help="a slice of lightfield.json's frames (default: all of them)",
     )
-    parser.add_argument("--output", required=True, type=Path, metavar="FOLDER")
+    parser.add_argument(
+        "--output", required=True, type=Path, metavar="FOLDER", help="folder to write"
+    )
     parser.add_argument("--record", type=Path, help="JSON of the files' sizes and checksums")
     arguments = parser.parse_args()
 

@@ -19,7 +19,7 @@ def main() -> None:
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
     add("--settings", type=Path, metavar="JSON", help="settings file with the flags' names as keys")
-    add("--output", type=Path, required=True, metavar="STEM")
+    add("--output", type=Path, required=True, metavar="STEM", help="stem of the files to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
     if arguments.settings:

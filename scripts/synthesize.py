@@ -38,7 +38,7 @@ def main() -> None:
     add("--exposure", type=stops, help="of the PNGs, in stops (default: by the first picture)")
     add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
     add("--rate", type=positive, default=25, help="pictures a second of the video (default: 25)")
-    add("--output", type=Path, required=True, metavar="FOLDER")
+    add("--output", type=Path, required=True, metavar="FOLDER", help="folder to write")
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for it.

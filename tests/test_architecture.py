@@ -1,4 +1,4 @@
-"""The library's packages are those of docs/architecture.md, and import only those above them."""
+"""The packages are those of docs/explanation/architecture.md, and import only those above them."""
 
 import ast
 import re
@@ -10,7 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LIBRARY = ROOT / "scripts" / "lightfield"
-PACKAGES = re.findall(r"^\| (\w+) \|", (ROOT / "docs/architecture.md").read_text(), re.M)[1:]
+PAGE = ROOT / "docs/explanation/architecture.md"
+PACKAGES = re.findall(r"^\| (\w+) \|", PAGE.read_text(), re.M)[1:]
 
 
 def imported(file):

@@ -19,7 +19,7 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 report: {panorama: false}
 """
-# The example of docs/scenes.md.
+# The example of docs/how-to/keep-your-own-folder.md.
 WORKFLOW = f"""
 module plenoforge:
     snakefile: "{ROOT}/Snakefile"
@@ -73,7 +73,7 @@ def test_scenes_poses_results_and_work_are_in_the_users_folder(folder):
     content = json.loads((folder / "results/mine/LFOwn/lightfield.json").read_text())
     assert [frame["position"] for frame in content["frames"]] == [[0, 0, 1.3]]
     assert (folder / "work/logs/mine/LFOwn/lightfield.log").is_file()
-    # Without --cores, and with the choice of docs/scenes.md: all rigs of these scenes.
+    # Without --cores, and with the choice of that page: all rigs of these scenes.
     (folder / "config.yaml").write_text("scenes: [mine]\npreset: full\n")
     code, said = snakemake(*folder_arguments, "verify", "rig_tables")
     assert code == 0, said

@@ -460,7 +460,7 @@ def test_a_pngs_header_leads_back_to_its_light(dataset, run):
     said = {name: image.attributes[f"plenoforge:{name}"] for name in written}
     assert said == {name: str(value) for name, value in written.items()}
     light = read_image(dataset / "out/view_0000f.exr").colour
-    # The formula of docs/formats.md, for the sRGB value y and the maximum m.
+    # The formula of docs/reference/files.md, for the sRGB value y and the maximum m.
     y, m = decode_srgb(image.colour / 255), float(said["reinhard"])
     v = m**2 / 2 * (y - 1 + np.sqrt((1 - y) ** 2 + 4 * y / m**2))
     run(*optics, "--exr")

@@ -92,13 +92,13 @@ FARTHEST = 1e7
 Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
 # Named, so that the JSON schema has it once.
 Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
-# What messages say instead of a regular expression.
-_MEANINGS: dict[str, str] = {}
+# What messages and the reference say instead of a regular expression.
+MEANINGS: dict[str, str] = {}
 
 
 def pattern(expression: str, meaning: str) -> str:
     """Return a field's pattern. Messages show its ``meaning`` instead of the expression."""
-    _MEANINGS[expression] = meaning
+    MEANINGS[expression] = meaning
     return expression
 
 
@@ -209,7 +209,7 @@ def _allowed(error: ErrorDetails) -> str:
         case "bool_type":
             return "be true or false"
         case "string_pattern_mismatch":
-            return f"be {_MEANINGS[error['ctx']['pattern']]}"
+            return f"be {MEANINGS[error['ctx']['pattern']]}"
         case "list_type":
             return "be a list"
         case "literal_error":

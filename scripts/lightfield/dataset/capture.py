@@ -146,12 +146,20 @@ class LightfieldSettings(Settings):
     """The settings of scripts/make_lightfield.py."""
 
     scene: str = Field(description="Name of a file in configs/scenes/.")
-    source: Annotated[SceneSource, PlainSerializer(_source_as_written)]
-    render: dict[str, Any] = Field(description="Within the limits of the preset.")
-    rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)]
+    source: Annotated[SceneSource, PlainSerializer(_source_as_written)] = Field(
+        description="The block `scene` of the scene YAML."
+    )
+    render: dict[str, Any] = Field(
+        description="The block `render` of the scene YAML, within the limits of the preset."
+    )
+    rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)] = Field(
+        description="As in the scene YAML."
+    )
     flow: bool = Field(False, description="Whether each view has a neighbour for its flow.")
     panorama_width: AtLeastOne | None = Field(
-        None, description="Instead of the rig, a panorama from its centre, this many pixels wide."
+        None,
+        description="Width of a panorama from the rig's centre, which replaces the rig.",
+        json_schema_extra={"unit": "pixels"},
     )
     fingerprint: str | None = Field(
         None, description="Changes with the builder's text, so that the scene is captured again."

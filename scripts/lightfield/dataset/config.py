@@ -144,22 +144,41 @@ AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 class Preset(Settings):
     """Upper limits of a scene YAML's values. A key that is left out limits nothing."""
 
-    resolution: AtLeastOne | None = Field(None, description="Pixels along an image's longer side.")
-    samples: AtLeastOne | None = Field(None, description="Paths for each pixel.")
-    views: AtLeastOne | None = Field(None, description="Views of a rig.")
+    resolution: AtLeastOne | None = Field(
+        None, description="Length of an image's longer side.", json_schema_extra={"unit": "pixels"}
+    )
+    samples: AtLeastOne | None = Field(
+        None, description="Paths for each pixel.", json_schema_extra={"unit": "paths"}
+    )
+    views: AtLeastOne | None = Field(
+        None, description="Views of a rig.", json_schema_extra={"unit": "views"}
+    )
     denoise: bool | None = Field(None, description="Denoise even if the scene YAML does not.")
 
 
 class Energy(Settings):
     """The power and price from which report/costs.json computes energy and costs."""
 
-    watts: float = Field(65, ge=0, le=1e6, description="Power of a machine whose cores all work.")
+    watts: float = Field(
+        65,
+        ge=0,
+        le=1e6,
+        description="Power of a machine whose cores all work.",
+        json_schema_extra={"unit": "W"},
+    )
     cores: Auto | AtLeastOne = Field(
         "auto",
         description="Cores of that machine. auto: those of the machine that computes the costs.",
+        json_schema_extra={"unit": "cores"},
     )
-    price_per_kwh: float = Field(0.32, ge=0, le=1e6)
-    currency: str = Field("EUR", max_length=20)
+    price_per_kwh: float = Field(
+        0.32,
+        ge=0,
+        le=1e6,
+        description="Price of electricity.",
+        json_schema_extra={"unit": "currency/kWh"},
+    )
+    currency: str = Field("EUR", max_length=20, description="Currency of the price.")
 
 
 _SHARDS_ARE_AUTOMATIC = (
@@ -175,7 +194,9 @@ class Configuration(Settings):
         "shard_minutes": _SHARDS_ARE_AUTOMATIC,
     }
 
-    scenes: Names = Field(description="Names of files in configs/scenes/, without .yaml.")
+    scenes: Names = Field(
+        description="Names of files in configs/scenes/, without .yaml. One name needs no list."
+    )
     rigs: Literal["all"] | Names = Field(
         "all", description="all, or the names of the rigs to build."
     )
@@ -191,7 +212,7 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ] = Field(min_length=1)
+    ] = Field(min_length=1, description="Upper limits of a scene YAML's values, by name.")
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
@@ -205,6 +226,7 @@ class Configuration(Settings):
         description="How many views one render job makes. With auto, the number follows from the "
         "expected time of a view, and on a cluster from the jobs that run at once (--jobs). A "
         "dataset that was begun with auto keeps its jobs.",
+        json_schema_extra={"unit": "views"},
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
@@ -212,9 +234,11 @@ class Configuration(Settings):
         "YAML.",
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="Largest size of a package's parts. Without it, a package is one file."
+        None,
+        description="Largest size of a package's parts. Without it, a package is one file.",
+        json_schema_extra={"unit": "GB"},
     )
-    energy: Energy = Energy()
+    energy: Energy = Field(Energy(), description="From what energy and costs are computed.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -254,8 +278,12 @@ def _check_folder(key: str, folder: str) -> None:
 class Parameters(Settings):
     """The parameters of a builder."""
 
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(1.0, description="1 is full.")
+    seed: int = Field(
+        0, ge=0, le=2**63 - 1, description="Another seed places and shapes things anew."
+    )
+    detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
+        1.0, description="Level of detail of plants and meshes. 1 is full."
+    )
 
 
 # The word in a scene YAML that stands for the .blend's own value.
@@ -272,15 +300,15 @@ class SceneSource(Settings):
         pattern=pattern(
             "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
         ),
-        description="The builder's file in scripts/scenes/, without .py.",
+        description="The builder: the name of a folder in scripts/scenes/.",
     )
-    parameters: Parameters = Parameters()
+    parameters: Parameters = Field(Parameters(), description="The builder's parameters.")
     blend: str | None = Field(
         None,
         pattern=pattern(
             rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
         ),
-        description="The user's own .blend file, relative to the scene YAML's repository.",
+        description="The path of your own .blend file, from the folder that Snakemake runs in.",
     )
     dataset: str | None = Field(
         None,
@@ -348,7 +376,9 @@ CHOSEN = ("samples", "adaptive_threshold", "denoise")
 class TargetError(Settings):
     """A target error, and how it may be reached."""
 
-    value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN]
+    value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
+        description="The relative mean squared error to reach."
+    )
     denoise: Literal["auto", "never"] = Field(
         "auto", description="never: choose only between plain and adaptive sampling."
     )
@@ -362,7 +392,9 @@ class Render(Settings):
     """
 
     samples: AtLeastOne | Literal["file"] | None = Field(
-        None, description="Paths for each pixel. file: as many as in the .blend."
+        None,
+        description="Paths for each pixel. file: as many as in the .blend.",
+        json_schema_extra={"unit": "paths"},
     )
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
@@ -371,10 +403,16 @@ class Render(Settings):
         "with middle grey at 0.18, without the worst thousandth of pixels.",
     )
     max_bounces: int | None = Field(
-        None, ge=0, le=1024, description="Bounces of a path, of any kind."
+        None,
+        ge=0,
+        le=1024,
+        description="Bounces of a path, of any kind.",
+        json_schema_extra={"unit": "bounces"},
     )
     clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
-        None, description="Largest value of one indirect sample. 0 does not clamp."
+        None,
+        description="Largest value of one indirect sample. 0 does not clamp.",
+        json_schema_extra={"unit": "light"},
     )
     light_tree: bool | None = Field(
         None, description="Prefer lights that matter at a place, by a tree of all lights."
@@ -383,7 +421,7 @@ class Render(Settings):
         None, description="Learn where light comes from while rendering. Only on CPUs."
     )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
-        None, description="Width of the pixel filter, in pixels."
+        None, description="Width of the pixel filter.", json_schema_extra={"unit": "pixels"}
     )
     adaptive_threshold: Annotated[float, Field(ge=0, le=1), AS_WRITTEN] = Field(
         0, description="Noise at which adaptive sampling stops early. 0 takes every sample."
@@ -448,7 +486,8 @@ class Reprojection(ReprojectionOptions):
     format: Literal["png", "exr"] = Field("png", description="Only EXR has depth.")
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0,
-        description="In stops. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
+        description="Exposure. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
+        json_schema_extra={"unit": "stops"},
     )
     passes: PassNames | None = Field(
         None, description="Passes of render.passes to reproject, too, as EXR."
@@ -526,7 +565,7 @@ class Credits(Settings):
 class Scene(Credits):
     """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
-    scene: SceneSource
+    scene: SceneSource = Field(description="The scene: a builder, a .blend, or a dataset.")
     render: Render | None = Field(
         None, description="How Cycles renders. Required, except with scene.dataset."
     )

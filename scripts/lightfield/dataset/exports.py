@@ -67,9 +67,19 @@ class Export(Settings):
 class Developed(Export):
     """An export of 8-bit pictures. ``exposure`` and ``reinhard`` apply only to EXR sources."""
 
-    exposure: float = Field(0.0, ge=-100, le=100, description="Of EXR sources, in stops.")
+    exposure: float = Field(
+        0.0,
+        ge=-100,
+        le=100,
+        description="Exposure of EXR sources.",
+        json_schema_extra={"unit": "stops"},
+    )
     reinhard: float = Field(
-        1.0, ge=1e-9, le=1e9, description="Of EXR sources: the value that becomes white; 1 is none."
+        1.0,
+        ge=1e-9,
+        le=1e9,
+        description="Tone mapping of EXR sources: the value that becomes white; 1 is none.",
+        json_schema_extra={"unit": "light"},
     )
 
 
@@ -81,22 +91,30 @@ class InstantNgp(Export):
     """The transforms.json of instant-ngp."""
 
     scale: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
-        None, description="World to unit cube; without it, fitted to the scene."
+        None,
+        description="Scale from the world to the unit cube. Without it, fitted to the scene.",
+        json_schema_extra={"unit": "cubes/m"},
     )
     offset: Vector | None = Field(
-        None, description="The mean camera's place in the unit cube; without it, 0.5 each."
+        None,
+        description="The mean camera's place in the unit cube. Without it, 0.5 each.",
+        json_schema_extra={"unit": "cubes"},
     )
     bounds: Literal["rig", "depth"] = Field(
         "rig",
         description="What is fitted without a scale: the rig, or what the views' depth shows.",
     )
     aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = Field(
-        None, description="Side of the training volume, in unit cubes."
+        None, description="Side of the training volume.", json_schema_extra={"unit": "cubes"}
     )
     render_aabb: Annotated[tuple[Vector, Vector], as_list(2)] | None = Field(
-        None, description="Two corners of the part of the unit cube that is shown."
+        None,
+        description="Two corners of the part of the unit cube that is shown.",
+        json_schema_extra={"unit": "cubes"},
     )
-    depth: bool = Field(False, description="Depth maps too, 16 bit, from sources with depth.")
+    depth: bool = Field(
+        False, description="Write depth maps of 16 bits, too, from sources with depth."
+    )
 
     @model_validator(mode="after")
     def _one_placement(self) -> Self:
@@ -136,11 +154,11 @@ class Colmap(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    format: Literal["binary", "text"] = "binary"
+    format: Literal["binary", "text"] = Field("binary", description="The form of COLMAP's files.")
     points: PointCount = Field(
-        50000, description="Points lifted from depth, at most; one more for an image without any."
+        50000, description="Most points lifted from depth. An image without any gets one more."
     )
-    depth: bool = Field(False, description="Depth maps too, from sources with depth.")
+    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | KannalaBrandt):
@@ -157,8 +175,8 @@ class Nerfstudio(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Points of the point cloud, at most.")
-    depth: bool = Field(False, description="Depth maps too, from sources with depth.")
+    points: PointCount = Field(50000, description="Most points of the point cloud.")
+    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
     # This changes no file.
     splatfacto: bool = Field(
         False, exclude=True, description="Refuse what splatfacto cannot train on."
@@ -191,7 +209,9 @@ class NerfSynthetic(Developed):
 class OpenDibr(Developed):
     """The views and list that OpenDIBR plays."""
 
-    format: Literal["png", "h265"] = Field("png", description="h265 needs ffmpeg.")
+    format: Literal["png", "h265"] = Field(
+        "png", description="The form of colour and disparity. h265 needs ffmpeg."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant):
@@ -235,7 +255,7 @@ class ScanNetPP(Developed):
     is_for_training: ClassVar[bool] = True
 
     points: PointCount = Field(
-        50000, description="Points lifted from depth, at most; one more for an image without any."
+        50000, description="Most points lifted from depth. An image without any gets one more."
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -251,20 +271,29 @@ class PosesCsv(Export):
 class PointCloud(Developed):
     """A .ply of all surfaces that the views see."""
 
-    voxel: float = Field(0.01, gt=0, description="Metres; one point is kept in each.")
+    voxel: float = Field(
+        0.01,
+        gt=0,
+        description="Side of a voxel. Each keeps one point.",
+        json_schema_extra={"unit": "m"},
+    )
 
 
 class Exports(Settings):
-    instant_ngp: InstantNgp | None = None
-    colmap: Colmap | None = None
-    nerfstudio: Nerfstudio | None = None
-    nerf_synthetic: NerfSynthetic | None = None
-    opendibr: OpenDibr | None = None
-    miv: Miv | None = None
-    hci: Hci | None = None
-    scannetpp: ScanNetPP | None = None
-    poses_csv: PosesCsv | None = None
-    point_cloud: PointCloud | None = None
+    """The exports, by format."""
+
+    instant_ngp: InstantNgp | None = Field(None, description="For instant-ngp.")
+    colmap: Colmap | None = Field(None, description="For gsplat, 3DGRUT and 3D Gaussian splatting.")
+    nerfstudio: Nerfstudio | None = Field(None, description="For nerfstudio.")
+    nerf_synthetic: NerfSynthetic | None = Field(
+        None, description="For readers of NeRF's synthetic scenes."
+    )
+    opendibr: OpenDibr | None = Field(None, description="For OpenDIBR.")
+    miv: Miv | None = Field(None, description="For TMIV.")
+    hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
+    scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
+    point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 
     @property
     def selected(self) -> dict[str, Export]:
@@ -295,7 +324,7 @@ class ExportSettings(Settings, Generic[Options]):
     """The settings of one job, which exports the views of one source."""
 
     options: Options = Field(description="As in the scene YAML, with one source.")
-    suffix: Literal[".png", ".exr"] = Field(".exr", description="Of the views.")
+    suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the views.")
     tested_by: dict[str, str] = Field(
         {}, description="Folders of the rigs' datasets whose views test what is trained on these."
     )

@@ -34,8 +34,10 @@ CAMERA_KEYS = ("camera", "split")
 class BuildSettings(Settings):
     """The settings of scripts/build_scene.py."""
 
-    builder: Annotated[str, AfterValidator(_known_builder)]
-    parameters: Parameters = Parameters()
+    builder: Annotated[str, AfterValidator(_known_builder)] = Field(
+        description="A folder of scripts/scenes/."
+    )
+    parameters: Parameters = Field(Parameters(), description="The builder's parameters.")
     fingerprint: str | None = Field(
         None, description="Changes with the builder's text, so that the scene is built again."
     )
@@ -44,22 +46,26 @@ class BuildSettings(Settings):
 class FreePlacesSettings(Settings):
     """The settings of scripts/free_places.py."""
 
-    rig: Annotated[Random, PlainSerializer(_places_as_written)]
+    rig: Annotated[Random, PlainSerializer(_places_as_written)] = Field(
+        description="As in the scene YAML, without camera and split."
+    )
     frame: Frame | Literal["file"] = Field(1, description=f"{FILE}: the .blend's own frame.")
-    scene_name: str | None = None
-    view_layers: Literal["all"] | list[str] | None = None
+    scene_name: str | None = Field(None, description="As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None, description="As in the scene YAML."
+    )
 
 
 class FiguresSettings(Settings):
     """The settings of scripts/report_figures.py."""
 
-    rig: Annotated[AnyRig, PlainSerializer(as_written)]
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
 
 
 class Measurement(Settings):
     """A file of a measurement that a page shows."""
 
-    file: str
+    file: str = Field(description="The path of the measurement's file.")
     modified_ns: int | None = Field(
         None, description="Changes when it is measured again, so that the page is made again."
     )
@@ -68,13 +74,13 @@ class Measurement(Settings):
 class PageSettings(Settings):
     """The settings of scripts/report_html.py."""
 
-    rig: Annotated[AnyRig, PlainSerializer(as_written)]
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
     yaml: str = Field(description="The scene YAML's text.")
     command: str = Field(description="What makes the dataset again.")
     panorama: bool = Field(
         False, description="Whether the overview is a panorama, not the view in the rig's middle."
     )
-    measurements: list[Measurement] = Field([])
+    measurements: list[Measurement] = Field([], description="Measurements that the page shows.")
 
 
 class ValidationSettings(Settings):
@@ -96,9 +102,12 @@ class PackSettings(Settings):
         [], description="The datasets in the folder. With others the folder is packed again."
     )
     gigabytes: float | None = Field(
-        None, gt=0, description="The largest size of a part. Without it, there is one part."
+        None,
+        gt=0,
+        description="The largest size of a part. Without it, there is one part.",
+        json_schema_extra={"unit": "GB"},
     )
-    scene: Credits = Credits()
+    scene: Credits = Field(Credits(), description="What the package's card says of the scene.")
 
 
 class SynthesisSettings(Settings):
@@ -109,4 +118,8 @@ class SynthesisSettings(Settings):
         description="Folders of the datasets that synthesised views are compared with. Without "
         "any, they are compared with the dataset's own test views.",
     )
-    views: AtLeastOne = Field(12, description="Views of each of these that are compared.")
+    views: AtLeastOne = Field(
+        12,
+        description="Views of each of these that are compared.",
+        json_schema_extra={"unit": "views"},
+    )

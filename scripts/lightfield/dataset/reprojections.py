@@ -29,17 +29,28 @@ class ReprojectionOptions(Settings):
         description="The lens and image. Without it, those of the views: nothing is resampled.",
     )
     cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
-    rotation: Vector = Field((0.0, 0.0, 0.0), description="Pan, pitch and roll in degrees.")
+    rotation: Vector = Field(
+        (0.0, 0.0, 0.0), description="Pan, pitch and roll.", json_schema_extra={"unit": "degrees"}
+    )
     filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
         "adaptive", description="How colour is resampled."
     )
-    samples: int = Field(1, ge=1, le=MOST_SAMPLES, description="n x n samples for each pixel.")
-    bits: Literal[8, 16] = Field(8, description="Bits of a PNG's values.")
+    samples: int = Field(
+        1,
+        ge=1,
+        le=MOST_SAMPLES,
+        description="Samples along each side of a pixel: n x n in all.",
+        json_schema_extra={"unit": "samples"},
+    )
+    bits: Literal[8, 16] = Field(
+        8, description="Depth of a PNG's values.", json_schema_extra={"unit": "bits"}
+    )
     reinhard: float = Field(
         1.0,
         ge=1e-9,
         le=1e9,
         description="Reinhard tone mapping: the value that becomes white; 1 is none.",
+        json_schema_extra={"unit": "light"},
     )
 
     @model_validator(mode="after")
@@ -65,10 +76,15 @@ class ReprojectionOptions(Settings):
 class ReprojectionSettings(ReprojectionOptions):
     """The settings of scripts/reproject.py. scripts/lens_map.py needs only `LENS_MAP_KEYS`."""
 
-    formats: list[Literal["exr", "png"]] = Field([], description="EXR holds depth, too.")
-    exposure: Stops = Field(0.0, description="In stops.")
+    formats: list[Literal["exr", "png"]] = Field(
+        [], description="The files to write. EXR holds depth, too."
+    )
+    exposure: Stops = Field(0.0, description="Exposure.", json_schema_extra={"unit": "stops"})
     depth_png: float | None = Field(
-        None, gt=0, description="Steps in a metre of 16-bit depth maps. Without it, no such maps."
+        None,
+        gt=0,
+        description="Steps of 16-bit depth maps. Without it, no such maps.",
+        json_schema_extra={"unit": "steps/m"},
     )
     mask: bool = Field(False, description="Also write masks of the pixels without a source.")
     passes: list[str] = Field([], description="Passes to reproject, too.")

@@ -48,18 +48,25 @@ class Stage:
 class FullSize(Settings):
     """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
 
-    views: AtLeastOne
-    resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
-    samples: AtLeastOne | Literal["file"] | None = None
-    denoise: bool | None = None
+    views: AtLeastOne = Field(description="Views of the rig.", json_schema_extra={"unit": "views"})
+    resolution: list[AtLeastOne] = Field(
+        min_length=2,
+        max_length=2,
+        description="Width and height.",
+        json_schema_extra={"unit": "pixels"},
+    )
+    samples: AtLeastOne | Literal["file"] | None = Field(
+        None, description="Paths for each pixel.", json_schema_extra={"unit": "paths"}
+    )
+    denoise: bool | None = Field(None, description="Whether views are denoised.")
 
 
 class CostSettings(Settings):
     """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
 
-    energy: Energy
-    full: FullSize
-    reprojections: list[str] = Field([])
+    energy: Energy = Field(description="The key `energy` of config.yaml.")
+    full: FullSize = Field(description="The dataset at full size.")
+    reprojections: list[str] = Field([], description="Names of the reprojections.")
 
 
 @dataclass(frozen=True)

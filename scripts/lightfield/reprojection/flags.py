@@ -86,9 +86,15 @@ def add_lens_map_flags(parser: argparse.ArgumentParser) -> None:
     sampling = parser.add_argument_group("Sampling")
     sampling.add_argument("-s", "--samples", type=int, default=1, help="n × n samples a pixel")
     kind = sampling.add_mutually_exclusive_group()
-    kind.add_argument("--nn", action="store_const", dest="filter", const="nearest")
-    kind.add_argument("--bl", action="store_const", dest="filter", const="bilinear")
-    kind.add_argument("--bc", action="store_const", dest="filter", const="bicubic")
+    kind.add_argument(
+        "--nn", action="store_const", dest="filter", const="nearest", help="--filter nearest"
+    )
+    kind.add_argument(
+        "--bl", action="store_const", dest="filter", const="bilinear", help="--filter bilinear"
+    )
+    kind.add_argument(
+        "--bc", action="store_const", dest="filter", const="bicubic", help="--filter bicubic"
+    )
     kind.add_argument(
         "--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}, or bicubic with --samples"
     )

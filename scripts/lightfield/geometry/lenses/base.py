@@ -45,7 +45,9 @@ LENSES: dict[str, "type[Lens]"] = {}
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]
-FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
+FocalLength = Annotated[
+    Millimetres, Field(description="Focal length.", json_schema_extra={"unit": "mm"})
+]
 
 
 class LensSettings(Settings):
@@ -57,13 +59,19 @@ class LensSettings(Settings):
 
     lens: str
     resolution: Annotated[tuple[Pixels, Pixels], as_list(2)] = Field(
-        description="Width and height in pixels."
+        description="Width and height.", json_schema_extra={"unit": "pixels"}
     )
     sensor_size: Millimetres | Annotated[tuple[Millimetres, Millimetres], as_list(2)] | None = (
-        Field(None, description="Millimetres: the width, or width and height.")
+        Field(
+            None,
+            description="The sensor's width, or width and height. Without it, 36 wide.",
+            json_schema_extra={"unit": "mm"},
+        )
     )
     principal_point: Annotated[tuple[Place, Place], as_list(2)] | None = Field(
-        None, description="In pixels; without it, the centre."
+        None,
+        description="The optical axis in the image. Without it, the centre.",
+        json_schema_extra={"unit": "pixels"},
     )
 
     @model_validator(mode="after")
@@ -362,8 +370,13 @@ class FisheyeSettings(LensSettings):
 
 def fov_up_to(largest: float, default: Any = ...) -> Any:
     """Return the field `fov` of a fisheye's settings, of at most ``largest`` degrees."""
-    text = "Full field of view, degrees."
-    return Field(default, gt=0, le=largest, description=text)
+    return Field(
+        default,
+        gt=0,
+        le=largest,
+        description="Full field of view.",
+        json_schema_extra={"unit": "degrees"},
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

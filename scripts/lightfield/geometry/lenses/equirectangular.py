@@ -21,10 +21,14 @@ class EquirectangularSettings(LensSettings):
 
     lens: Literal["equirectangular"]
     longitude: Annotated[tuple[Longitude, Longitude], as_list(2)] = Field(
-        (-180, 180), description="Smallest and largest, degrees."
+        (-180, 180),
+        description="Smallest and largest longitude.",
+        json_schema_extra={"unit": "degrees"},
     )
     latitude: Annotated[tuple[Latitude, Latitude], as_list(2)] = Field(
-        (-90, 90), description="Smallest and largest, degrees."
+        (-90, 90),
+        description="Smallest and largest latitude.",
+        json_schema_extra={"unit": "degrees"},
     )
 
     def optics(self) -> dict[str, Any]:

@@ -27,9 +27,13 @@ class RectilinearSettings(LensSettings):
 
     lens: Literal["rectilinear"]
     fov: Annotated[float, Field(gt=0, lt=180)] | None = Field(
-        None, description="Full field of view across the image's width, degrees."
+        None,
+        description="Full field of view across the image's width.",
+        json_schema_extra={"unit": "degrees"},
     )
-    focal_length: FocalLength | None = Field(None, description="Millimetres, instead of fov.")
+    focal_length: FocalLength | None = Field(
+        None, description="Focal length, instead of fov.", json_schema_extra={"unit": "mm"}
+    )
 
     def optics(self) -> dict[str, Any]:
         if self.focal_length is None and self.fov is None:

@@ -15,7 +15,9 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 class Hemisphere(Orbit):
     type: Literal["hemisphere"]
     elevation: Elevations = Field(
-        (0.0, 90.0), description="Of the lowest and the highest camera, degrees."
+        (0.0, 90.0),
+        description="Elevation of the lowest and the highest camera.",
+        json_schema_extra={"unit": "degrees"},
     )
     pattern: Literal["fibonacci", "rings"] = Field(
         "fibonacci", description="A spiral by the golden angle, or rings of equal spacing."

@@ -16,8 +16,14 @@ _PIECES = 2000
 
 
 class Key(Settings):
-    position: Vector
-    rotation: Vector | None = Field(None, description="XYZ Euler angles in degrees.")
+    """A pose on a path."""
+
+    position: Vector = Field(
+        description="Where the path goes through.", json_schema_extra={"unit": "m"}
+    )
+    rotation: Vector | None = Field(
+        None, description="XYZ Euler angles.", json_schema_extra={"unit": "degrees"}
+    )
     quaternion_wxyz: Annotated[tuple[float, float, float, float], as_list(4)] | None = Field(
         None, description="The rotation as a quaternion, w first; instead of angles."
     )

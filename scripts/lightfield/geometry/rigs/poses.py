@@ -70,7 +70,10 @@ class Listing(NamedTuple):
 
 
 class Poses(Rig):
-    """Poses from a file. Presets set ``max_views``, an even subset; a scene YAML cannot."""
+    """Poses from a file.
+
+    Presets set ``max_views``, an even subset. A scene YAML cannot.
+    """
 
     shape = "PLANE"
     is_loose = True

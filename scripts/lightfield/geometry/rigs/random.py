@@ -28,9 +28,13 @@ class Random(CountedRig):
     unit_volume = 1.0
 
     type: Literal["random"]
-    seed: int = Field(0, ge=0, le=2**31 - 1)
+    seed: int = Field(0, ge=0, le=2**31 - 1, description="Another seed gives other places.")
     clearance: float = Field(
-        0.2, gt=0, le=1000, description="Metres to the nearest surface, at least."
+        0.2,
+        gt=0,
+        le=1000,
+        description="Least distance to the nearest surface.",
+        json_schema_extra={"unit": "m"},
     )
     file: SkipJsonSchema[str | None] = None
 

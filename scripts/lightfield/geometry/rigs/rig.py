@@ -78,9 +78,11 @@ class UnitPoses:
 
 
 class Frames(Settings):
-    first: Frame
-    last: Frame
-    step: int = Field(1, ge=1)
+    """A range of frames of an animation."""
+
+    first: Frame = Field(description="The first frame.")
+    last: Frame = Field(description="The last frame.")
+    step: int = Field(1, ge=1, description="Render every n-th frame.")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -104,8 +106,13 @@ EYES = {"left": -1, "right": 1}
 
 
 class Stereo(Settings):
+    """A pair of cameras at each position."""
+
     distance: float = Field(
-        gt=0, le=1000, description="Metres between the eyes, on both sides of the position."
+        gt=0,
+        le=1000,
+        description="Distance between the eyes, on both sides of the position.",
+        json_schema_extra={"unit": "m"},
     )
     omnidirectional: bool = Field(
         False,
@@ -134,17 +141,26 @@ class Rig(Settings):
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
 
-    type: str
-    size: Size = Field(1, description="Metres, along every axis or along x, y and z.")
-    center: Vector = Field((0, 0, 0), description="Metres.")
+    type: str = Field(description="The type, which places the cameras.")
+    size: Size = Field(
+        1,
+        description="Size along every axis, or along x, y and z.",
+        json_schema_extra={"unit": "m"},
+    )
+    center: Vector = Field(
+        (0, 0, 0), description="The rig's middle.", json_schema_extra={"unit": "m"}
+    )
     rotation: Vector = Field(
-        (0, 0, 0), description="Of the whole rig: XYZ Euler angles in degrees."
+        (0, 0, 0),
+        description="Rotation of the whole rig: XYZ Euler angles.",
+        json_schema_extra={"unit": "degrees"},
     )
     face_inside: bool = Field(False, description="Turn every camera round.")
     look_at: Vector | None = Field(
         None,
-        description="The point that every camera looks at, in world coordinates, metres. It "
-        "replaces the rig's own directions.",
+        description="The point that every camera looks at, in world coordinates. It replaces the "
+        "rig's own directions.",
+        json_schema_extra={"unit": "m"},
     )
     cube_map: bool = Field(False, description="Six 90 degree views at each position.")
     stereo: Stereo | None = Field(None, description="A pair of views at each position.")
@@ -158,7 +174,9 @@ class Rig(Settings):
         "validation or test: all views do. A mapping: every n-th position tests, or views by name.",
     )
     # Every rig of a scene YAML has a camera. Code that needs only the places may leave it out.
-    camera: CameraSettings = None  # type: ignore[assignment]
+    camera: CameraSettings = Field(  # type: ignore[assignment]
+        None, description="The lens and image."
+    )
 
     @model_validator(mode="after")
     def _looks_one_way(self) -> Self:
@@ -338,7 +356,7 @@ def ball_outline() -> list[Floats]:
 class CountedRig(Rig):
     """A rig of any number of cameras. With fewer cameras it is still a rig of its type."""
 
-    count: int = Field(ge=1, le=100000, description="Cameras.")
+    count: int = Field(ge=1, le=100000, description="Number of cameras.")
 
     @property
     def positions(self) -> int:

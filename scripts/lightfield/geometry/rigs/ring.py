@@ -12,7 +12,9 @@ from lightfield.geometry.rotations import Floats
 
 class Ring(Orbit):
     type: Literal["ring"]
-    elevation: Elevation = Field(0.0, description="Of every camera, degrees.")
+    elevation: Elevation = Field(
+        0.0, description="Elevation of every camera.", json_schema_extra={"unit": "degrees"}
+    )
 
     def directions(self) -> Floats:
         azimuth = 2 * np.pi * np.arange(self.count) / self.count

@@ -22,7 +22,9 @@ class Sphere(Rig):
 
     type: Literal["sphere"]
     subdivisions: int = Field(
-        ge=1, le=7, description="Of the icosphere: 1 is 12 cameras, 2 is 42, 3 is 162, 4 is 642."
+        ge=1,
+        le=7,
+        description="Subdivisions of the icosphere: 1 is 12 cameras, 2 is 42, 3 is 162, 4 is 642.",
     )
 
     @property

@@ -11,9 +11,17 @@ from lightfield.geometry.rotations import Floats
 
 class Spiral(Orbit):
     type: Literal["spiral"]
-    turns: float = Field(2.0, gt=0, le=1000, description="Times round the object.")
+    turns: float = Field(
+        2.0,
+        gt=0,
+        le=1000,
+        description="Times round the object.",
+        json_schema_extra={"unit": "turns"},
+    )
     elevation: Elevations = Field(
-        (0.0, 60.0), description="Of the first and the last camera, degrees."
+        (0.0, 60.0),
+        description="Elevation of the first and the last camera.",
+        json_schema_extra={"unit": "degrees"},
     )
 
     def directions(self) -> Floats:
