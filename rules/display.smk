@@ -4,10 +4,7 @@ import resource
 
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
-from lightfield.dataset.unit_costs import (
-    JOB_SECONDS,
-    START_UP_SECONDS,
-)
+from lightfield.dataset.unit_costs import JOB_SECONDS, START_UP_SECONDS
 from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
 # For more datasets than this, only the page of all datasets is named.
@@ -24,8 +21,6 @@ PHASES = {
     "validate": "validation",
     "costs": "report",
 }
-
-
 # The phases of a dataset, in the order of the work. Other phases follow.
 PHASE_ORDER = {
     phase: place
@@ -249,13 +244,6 @@ def print_pages():
         print(f"valid: {page}", file=sys.stderr)
 
 
-def work_of(job, name):
-    """Return a job's part of the forecast, under a name."""
-    views = rendered_views(job)
-    size = views * dataset_of(job.wildcards).estimate.all_view_bytes if views else 0.0
-    return Work(name, 1, views, estimated_seconds(job) or 0.0, size)
-
-
 def dataset_name_of(job):
     """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
     wildcards = job.wildcards
@@ -267,6 +255,14 @@ def dataset_name_of(job):
     return f"{dataset.scene_folder}/{dataset.rig_name}"
 
 
+def work_of(job):
+    """Return a job's part of the forecast."""
+    views = rendered_views(job)
+    size = views * dataset_of(job.wildcards).estimate.all_view_bytes if views else 0.0
+    seconds = estimated_seconds(job) or 0.0
+    return Work(phase_of(job), dataset_name_of(job), views, seconds, size)
+
+
 def print_forecast():
     """Print the jobs, views, CPU time and size of a dry run's phases and datasets at its end."""
     if not is_planned_dry_run():
@@ -276,9 +272,7 @@ def print_forecast():
     # Targets such as `all` have no program, and so no log.
     jobs = [job for job in needed_jobs() if job.log]
     jobs.sort(key=lambda job: PHASE_ORDER.get(phase_of(job), len(PHASE_ORDER)))
-    phases = [work_of(job, phase_of(job)) for job in jobs]
-    datasets = [work_of(job, name) for job in jobs if (name := dataset_name_of(job))]
-    print(forecast(phases, sorted(datasets, key=lambda work: work.name)))
+    print(forecast([work_of(job) for job in jobs]))
 
 
 atexit.register(print_forecast)

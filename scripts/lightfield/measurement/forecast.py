@@ -3,7 +3,7 @@
 Every job reads this file with the rules, so it must import nothing that takes long.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lightfield.dataset.unit_costs import (
@@ -46,52 +46,52 @@ After `snakemake plan`, the seconds and bytes of a view are those that its probe
 
 @dataclass(frozen=True)
 class Work:
-    """Some jobs: their number, the views that they render, seconds of one core, and bytes."""
+    """The work of a job: the views that it renders, its seconds on one core, and their bytes.
 
-    name: str
-    jobs: int
+    ``dataset`` is the name of its dataset. It is None if the job belongs to none.
+    """
+
+    phase: str
+    dataset: str | None
     views: int
     seconds: float
     size: float
 
 
-def forecast(phases: Iterable[Work], datasets: Iterable[Work]) -> str:
-    """Return the tables that end a dry run, with sums, and with the formulas below.
+def forecast(works: Sequence[Work]) -> str:
+    """Return the tables that end a dry run, and the formulas below.
 
-    Works of the same name become one row. Several datasets have a table of their own.
+    The first table has a row for each phase, in the order of ``works``, and their sum. Several
+    datasets have a table of their own.
     """
-    rows = _sums(phases)
-    tables = [_table("phase", [*rows, _sum("all", rows)])]
-    dataset_rows = _sums(datasets)
-    if len(dataset_rows) > 1:
-        tables.append(_table("dataset", dataset_rows))
+    phases: dict[str, list[Work]] = {}
+    datasets: dict[str, list[Work]] = {}
+    for work in works:
+        phases.setdefault(work.phase, []).append(work)
+        if work.dataset:
+            datasets.setdefault(work.dataset, []).append(work)
+    tables = [_table("phase", {**phases, "all": works})]
+    if len(datasets) > 1:
+        tables.append(_table("dataset", dict(sorted(datasets.items()))))
     return "\n\n".join([*tables, FORMULAS])
 
 
-def _sums(works: Iterable[Work]) -> list[Work]:
-    """Return the sum of the works of each name, in the order of their first ones."""
-    by_name: dict[str, list[Work]] = {}
-    for work in works:
-        by_name.setdefault(work.name, []).append(work)
-    return [_sum(name, group) for name, group in by_name.items()]
-
-
-def _sum(name: str, works: Sequence[Work]) -> Work:
-    return Work(
-        name,
-        sum(work.jobs for work in works),
-        sum(work.views for work in works),
-        sum(work.seconds for work in works),
-        sum(work.size for work in works),
-    )
-
-
-def _table(title: str, works: Sequence[Work]) -> str:
+def _table(title: str, groups: Mapping[str, Sequence[Work]]) -> str:
+    """Return a table with a row for the sum of each group, by its name."""
     rows = [(title, "jobs", "views", "CPU time", "size")]
-    for work in works:
-        views = f"{work.views:,}" if work.views else ""
-        size = size_text(work.size) if work.size else ""
-        rows.append((work.name, f"{work.jobs:,}", views, time_text(work.seconds), size))
+    for name, works in groups.items():
+        views = sum(work.views for work in works)
+        seconds = sum(work.seconds for work in works)
+        size = sum(work.size for work in works)
+        rows.append(
+            (
+                name,
+                f"{len(works):,}",
+                f"{views:,}" if views else "",
+                time_text(seconds),
+                size_text(size) if size else "",
+            )
+        )
     return "\n".join(
         f"{name:<40} {jobs:>8} {views:>8} {seconds:>10} {size:>8}".rstrip()
         for name, jobs, views, seconds, size in rows
