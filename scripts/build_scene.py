@@ -7,8 +7,7 @@ import argparse
 import importlib
 from pathlib import Path
 
-from lightfield.core.cli import refuse_beside_settings, run
-from lightfield.core.errors import UserError
+from lightfield.core.cli import check_settings, run
 from lightfield.core.files import atomic_path
 from lightfield.dataset.names import builders
 
@@ -21,10 +20,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-    elif arguments.builder is None:
-        raise UserError("--builder: is missing; or give --settings")
+    check_settings(arguments, add_settings_flags, "builder")
 
     # Only now, so that --help need not wait for these.
     from pydantic import TypeAdapter

@@ -9,7 +9,7 @@ whose views test what is trained on these. An earlier export in the same folder 
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import refuse_beside_settings, run
+from lightfield.core.cli import check_settings, run
 from lightfield.dataset.names import EXPORTS, VIEWS
 
 
@@ -23,8 +23,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
+    check_settings(arguments, add_settings_flags)
 
     # Only now, so that --help need not wait for these.
     from pydantic import TypeAdapter

@@ -16,7 +16,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from lightfield.core.cli import above_zero, finite, refuse_beside_settings, run
+from lightfield.core.cli import above_zero, check_settings, finite, run
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -36,8 +36,7 @@ def main(words: Sequence[str] | None = None) -> None:
     )
     add_settings_flags(parser)
     arguments = parser.parse_args(words)
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
+    check_settings(arguments, add_settings_flags)
 
     # Only now, so that --help need not wait for it.
     from lightfield.export import instant_ngp

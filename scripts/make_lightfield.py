@@ -8,7 +8,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightfield.core.cli import refuse_beside_settings, run
+from lightfield.core.cli import check_settings, run
 from lightfield.core.errors import UserError
 
 
@@ -74,10 +74,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-    elif arguments.scene is None:
-        raise UserError("--scene: is missing; or give --settings")
+    check_settings(arguments, add_settings_flags, "scene")
     return arguments
 
 

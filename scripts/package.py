@@ -7,7 +7,7 @@ largest size of a part. `scene` has the keys description, licence and credit of 
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import above_zero, refuse_beside_settings, run
+from lightfield.core.cli import above_zero, check_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 
@@ -25,10 +25,7 @@ def main() -> None:
         raise UserError(f"--output {arguments.output}: must end in .tar; .json lies beside it")
     if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
         raise UserError(f"--output {arguments.output}: must not be in what it packs")
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-    elif arguments.scene is None:
-        raise UserError("--scene: is missing; or give --settings")
+    check_settings(arguments, add_settings_flags, "scene")
 
     # Only now, so that --help need not wait for these.
     from lightfield.core.settings import read_settings

@@ -9,7 +9,7 @@ OUTPUT.svg and OUTPUT.png show the quality over the number and the bytes of the 
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import positive, refuse_beside_settings, run
+from lightfield.core.cli import check_settings, positive, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
 
@@ -22,8 +22,7 @@ def main() -> None:
     add("--output", type=Path, required=True, metavar="STEM", help="stem of the files to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
+    check_settings(arguments, add_settings_flags)
 
     # Only now, so that --help need not wait for these.
     import numpy as np

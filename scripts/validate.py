@@ -18,7 +18,7 @@ from os.path import normpath
 from pathlib import Path
 
 from lightfield.core import leftovers
-from lightfield.core.cli import positive, refuse_beside_settings, run
+from lightfield.core.cli import check_settings, positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import ledger
@@ -46,8 +46,7 @@ def main() -> None:
     if not arguments.dataset.is_dir():
         raise UserError(f"{arguments.dataset}: no such folder")
 
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
+    check_settings(arguments, add_settings_flags)
     check(arguments)
 
 

@@ -67,10 +67,19 @@ def _as_value(word: str) -> str:
     return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
 
 
-def refuse_beside_settings(
-    arguments: argparse.Namespace, add_flags: Callable[[argparse.ArgumentParser], None]
+def check_settings(
+    arguments: argparse.Namespace,
+    add_flags: Callable[[argparse.ArgumentParser], None],
+    required: str | None = None,
 ) -> None:
-    """Raise `UserError` if a flag of ``add_flags`` is given beside --settings."""
+    """Raise `UserError` if a flag of ``add_flags`` is given beside --settings.
+
+    Without --settings, raise it if the ``required`` flag is missing.
+    """
+    if not arguments.settings:
+        if required and getattr(arguments, required) is None:
+            raise UserError(f"--{required}: is missing; or give --settings")
+        return
     parser = argparse.ArgumentParser()
     add_flags(parser)
     for name, default in vars(parser.parse_args([])).items():

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import InstanceOf, TypeAdapter
 
-from lightfield.core.cli import refuse_beside_settings
+from lightfield.core.cli import check_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import checked, read_settings
@@ -61,16 +61,16 @@ def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
 
 def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
     """Return the settings of a lens map, from --settings or from the flags."""
+    check_settings(arguments, add_lens_map_flags)
     if arguments.settings:
-        refuse_beside_settings(arguments, add_lens_map_flags)
         return read_settings(ReprojectionSettings, arguments.settings)
     return _of_flags(_lens_map_content(arguments, source))
 
 
 def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
     """Return the settings of a reprojection, from --settings or from the flags."""
+    check_settings(arguments, add_reproject_flags)
     if arguments.settings:
-        refuse_beside_settings(arguments, add_reproject_flags)
         settings = read_settings(ReprojectionSettings, arguments.settings)
         if not settings.formats:
             raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
