@@ -113,6 +113,14 @@ def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any
     return s0, s1, s2, s3
 
 
+@inline
+def _write(out: Array, row: int, column: int, v0: Any, v1: Any, v2: Any, v3: Any) -> None:
+    out[row, column, 0] = v0
+    out[row, column, 1] = v1
+    out[row, column, 2] = v2
+    out[row, column, 3] = v3
+
+
 @kernel
 def _finite_and_not_negative(s0: Any, s1: Any, s2: Any, s3: Any) -> bool:
     return bool(s0 + s1 + s2 + s3 < np.inf and min(min(s0, s1), min(s2, s3)) >= 0)
@@ -232,10 +240,7 @@ def interpolating(weights: Weights) -> Callable[..., None]:
                     reach = len(wx) // 2 - 1
                     s0, s1, s2, s3 = _sample(source, row - reach, column - reach, wy, wx)
                     if _finite_and_not_negative(s0, s1, s2, s3):
-                        out[i, j, 0] = s0
-                        out[i, j, 1] = s1
-                        out[i, j, 2] = s2
-                        out[i, j, 3] = s3
+                        _write(out, i, j, s0, s1, s2, s3)
                         continue
                 if _careful(source, valid, row, column, fy, fx, wy, wx, topology, result):
                     out[i, j] = result[0]
@@ -301,10 +306,7 @@ def covering(weights: Weights) -> Callable[..., None]:
                         a3 += s3
                 if sample_count:
                     scale = np.float32(1) / np.float32(sample_count)
-                    out[i, j, 0] = a0 * scale
-                    out[i, j, 1] = a1 * scale
-                    out[i, j, 2] = a2 * scale
-                    out[i, j, 3] = a3 * scale
+                    _write(out, i, j, a0 * scale, a1 * scale, a2 * scale, a3 * scale)
 
     return kernel(cover)
 

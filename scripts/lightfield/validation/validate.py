@@ -104,12 +104,8 @@ def validate(
         files_checks[0] = UNLISTED
     checks += [*files_checks, cameras_check, *splits_checks]
     rendered = files.rendered(sets)
-    return Result(
-        f"{dataset.parent.name}/{dataset.name}",
-        len(rendered.views) if rendered else 0,
-        checks,
-        digests,
-    )
+    view_count = len(rendered.views) if rendered else 0
+    return Result(f"{dataset.parent.name}/{dataset.name}", view_count, checks, digests)
 
 
 ParallelMap = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
