@@ -4,6 +4,7 @@ import csv
 import math
 import shutil
 
+import accessibility
 import numpy as np
 import pytest
 from sphere import write_views
@@ -324,3 +325,13 @@ def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, ru
             evaluation.mask(mask, source)
     images.write_png(mask, np.eye(48, 64, dtype=np.uint8))
     assert evaluation.mask(mask, source).sum() == 48
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_a_page_of_errors(dataset, tmp_path, run_program, show, width):
+    renders = dataset / "perspective"
+    arguments = [renders, "--dataset", dataset, "--source", "perspective", "--output", tmp_path]
+    run_program("evaluate.py", *arguments)
+    tab = show(tmp_path / "index.html", width)
+    assert accessibility.faults(tab) == []
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width

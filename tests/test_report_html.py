@@ -5,6 +5,7 @@ import io
 import json
 from types import SimpleNamespace
 
+import accessibility
 import numpy as np
 import pytest
 from PIL import Image
@@ -277,6 +278,19 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
     assert tab.eval_on_selector_all(".scroll, pre, nav", cut) == 0
 
 
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_a_page(sphere, show, width):
+    tab = show(sphere.page, width)
+    pixels(tab, "viewer")
+    assert accessibility.faults(tab) == []
+
+
+def test_axe_finds_a_picture_without_a_description(sphere, show):
+    tab = show(sphere.page)
+    tab.evaluate("document.querySelector('img').removeAttribute('alt')")
+    assert [rule for rule, _ in accessibility.faults(tab)] == ["image-alt"]
+
+
 def test_names_are_text_whatever_they_hold(show, tmp_path):
     rig = {**LINE, "cameras": [2, 1]}
     names = ["a\"<b>&'", "<i>"]
@@ -407,6 +421,14 @@ def write_many(results, count):
         rig = {**LINE, "cameras": [1, 1], "camera": camera}
         write_dataset(folder, rig, depth="z" if number else "distance")
         (folder / "report/index.html").write_text("")
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_an_index(run_program, show, tmp_path, width):
+    write_many(tmp_path, 12)
+    output = tmp_path / "index.html"
+    run_program("report_index.py", "--results", tmp_path, "--output", output)
+    assert accessibility.faults(show(output, width)) == []
 
 
 @pytest.mark.parametrize(("count", "has_search"), [(11, False), (12, True)])

@@ -5,6 +5,7 @@ import io
 import math
 import shutil
 
+import accessibility
 import numpy as np
 import pytest
 from PIL import Image
@@ -287,6 +288,11 @@ def test_a_phone_shows_the_walk(tab):
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= 390
     assert opened.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_a_page_with_a_walk(tab, width):
+    assert accessibility.faults(tab(width=width)) == []
 
 
 def test_views_are_chosen_again_only_after_the_eye_has_moved(tab):
