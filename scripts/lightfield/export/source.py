@@ -15,7 +15,6 @@ from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.imaging.tonemap import encode_srgb, to_8_bit, tone_map
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -106,6 +105,9 @@ class SourceDataset:
         if self.lightfield.transparent:
             alpha = image.channels["A"][..., None].astype(np.float32)
             colour /= np.where(alpha > 0, alpha, 1)
+        # Only here, because its kernels take long to load, and most exports link developed views.
+        from lightfield.imaging.tonemap import to_8_bit, tone_map
+
         return to_8_bit(tone_map(colour, self.exposure, self.reinhard))
 
     def alpha(self, view: View) -> NDArray[np.uint8]:
@@ -121,6 +123,8 @@ class SourceDataset:
         """Return a view's sRGB-encoded colour (height, width, 3), 0 to 1, not rounded."""
         if self.suffix == ".png":
             return self.colour(view) / 255
+        from lightfield.imaging.tonemap import encode_srgb, tone_map
+
         developed = tone_map(self._image(view).colour, self.exposure, self.reinhard)
         return np.asarray(encode_srgb(developed), np.float64)
 

@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 
 from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.nearest import Cameras
 
 Array = NDArray[np.float64]
 
@@ -408,6 +407,9 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     count as neighbours.
     """
     positions = np.array([camera.position for camera in cameras])
+    # Only here, because it imports scipy's trees, which most programs do not need.
+    from lightfield.geometry.nearest import Cameras
+
     nearest = Cameras(positions)
     pairs = set()
     for view, patches_of_view in enumerate(patches):
