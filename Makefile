@@ -22,8 +22,8 @@ all: .venv/complete
 
 test: check
 	python envs/check_system.py --tests
-	@# One process more than cores, because some tests wait: for Slurm, killed jobs, or a browser.
-	python -m pytest -n $$(( $(CORES) + 1 ))
+	@# Two processes more than cores, because some tests wait: for Slurm, killed jobs, or a browser.
+	python -m pytest -n $$(( $(CORES) + 2 ))
 
 test-other: export PATH := $(CURDIR)/.venv-other/bin:$(PATH)
 test-other: .venv-other/complete
