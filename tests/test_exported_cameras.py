@@ -64,7 +64,12 @@ EXPORTS = {
     "fisheye": {"colmap": {"points": 60}, "opendibr": {}, "scannetpp": {"points": 60}},
     "wide": {"nerfstudio": {"points": 60}},
     "opencv": {"colmap": {"format": "text", "points": 60}},
-    "panorama": {"nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
+    "panorama": {
+        "colmap": {"format": "text", "points": 60},
+        "nerfstudio": {"points": 60},
+        "opendibr": {},
+        "miv": {},
+    },
     "half": {"opendibr": {}, "miv": {}},
     "split": {"colmap": {"format": "text", "points": 60}, "nerfstudio": {"points": 60}},
 }
@@ -328,6 +333,7 @@ IN_TEXT = [
         for name, kind, folder in (
             ("perspective", "colmap", MODEL),
             ("opencv", "colmap", MODEL),
+            ("panorama", "colmap", MODEL),
             ("fisheye", "scannetpp", "scannetpp/colmap"),
         )
         for file, pattern, said in (
@@ -347,7 +353,7 @@ IN_TEXT = [
             ("images.txt", r"^4 .* (1) view_0003f", "image 4: has no camera 4"),
             *(
                 ("cameras.txt", rf"^1 \w+ \d+ \d+ (?:\S+ ){{{k}}}(\S+)", "camera 1")
-                for k in range(4)
+                for k in range(2 if name == "panorama" else 4)
             ),
             ("cameras.txt", r"^1 \w+ (\d+)", "camera 1: its image has"),
             ("cameras.txt", r"^1 \w+ \d+ (\d+)", "camera 1: its image has"),

@@ -85,6 +85,8 @@ class Colmap:
         self.colours = {int(row[0]): np.array(row[4:7], int) for row in points}
         self.tracks = {int(row[0]): np.array(row[8:], int).reshape(-1, 2) for row in points}
 
+        if self.model == "EQUIRECTANGULAR":
+            return
         fx, fy, cx, cy, *distortion = self.parameters
         self.matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
         self.distortion = np.array(distortion) if distortion else None
@@ -151,6 +153,27 @@ def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_pat
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
     assert point_count == every
+
+
+def test_colmap_sees_the_points_all_around_a_panorama(tmp_path, capsys):
+    write_views(tmp_path / "dataset", LENSES["panorama"], RIG)
+    options = {"format": "text", "points": 400}
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, **options)
+    assert "gsplat, 3DGRUT and the original 3D Gaussian splatting do not" in capsys.readouterr().err
+    model = Colmap(folder / "sparse" / "0")
+    assert (model.model, model.parameters) == ("EQUIRECTANGULAR", [64, 32])
+    on_sphere(np.array([*model.positions.values()]), 1e-5)
+    assert not (folder / "masks").exists()
+    for number, (name, turn, shift) in model.images.items():
+        assert (folder / "images" / name).is_file()
+        rows = model.seen[number]
+        assert len(rows) > 100
+        local = np.array([model.positions[int(point)] for point in rows[:, 2]]) @ turn.T + shift
+        assert (local[:, 2] < 0).any()
+        # COLMAP's models.h: longitude grows to the right from the axis, latitude downwards.
+        x = (np.arctan2(local[:, 0], local[:, 2]) / (2 * math.pi) + 0.5) * 64
+        y = (np.arctan2(local[:, 1], np.hypot(local[:, 0], local[:, 2])) / math.pi + 0.5) * 32
+        np.testing.assert_allclose(rows[:, :2], np.column_stack([x, y]), atol=1e-6)
 
 
 def read_by_3dgrut(model):
@@ -701,7 +724,15 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
     ("name", "source", "camera", "options", "problem"),
     [
         ("colmap", "views", VIEWS, {}, "sees 180 degrees"),
-        ("colmap", "views", LENSES["panorama"], {}, "has a lens that COLMAP lacks; reproject"),
+        ("colmap", "views", LENSES["half"], {}, "is a part of a panorama; COLMAP takes whole"),
+        ("colmap", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
+        (
+            "colmap",
+            "views",
+            {"lens": "equisolid", "focal_length": 10, "fov": 120, "resolution": [64, 64]},
+            {},
+            "has a lens that COLMAP lacks; reproject",
+        ),
         ("colmap", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
         ("nerfstudio", "views", VIEWS | {"resolution": [65, 65]}, {}, "use even sizes"),
         (

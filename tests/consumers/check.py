@@ -31,8 +31,12 @@ def colmap(folder, name):
     import pycolmap
 
     model = pycolmap.Reconstruction(folder / "colmap" / name / "sparse" / "0")
-    names, matrices, _ = ours(folder, name)
+    names, matrices, rays = ours(folder, name)
     fewest, pixels, metres = 10**9, 0.0, 0.0
+    (camera,) = model.cameras.values()
+    row, column = np.nonzero(np.isfinite(rays[..., 0]))
+    centres = np.column_stack([column, row]) + 0.5
+    radians = angle(camera.cam_ray_from_img(centres), rays[row, column] * [1, -1, -1]).max()
     for image in model.images.values():
         seen = [point for point in image.points2D if point.has_point3D()]
         fewest = min(fewest, len(seen))
@@ -44,6 +48,8 @@ def colmap(folder, name):
             image.projection_center(), matrices[names.index(stem)][:3, 3], atol=1e-9
         )
         path = folder / "colmap" / name / "stereo/depth_maps" / f"{image.name}.geometric.bin"
+        if not path.exists():
+            continue
         width, height, _, body = path.read_bytes().split(b"&", 3)
         depth = np.frombuffer(body, "<f4").reshape(int(height), int(width))
         row, column = np.nonzero(depth)
@@ -54,10 +60,12 @@ def colmap(folder, name):
         metres = max(metres, np.abs(np.linalg.norm(world, axis=1) - RADIUS).max())
     print(
         f"pycolmap {pycolmap.__version__}, {name}: {len(model.images)} views, at least {fewest} "
-        f"points in each within {pixels:.2g} pixels; depth within {1000 * metres:.2g} mm"
+        f"points in each within {pixels:.2g} pixels, {pixels / camera.width:.2g} of the width; "
+        f"rays within {radians:.2g} rad; depth within {1000 * metres:.2g} mm"
     )
     assert fewest >= 1000
-    assert pixels < 0.5
+    assert pixels < 1e-9 * camera.width
+    assert radians < 1e-6
     assert metres < 1e-3
 
 

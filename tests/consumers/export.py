@@ -22,7 +22,7 @@ RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.
 # Enough views for a radiance field to learn from.
 LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
-    "colmap": ("perspective", "shifted", "fisheye", "opencv"),
+    "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
 }
 
@@ -42,8 +42,10 @@ def main() -> None:
         )
     for kind, sources in OF.items():
         for name in sources:
+            # COLMAP has no depth maps of panoramas.
+            has_depth = (kind, name) != ("colmap", "panorama")
             settings = settings_of(kind).model_validate(
-                {"sources": [name], "points": 40000, "depth": True}
+                {"sources": [name], "points": 40000, "depth": has_depth}
             )
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)

@@ -165,6 +165,11 @@ class Colmap(Developed):
             # COLMAP projects only points in front of the camera.
             if lens.fov >= math.pi:
                 return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
+            if self.depth:
+                return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
         return NO_DEPTH if self.depth and not has_depth else None
