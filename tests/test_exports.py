@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import subprocess
+import zlib
 from pathlib import Path
 
 import cv2
@@ -591,6 +592,86 @@ def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path)
         assert not images.read_image(path).channels["R"][mask == 0].any()
 
 
+class ZarrFolder:
+    """A Zarr store of version 2 in a folder, read without its compressed metadata."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def attributes(self, path):
+        return json.loads((self.folder / path / ".zattrs").read_text())
+
+    def array(self, path):
+        about = json.loads((self.folder / path / ".zarray").read_text())
+        name = ".".join("0" * len(about["shape"])) or "0"
+        content = (self.folder / path / name).read_bytes()
+        if about["compressor"]:
+            assert about["compressor"]["id"] == "zlib"
+            content = zlib.decompress(content)
+        assert about["chunks"] == about["shape"]
+        return np.frombuffer(content, about["dtype"]).reshape(about["shape"])
+
+
+def ncore_pixels(attributes, local):
+    """Project directions (n, 3), x right, y down and z forward, as NCore's documentation does."""
+    lens = attributes["camera_model_parameters"]
+    x, y, z = local.T
+    if attributes["camera_model_type"] == "opencv-pinhole":
+        pixels = np.column_stack([x / z, y / z]) * lens["focal_length"] + lens["principal_point"]
+        return np.where(z[:, None] > 0, pixels, np.nan)
+    assert lens["reference_poly"] == "ANGLE_TO_PIXELDIST"
+    angle = np.arctan2(np.hypot(x, y), z)
+    radius = np.polynomial.Polynomial(lens["angle_to_pixeldist_poly"])(angle)
+    scaled = (radius / np.hypot(x, y))[:, None] * local[:, :2]
+    c, d, e = lens["linear_cde"]
+    pixels = scaled @ np.array([[c, d], [e, 1]]).T + lens["principal_point"] + 0.5
+    return np.where(angle[:, None] <= lens["max_angle"], pixels, np.nan)
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide"])
+def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tmp_path, source):
+    folder = exported(dataset, "ncore", source, tmp_path, points=400)
+    sequence = json.loads((folder / "views.json").read_text())
+    (entry,) = sequence["component_stores"]
+    store = ZarrFolder(folder / entry["path"])
+    frame = "lidars/points/frames/0"
+    directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
+    points = directions * store.array(f"{frame}/ray_bundle_returns/distance_m")[0][:, None]
+    assert 100 < len(points) <= 400
+    on_sphere(points, 1e-5)
+    np.testing.assert_allclose(store.array(f"{frame}/generic_data/rgb"), colour_of(points), atol=6)
+    poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]
+    frames = store.attributes("cameras/camera/frames")["frames_timestamps_us"]
+    assert [end for _, end in frames] == poses["timestamps_us"] == [10**6 * i for i in range(12)]
+    assert sequence["sequence_timestamp_interval_us"] == {"start": 0, "stop": 11 * 10**6 + 1}
+    expected = matrices(dataset, source)
+    names = []
+    for (_, end), pose in zip(frames, np.array(poses["poses"]), strict=True):
+        view = f"cameras/camera/frames/{end}"
+        names.append(store.attributes(f"{view}/generic_data")["name"])
+        np.testing.assert_array_equal(pose @ np.diag([1, -1, -1, 1]), expected[names[-1]])
+        png = store.array(f"{view}/image").tobytes()
+        (tmp_path / "view.png").write_bytes(png)
+        channels = images.read_image(tmp_path / "view.png").channels
+        assert set(channels) == {*"RGB"}
+        height, width = channels["R"].shape
+        mask = np.full((height, width), 255)
+        if source in ("fisheye", "wide"):
+            mask = store.array(f"{view}/generic_data/mask")
+            assert set(np.unique(mask)) == {0, 255}
+        lens = store.attributes("intrinsics/default/cameras/camera")
+        pixels = ncore_pixels(lens, (points - pose[:3, 3]) @ pose[:3, :3])
+        with np.errstate(invalid="ignore"):
+            inside = ((pixels >= 0) & (pixels < [width, height])).all(axis=1)
+        column, row = np.floor(pixels[inside]).astype(int).T
+        has_light = mask[row, column] > 0
+        seen = np.stack([channels[name] for name in "RGB"], axis=-1)[row, column][has_light]
+        assert len(seen) > 50
+        np.testing.assert_allclose(seen, colour_of(points[inside][has_light]), atol=6)
+    assert names == sorted(expected)
+
+
 def ply(path):
     head, _, body = path.read_bytes().partition(b"end_header\n")
     kinds = {"float": "<f4", "uchar": "u1"}
@@ -752,6 +833,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
+        ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
@@ -826,6 +908,7 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
         ("miv", "fisheye", "has a lens that MIV lacks"),
         ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
+        ("ncore", "panorama", "is not an equidistant fisheye or a pinhole"),
     ],
 )
 def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(

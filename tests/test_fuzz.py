@@ -281,7 +281,7 @@ def read_transforms(path, _):
 
 
 def export_list(rng):
-    formats = ["nerfstudio", "nerf_synthetic", "opendibr", "miv", "scannetpp", "colmap"]
+    formats = ["nerfstudio", "nerf_synthetic", "opendibr", "miv", "scannetpp", "colmap", "ncore"]
     return {
         "format": rng.choice([*formats, "hci", "point_cloud", "poses_csv"]),
         "options": {"depth": True},
@@ -619,6 +619,7 @@ EXPORTS = {
     "opendibr": {},
     "miv": {},
     "hci": {},
+    "ncore": {"points": 20},
     "poses_csv": {},
     "point_cloud": {"voxel": 0.1},
 }

@@ -24,6 +24,7 @@ LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
+    "ncore": ("perspective", "shifted", "fisheye", "wide"),
 }
 
 
@@ -31,7 +32,7 @@ def main() -> None:
     folder = Path(sys.argv[1])
     shutil.rmtree(folder, ignore_errors=True)
     write_views(folder / "dataset", enlarged(LENSES["wide"], 2), RIG)
-    for name in sorted({*OF["colmap"], *OF["nerfstudio"]}):
+    for name in sorted({name for sources in OF.values() for name in sources}):
         write_views(folder / "dataset" / name, enlarged(LENSES[name], 2), RIG)
         source = SourceDataset(folder / "dataset", name, ".exr")
         np.savez(
@@ -42,11 +43,11 @@ def main() -> None:
         )
     for kind, sources in OF.items():
         for name in sources:
+            options = {"sources": [name], "points": 40000}
             # COLMAP has no depth maps of panoramas.
-            has_depth = (kind, name) != ("colmap", "panorama")
-            settings = settings_of(kind).model_validate(
-                {"sources": [name], "points": 40000, "depth": has_depth}
-            )
+            if kind != "ncore" and (kind, name) != ("colmap", "panorama"):
+                options["depth"] = True
+            settings = settings_of(kind).model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
     write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)

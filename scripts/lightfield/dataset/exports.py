@@ -269,6 +269,19 @@ class ScanNetPP(Developed):
         return "is not an equidistant fisheye below 180 degrees; reproject to one"
 
 
+class NCore(Developed):
+    """A sequence of NCore v4, for gsplat and 3DGRUT."""
+
+    is_for_training: ClassVar[bool] = True
+
+    points: PointCount = Field(50000, description="Most points lifted from depth.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | Rectilinear):
+            return None
+        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+
+
 class PosesCsv(Export):
     """A table of poses: name, position, rotation."""
 
@@ -297,6 +310,9 @@ class Exports(Settings):
     miv: Miv | None = Field(None, description="For TMIV.")
     hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
     scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    ncore: NCore | None = Field(
+        None, description="For gsplat and 3DGRUT: NCore v4, fisheyes past 180° too."
+    )
     poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
     point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 

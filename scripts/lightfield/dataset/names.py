@@ -14,6 +14,7 @@ EXPORTS = (
     "miv",
     "hci",
     "scannetpp",
+    "ncore",
     "poses_csv",
     "point_cloud",
 )
