@@ -59,21 +59,32 @@ EXPORTS = {
         "opendibr": {},
         "miv": {},
         "hci": {},
+        "lichtfeld": {"points": 60, "depth": True, "format": "exr"},
         "ncore": {"points": 60},
         "poses_csv": {},
     },
     "shifted": {"colmap": {"points": 60}, "nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
-    "fisheye": {"colmap": {"points": 60}, "opendibr": {}, "scannetpp": {"points": 60}},
+    "fisheye": {
+        "colmap": {"points": 60},
+        "lichtfeld": {"points": 60, "depth": True},
+        "opendibr": {},
+        "scannetpp": {"points": 60},
+    },
     "wide": {"nerfstudio": {"points": 60}, "ncore": {"points": 60}},
     "opencv": {"colmap": {"format": "text", "points": 60}},
     "panorama": {
         "colmap": {"format": "text", "points": 60},
+        "lichtfeld": {"points": 60},
         "nerfstudio": {"points": 60},
         "opendibr": {},
         "miv": {},
     },
     "half": {"opendibr": {}, "miv": {}},
-    "split": {"colmap": {"format": "text", "points": 60}, "nerfstudio": {"points": 60}},
+    "split": {
+        "colmap": {"format": "text", "points": 60},
+        "lichtfeld": {"points": 60},
+        "nerfstudio": {"points": 60},
+    },
 }
 INSTANT_NGP = {
     "views": ["--depth-bounds"],
@@ -160,7 +171,7 @@ def test_correct_exports_agree_with_their_views(name, dataset):
     for check in (checks["exported_cameras"], checks["exported_depth"]):
         assert check.passed, check.problems
     exports_of_set = EXPORTS[name]
-    kinds = {"colmap", "nerfstudio", "scannetpp", "ncore", "point_cloud"}
+    kinds = {"colmap", "nerfstudio", "scannetpp", "ncore", "lichtfeld", "point_cloud"}
     with_points = kinds & exports_of_set.keys()
     assert (checks["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
     # Each part of the split also has a list for instant-ngp.
@@ -266,6 +277,16 @@ IN_JSON = [
     ("wide", "nerfstudio", "transforms.json", ("k4",), OF_LENS),
     ("panorama", "nerfstudio", "transforms.json", ("fl_x",), OF_LENS),
     ("panorama", "nerfstudio", "transforms.json", ("cy",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", (*FRAME, 1, 3), OF_POSITION),
+    ("perspective", "lichtfeld", "transforms.json", (*FRAME, 2, 0), OF_ROTATION),
+    ("perspective", "lichtfeld", "transforms.json", ("fl_x",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", ("cy",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", ("w",), "its image has"),
+    ("fisheye", "lichtfeld", "transforms.json", ("fl_y",), OF_LENS),
+    ("fisheye", "lichtfeld", "transforms.json", ("k2",), OF_LENS),
+    ("fisheye", "lichtfeld", "transforms.json", ("k3",), OF_LENS),
+    ("panorama", "lichtfeld", "transforms.json", ("h",), "its image has"),
+    ("panorama", "lichtfeld", "transforms.json", (*FRAME, 0, 3), OF_POSITION),
     *(
         ("perspective", "nerf_synthetic", f"transforms_{part}.json", keys, said)
         for part in ("train", "val", "test")
@@ -439,7 +460,12 @@ def test_a_changed_number_in_a_binary_model_is_found(name, dataset):
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("perspective", "nerfstudio"), ("wide", "nerfstudio"), ("views", "point_cloud")],
+    [
+        ("perspective", "nerfstudio"),
+        ("wide", "nerfstudio"),
+        ("panorama", "lichtfeld"),
+        ("views", "point_cloud"),
+    ],
 )
 def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset):
     path = home(dataset, name) / "exports" / kind / "points.ply"
@@ -499,6 +525,8 @@ def test_the_program_names_file_view_and_number_of_a_changed_matrix(dataset, run
         ("perspective", "poses_csv", "poses_csv/poses.csv"),
         ("fisheye", "scannetpp", "scannetpp/train_test_lists.json"),
         ("half", "miv", "miv/export.json"),
+        ("fisheye", "lichtfeld", "lichtfeld/transforms.json"),
+        ("fisheye", "lichtfeld", "lichtfeld/points.ply"),
         ("wide", "ncore", "ncore/views.json"),
         ("wide", "ncore", "ncore/views.ncore4.zarr/.zmetadata.cbor.xz"),
         (
@@ -592,6 +620,7 @@ def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
             *("perspective", "opendibr", "cameras.json", "view_0003f_depth"),
             *("view_0002f_depth", "cameras[4]: NameDepth"),
         ),
+        ("split", "lichtfeld", "test.txt", "view_0001f", "view_0002f", "test.txt: lacks"),
         ("perspective", "miv", "sequence.json", '  "view_0003f"', '  "view_0002f"', "sourceCamera"),
         ("perspective", "opendibr", "cameras.json", "OPENGL", "COLMAP", "Axial_system"),
         (

@@ -28,6 +28,7 @@ from lightfield.export.points import evenly
 from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
+from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
@@ -672,6 +673,134 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
     assert names == sorted(expected)
 
 
+def lichtfeld_cameras(content):
+    """Return world-to-camera matrices by image, as LichtFeld's transforms.cpp computes them.
+
+    Its cameras look along z with y down. Its world is (x, −y, −z), for cameras and points alike.
+    """
+    flip = np.diag([1.0, -1, -1, 1])
+    return {
+        Path(frame["file_path"]): np.linalg.inv(np.array(frame["transform_matrix"]) @ flip) @ flip
+        for frame in content["frames"]
+    }
+
+
+def lichtfeld_pixels(content, local):
+    """Project points (n, 3), x right, y down and z forward, to pixels (n, 2)."""
+    x, y, z = local.T
+    if content["camera_model"] == "EQUIRECTANGULAR":
+        longitude, latitude = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
+        turns = np.column_stack([longitude / (2 * math.pi), latitude / math.pi])
+        return (turns + 0.5) * [content["w"], content["h"]]
+    scale = np.column_stack([x, y]) / z[:, None]
+    if content["camera_model"] == "OPENCV_FISHEYE":
+        angle = np.arctan2(np.hypot(x, y), z)
+        radius = angle + sum(content[f"k{i}"] * angle ** (2 * i + 1) for i in (1, 2, 3))
+        scale = np.column_stack([x, y]) * (radius / np.hypot(x, y))[:, None]
+    else:
+        assert content["camera_model"] == "PINHOLE"
+    pixels = scale * [content["fl_x"], content["fl_y"]] + [content["cx"], content["cy"]]
+    return np.where(z[:, None] > 0, pixels, np.nan)
+
+
+THREE_TERMS = LENSES["opencv"] | {"coefficients": [0.02, -0.01, 0.003, 0]}
+
+
+@pytest.mark.parametrize(
+    ("source", "form"),
+    [
+        ("perspective", "png"),
+        ("shifted", "exr"),
+        ("fisheye", "png"),
+        ("three_terms", "png"),
+        ("panorama", "exr"),
+    ],
+)
+def test_lichtfeld_shows_its_points_and_depth_where_they_are(dataset, tmp_path, source, form):
+    if source == "three_terms":
+        write_views(tmp_path / "dataset", THREE_TERMS, RIG)
+        dataset, source = tmp_path / "dataset", "views"
+    options = {"points": 400, "format": form, "depth": source != "panorama"}
+    folder = exported(dataset, "lichtfeld", source, tmp_path, **options)
+    content = json.loads((folder / "transforms.json").read_text())
+    vertices, _ = ply(folder / content["ply_file_path"])
+    points = np.stack([vertices[name] for name in "xyz"], axis=-1) * np.array([1, -1, -1])
+    on_sphere(points, 1e-5)
+    world_to_camera = lichtfeld_cameras(content)
+    assert len(world_to_camera) == 12
+    for path, matrix in world_to_camera.items():
+        assert path.suffix == f".{form}"
+        channels = images.read_image(folder / path).channels
+        picture = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float64)
+        if form == "exr":
+            picture = 255 * encode_srgb(picture.astype(np.float32))
+        mask = np.full(picture.shape[:2], 255)
+        if (folder / "masks" / f"{path.stem}.png").exists():
+            mask = images.read_image(folder / "masks" / f"{path.stem}.png").channels["Y"]
+        pixels = lichtfeld_pixels(content, points @ matrix[:3, :3].T + matrix[:3, 3])
+        with np.errstate(invalid="ignore"):
+            inside = ((pixels >= 0) & (pixels < [content["w"], content["h"]])).all(axis=1)
+        column, row = np.floor(pixels[inside]).astype(int).T
+        has_light = mask[row, column] > 0
+        colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
+        assert has_light.sum() > 50
+        shown = picture[row, column][has_light]
+        # The panorama's pixels are up to 0.4 m wide, and colour changes by 29 levels a metre.
+        np.testing.assert_allclose(shown, colours[inside][has_light], atol=12)
+        if source == "panorama":
+            continue
+        depth = images.read_image(folder / "depth" / f"{path.stem}.png").channels["Y"]
+        assert depth.dtype == np.uint16
+        assert depth.max() == 65535
+        assert ((depth > 0) == (mask > 0)).all()
+        row, column = np.nonzero(depth)
+        centres = np.column_stack([column, row]) + 0.5
+        # The axis of the fisheye is no pixel's centre.
+        steps = depth[row, column].astype(float)
+        rays = lenses.from_camera(THREE_TERMS if source == "views" else LENSES[source]).rays(
+            *centres.T
+        )
+        np.testing.assert_allclose(
+            lichtfeld_pixels(content, rays * [1, -1, -1]), centres, atol=1e-6
+        )
+        to_world = np.linalg.inv(matrix)
+        reach = steps[:, None] * rays * [1, -1, -1] / -rays[:, 2:] @ to_world[:3, :3].T
+        on_sphere(to_world[:3, 3] + lichtfeld_scale(reach, to_world[:3, 3]) * reach, 1e-3)
+
+
+def lichtfeld_scale(reach, place):
+    """Return the metres of a step of depth. The farthest of the points place + reach fits it."""
+    farthest = reach[np.argmax(np.linalg.norm(reach, axis=1))]
+    a, b, c = farthest @ farthest, farthest @ place, place @ place - RADIUS**2
+    return (-b + math.sqrt(b * b - a * c)) / a
+
+
+def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, LENSES["fisheye"], RIG | {"rotation": [10, 20, 30]})
+    with pytest.raises(UserError, match=r"normal/view_0000f.exr: is missing; normals need passes"):
+        exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+    lightfield = LightField.read(dataset / "lightfield.json")
+    rays = lightfield.lens.pixel_rays()
+    true_normals = {}
+    for view in lightfield.views:
+        distance = look(lightfield.lens, view.matrix)[1][..., None]
+        places = view.matrix[:3, 3] + rays @ view.matrix[:3, :3].T * distance
+        true_normals[view.name] = np.nan_to_num(-places / RADIUS)
+        planes = np.moveaxis(true_normals[view.name].astype(np.float32), -1, 0)
+        path = dataset / "normal" / f"{view.name}.exr"
+        path.parent.mkdir(exist_ok=True)
+        images.write_exr(path, dict(zip("RGB", planes, strict=True)))
+    folder = exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+    content = json.loads((folder / "transforms.json").read_text())
+    for path, matrix in lichtfeld_cameras(content).items():
+        channels = images.read_image(folder / "normals" / f"{path.stem}.png").channels
+        colours = np.stack([channels[name] for name in "RGB"], axis=-1)
+        world = (colours / 255 * 2 - 1) @ matrix[:3, :3] * [1, -1, -1]
+        np.testing.assert_allclose(world, true_normals[path.stem], atol=0.011)
+        assert (colours[~np.isfinite(rays[..., 0])] == 128).all()
+
+
 def ply(path):
     head, _, body = path.read_bytes().partition(b"end_header\n")
     kinds = {"float": "<f4", "uchar": "u1"}
@@ -834,6 +963,12 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
         ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
+        ("lichtfeld", "views", VIEWS, {}, "sees 180 degrees, where LichtFeld's fisheye ends"),
+        ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
+        ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
+        ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not of EXR; give it format: exr"),
+        ("lichtfeld", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
+        ("lichtfeld", "again", VIEWS, {"normals": True}, r"give it passes: \[normal\]"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
@@ -909,6 +1044,7 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
         ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
         ("ncore", "panorama", "is not an equidistant fisheye or a pinhole"),
+        ("lichtfeld", "opencv", "has a fourth coefficient, which LichtFeld drops; reproject"),
     ],
 )
 def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(

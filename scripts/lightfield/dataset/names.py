@@ -15,6 +15,7 @@ EXPORTS = (
     "hci",
     "scannetpp",
     "ncore",
+    "lichtfeld",
     "poses_csv",
     "point_cloud",
 )

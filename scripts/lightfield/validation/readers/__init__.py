@@ -20,6 +20,7 @@ from lightfield.validation.readers import (
     colmap,
     hci,
     instant_ngp,
+    lichtfeld,
     miv,
     ncore,
     nerf_synthetic,
@@ -34,6 +35,7 @@ from lightfield.validation.readers.contents import Exported
 READERS = {
     "colmap": colmap.read,
     "hci": hci.read,
+    "lichtfeld": lichtfeld.read,
     "miv": miv.read,
     "ncore": ncore.read,
     "nerf_synthetic": nerf_synthetic.read,
