@@ -353,6 +353,9 @@ REFUSED = [
             ("instant_ngp", "render_aabb", [[0, 0, 0]]),
             ("instant_ngp", "render_aabb", [[1, 1, 1], [0, 0, 0]]),
             ("opendibr", "format", "mp4"),
+            ("ncore", "points", 0),
+            ("lichtfeld", "format", "jpg"),
+            ("lichtfeld", "normals", 1),
         )
     ),
     *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import struct
+import zlib
 from contextlib import contextmanager
 
 import numpy as np
@@ -20,7 +21,7 @@ from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
-from lightfield.export import MANIFESTS
+from lightfield.export import MANIFESTS, zarr_store
 from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
@@ -58,15 +59,32 @@ EXPORTS = {
         "opendibr": {},
         "miv": {},
         "hci": {},
+        "lichtfeld": {"points": 60, "depth": True, "format": "exr"},
+        "ncore": {"points": 60},
         "poses_csv": {},
     },
     "shifted": {"colmap": {"points": 60}, "nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
-    "fisheye": {"colmap": {"points": 60}, "opendibr": {}, "scannetpp": {"points": 60}},
-    "wide": {"nerfstudio": {"points": 60}},
+    "fisheye": {
+        "colmap": {"points": 60},
+        "lichtfeld": {"points": 60, "depth": True},
+        "opendibr": {},
+        "scannetpp": {"points": 60},
+    },
+    "wide": {"nerfstudio": {"points": 60}, "ncore": {"points": 60}},
     "opencv": {"colmap": {"format": "text", "points": 60}},
-    "panorama": {"nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
+    "panorama": {
+        "colmap": {"format": "text", "points": 60},
+        "lichtfeld": {"points": 60},
+        "nerfstudio": {"points": 60},
+        "opendibr": {},
+        "miv": {},
+    },
     "half": {"opendibr": {}, "miv": {}},
-    "split": {"colmap": {"format": "text", "points": 60}, "nerfstudio": {"points": 60}},
+    "split": {
+        "colmap": {"format": "text", "points": 60},
+        "lichtfeld": {"points": 60},
+        "nerfstudio": {"points": 60},
+    },
 }
 INSTANT_NGP = {
     "views": ["--depth-bounds"],
@@ -153,7 +171,8 @@ def test_correct_exports_agree_with_their_views(name, dataset):
     for check in (checks["exported_cameras"], checks["exported_depth"]):
         assert check.passed, check.problems
     exports_of_set = EXPORTS[name]
-    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & exports_of_set.keys()
+    kinds = {"colmap", "nerfstudio", "scannetpp", "ncore", "lichtfeld", "point_cloud"}
+    with_points = kinds & exports_of_set.keys()
     assert (checks["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
     # Each part of the split also has a list for instant-ngp.
     lists = len(exports_of_set) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
@@ -258,6 +277,16 @@ IN_JSON = [
     ("wide", "nerfstudio", "transforms.json", ("k4",), OF_LENS),
     ("panorama", "nerfstudio", "transforms.json", ("fl_x",), OF_LENS),
     ("panorama", "nerfstudio", "transforms.json", ("cy",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", (*FRAME, 1, 3), OF_POSITION),
+    ("perspective", "lichtfeld", "transforms.json", (*FRAME, 2, 0), OF_ROTATION),
+    ("perspective", "lichtfeld", "transforms.json", ("fl_x",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", ("cy",), OF_LENS),
+    ("perspective", "lichtfeld", "transforms.json", ("w",), "its image has"),
+    ("fisheye", "lichtfeld", "transforms.json", ("fl_y",), OF_LENS),
+    ("fisheye", "lichtfeld", "transforms.json", ("k2",), OF_LENS),
+    ("fisheye", "lichtfeld", "transforms.json", ("k3",), OF_LENS),
+    ("panorama", "lichtfeld", "transforms.json", ("h",), "its image has"),
+    ("panorama", "lichtfeld", "transforms.json", (*FRAME, 0, 3), OF_POSITION),
     *(
         ("perspective", "nerf_synthetic", f"transforms_{part}.json", keys, said)
         for part in ("train", "val", "test")
@@ -328,6 +357,7 @@ IN_TEXT = [
         for name, kind, folder in (
             ("perspective", "colmap", MODEL),
             ("opencv", "colmap", MODEL),
+            ("panorama", "colmap", MODEL),
             ("fisheye", "scannetpp", "scannetpp/colmap"),
         )
         for file, pattern, said in (
@@ -347,7 +377,7 @@ IN_TEXT = [
             ("images.txt", r"^4 .* (1) view_0003f", "image 4: has no camera 4"),
             *(
                 ("cameras.txt", rf"^1 \w+ \d+ \d+ (?:\S+ ){{{k}}}(\S+)", "camera 1")
-                for k in range(4)
+                for k in range(2 if name == "panorama" else 4)
             ),
             ("cameras.txt", r"^1 \w+ (\d+)", "camera 1: its image has"),
             ("cameras.txt", r"^1 \w+ \d+ (\d+)", "camera 1: its image has"),
@@ -430,7 +460,12 @@ def test_a_changed_number_in_a_binary_model_is_found(name, dataset):
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("perspective", "nerfstudio"), ("wide", "nerfstudio"), ("views", "point_cloud")],
+    [
+        ("perspective", "nerfstudio"),
+        ("wide", "nerfstudio"),
+        ("panorama", "lichtfeld"),
+        ("views", "point_cloud"),
+    ],
 )
 def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset):
     path = home(dataset, name) / "exports" / kind / "points.ply"
@@ -490,6 +525,15 @@ def test_the_program_names_file_view_and_number_of_a_changed_matrix(dataset, run
         ("perspective", "poses_csv", "poses_csv/poses.csv"),
         ("fisheye", "scannetpp", "scannetpp/train_test_lists.json"),
         ("half", "miv", "miv/export.json"),
+        ("fisheye", "lichtfeld", "lichtfeld/transforms.json"),
+        ("fisheye", "lichtfeld", "lichtfeld/points.ply"),
+        ("wide", "ncore", "ncore/views.json"),
+        ("wide", "ncore", "ncore/views.ncore4.zarr/.zmetadata.cbor.xz"),
+        (
+            "wide",
+            "ncore",
+            "ncore/views.ncore4.zarr/lidars/points/frames/0/ray_bundle/direction/0.0",
+        ),
     ],
 )
 def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset, tmp_path):
@@ -576,6 +620,7 @@ def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
             *("perspective", "opendibr", "cameras.json", "view_0003f_depth"),
             *("view_0002f_depth", "cameras[4]: NameDepth"),
         ),
+        ("split", "lichtfeld", "test.txt", "view_0001f", "view_0002f", "test.txt: lacks"),
         ("perspective", "miv", "sequence.json", '  "view_0003f"', '  "view_0002f"', "sourceCamera"),
         ("perspective", "opendibr", "cameras.json", "OPENGL", "COLMAP", "Axial_system"),
         (
@@ -598,6 +643,107 @@ def test_a_changed_name_is_found(name, kind, file, old, new, said, dataset):
     with changed(path, text.replace(old, new, 1).encode()):
         problem_lines = problems(dataset, name, kind)
     assert any(said in line for line in problem_lines), problem_lines
+
+
+NCORE = "ncore/views.ncore4.zarr"
+NCORE_LENS = f"{NCORE}/intrinsics/default/cameras/camera/.zattrs"
+NCORE_POSES = f"{NCORE}/poses/default/dynamic_poses/.zattrs"
+NCORE_TRAJECTORY = "('camera', 'world')"
+
+
+@contextmanager
+def consolidated(folder):
+    """Write a store's compressed metadata anew for a while, from its other files."""
+    summary = folder / zarr_store.METADATA
+    right = summary.read_bytes()
+    files = [file for file in folder.rglob(".z*") if file != summary]
+    metadata = {file.relative_to(folder).as_posix(): read_json(file) for file in files}
+    summary.write_bytes(zarr_store.consolidated(metadata))
+    try:
+        yield
+    finally:
+        summary.write_bytes(right)
+
+
+@pytest.mark.parametrize("place", [0, 2], ids=["first digit", "third digit"])
+@pytest.mark.parametrize(
+    ("name", "file", "keys", "said"),
+    [
+        *(
+            ("wide", NCORE_LENS, ("camera_model_parameters", *keys), said)
+            for keys, said in (
+                (("angle_to_pixeldist_poly", 1), "its camera"),
+                (("angle_to_pixeldist_poly", 3), "its camera"),
+                (("pixeldist_to_angle_poly", 1), "pixeldist_to_angle_poly"),
+                (("max_angle",), "max_angle"),
+                (("principal_point", 0), "its camera"),
+                (("linear_cde", 0), "its camera"),
+                (("linear_cde", 1), "its camera"),
+                (("linear_cde", 2), "its camera"),
+                (("resolution", 1), "its image has"),
+            )
+        ),
+        *(
+            ("perspective", NCORE_LENS, ("camera_model_parameters", *keys), said)
+            for keys, said in (
+                (("focal_length", 0), "its camera"),
+                (("focal_length", 1), "its camera"),
+                (("principal_point", 1), "its camera"),
+                (("radial_coeffs", 5), "radial_coeffs"),
+                (("tangential_coeffs", 0), "tangential_coeffs"),
+                (("thin_prism_coeffs", 2), "thin_prism_coeffs"),
+                (("resolution", 0), "its image has"),
+            )
+        ),
+        *(
+            ("wide", NCORE_POSES, (NCORE_TRAJECTORY, *keys), said)
+            for keys, said in (
+                (("poses", 3, 0, 3), "poses[3] (view_0003f): its position"),
+                (("poses", 3, 1, 2), "poses[3] (view_0003f): its rotation"),
+                (("poses", 3, 3, 0), "poses[3] (view_0003f): the last row"),
+                (("timestamps_us", 2), "times"),
+            )
+        ),
+        (
+            "wide",
+            f"{NCORE}/poses/default/static_poses/.zattrs",
+            ("('points', 'world')", "pose", 2, 3),
+            "is not a point of a view's depth",
+        ),
+        (
+            "wide",
+            f"{NCORE}/cameras/camera/frames/.zattrs",
+            ("frames_timestamps_us", 4, 0),
+            "times",
+        ),
+    ],
+)
+def test_a_changed_digit_of_an_ncore_store_is_found(name, file, keys, said, place, dataset):
+    path = dataset / name / "exports" / file
+    content = in_json(path, keys, place)
+    with changed(path, content), consolidated(dataset / name / "exports" / NCORE):
+        problem_lines = problems(dataset, name, "ncore")
+    assert any(said in line for line in problem_lines), problem_lines
+    assert all(f"{name}/exports/ncore/" in line for line in problem_lines)
+    with changed(path, content):
+        problem_lines = problems(dataset, name, "ncore")
+    assert any("differs from .zmetadata.cbor.xz" in line for line in problem_lines)
+
+
+@pytest.mark.parametrize(("array", "item"), [("_returns/distance_m", 5), ("/direction", 7)])
+def test_a_changed_point_of_an_ncore_store_is_found(array, item, dataset):
+    folder = dataset / "wide/exports" / NCORE / f"lidars/points/frames/0/ray_bundle{array}"
+    path = folder / "0.0"
+    right = path.read_bytes()
+    values = np.frombuffer(zlib.decompress(right), "<f4").copy()
+    values[item] += 1e-4
+    path.write_bytes(zlib.compress(values.tobytes()))
+    try:
+        problem_lines = problems(dataset, "wide", "ncore")
+    finally:
+        path.write_bytes(right)
+    point = item if array.endswith("distance_m") else item // 3
+    assert any(f"point {point}: " in line for line in problem_lines), problem_lines
 
 
 def test_points_are_found_in_any_order(dataset):

@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import subprocess
+import zlib
 from pathlib import Path
 
 import cv2
@@ -27,6 +28,7 @@ from lightfield.export.points import evenly
 from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
+from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
@@ -85,6 +87,8 @@ class Colmap:
         self.colours = {int(row[0]): np.array(row[4:7], int) for row in points}
         self.tracks = {int(row[0]): np.array(row[8:], int).reshape(-1, 2) for row in points}
 
+        if self.model == "EQUIRECTANGULAR":
+            return
         fx, fy, cx, cy, *distortion = self.parameters
         self.matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
         self.distortion = np.array(distortion) if distortion else None
@@ -151,6 +155,27 @@ def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_pat
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
     assert point_count == every
+
+
+def test_colmap_sees_the_points_all_around_a_panorama(tmp_path, capsys):
+    write_views(tmp_path / "dataset", LENSES["panorama"], RIG)
+    options = {"format": "text", "points": 400}
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, **options)
+    assert "gsplat, 3DGRUT and the original 3D Gaussian splatting do not" in capsys.readouterr().err
+    model = Colmap(folder / "sparse" / "0")
+    assert (model.model, model.parameters) == ("EQUIRECTANGULAR", [64, 32])
+    on_sphere(np.array([*model.positions.values()]), 1e-5)
+    assert not (folder / "masks").exists()
+    for number, (name, turn, shift) in model.images.items():
+        assert (folder / "images" / name).is_file()
+        rows = model.seen[number]
+        assert len(rows) > 100
+        local = np.array([model.positions[int(point)] for point in rows[:, 2]]) @ turn.T + shift
+        assert (local[:, 2] < 0).any()
+        # COLMAP's models.h: longitude grows to the right from the axis, latitude downwards.
+        x = (np.arctan2(local[:, 0], local[:, 2]) / (2 * math.pi) + 0.5) * 64
+        y = (np.arctan2(local[:, 1], np.hypot(local[:, 0], local[:, 2])) / math.pi + 0.5) * 32
+        np.testing.assert_allclose(rows[:, :2], np.column_stack([x, y]), atol=1e-6)
 
 
 def read_by_3dgrut(model):
@@ -568,6 +593,214 @@ def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path)
         assert not images.read_image(path).channels["R"][mask == 0].any()
 
 
+class ZarrFolder:
+    """A Zarr store of version 2 in a folder, read without its compressed metadata."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def attributes(self, path):
+        return json.loads((self.folder / path / ".zattrs").read_text())
+
+    def array(self, path):
+        about = json.loads((self.folder / path / ".zarray").read_text())
+        name = ".".join("0" * len(about["shape"])) or "0"
+        content = (self.folder / path / name).read_bytes()
+        if about["compressor"]:
+            assert about["compressor"]["id"] == "zlib"
+            content = zlib.decompress(content)
+        assert about["chunks"] == about["shape"]
+        return np.frombuffer(content, about["dtype"]).reshape(about["shape"])
+
+
+def ncore_pixels(attributes, local):
+    """Project directions (n, 3), x right, y down and z forward, as NCore's documentation does."""
+    lens = attributes["camera_model_parameters"]
+    x, y, z = local.T
+    if attributes["camera_model_type"] == "opencv-pinhole":
+        pixels = np.column_stack([x / z, y / z]) * lens["focal_length"] + lens["principal_point"]
+        return np.where(z[:, None] > 0, pixels, np.nan)
+    assert lens["reference_poly"] == "ANGLE_TO_PIXELDIST"
+    angle = np.arctan2(np.hypot(x, y), z)
+    radius = np.polynomial.Polynomial(lens["angle_to_pixeldist_poly"])(angle)
+    scaled = (radius / np.hypot(x, y))[:, None] * local[:, :2]
+    c, d, e = lens["linear_cde"]
+    pixels = scaled @ np.array([[c, d], [e, 1]]).T + lens["principal_point"] + 0.5
+    return np.where(angle[:, None] <= lens["max_angle"], pixels, np.nan)
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide"])
+def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tmp_path, source):
+    folder = exported(dataset, "ncore", source, tmp_path, points=400)
+    sequence = json.loads((folder / "views.json").read_text())
+    (entry,) = sequence["component_stores"]
+    store = ZarrFolder(folder / entry["path"])
+    frame = "lidars/points/frames/0"
+    directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
+    points = directions * store.array(f"{frame}/ray_bundle_returns/distance_m")[0][:, None]
+    assert 100 < len(points) <= 400
+    on_sphere(points, 1e-5)
+    np.testing.assert_allclose(store.array(f"{frame}/generic_data/rgb"), colour_of(points), atol=6)
+    poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]
+    frames = store.attributes("cameras/camera/frames")["frames_timestamps_us"]
+    assert [end for _, end in frames] == poses["timestamps_us"] == [10**6 * i for i in range(12)]
+    assert sequence["sequence_timestamp_interval_us"] == {"start": 0, "stop": 11 * 10**6 + 1}
+    expected = matrices(dataset, source)
+    names = []
+    for (_, end), pose in zip(frames, np.array(poses["poses"]), strict=True):
+        view = f"cameras/camera/frames/{end}"
+        names.append(store.attributes(f"{view}/generic_data")["name"])
+        np.testing.assert_array_equal(pose @ np.diag([1, -1, -1, 1]), expected[names[-1]])
+        png = store.array(f"{view}/image").tobytes()
+        (tmp_path / "view.png").write_bytes(png)
+        channels = images.read_image(tmp_path / "view.png").channels
+        assert set(channels) == {*"RGB"}
+        height, width = channels["R"].shape
+        mask = np.full((height, width), 255)
+        if source in ("fisheye", "wide"):
+            mask = store.array(f"{view}/generic_data/mask")
+            assert set(np.unique(mask)) == {0, 255}
+        lens = store.attributes("intrinsics/default/cameras/camera")
+        pixels = ncore_pixels(lens, (points - pose[:3, 3]) @ pose[:3, :3])
+        with np.errstate(invalid="ignore"):
+            inside = ((pixels >= 0) & (pixels < [width, height])).all(axis=1)
+        column, row = np.floor(pixels[inside]).astype(int).T
+        has_light = mask[row, column] > 0
+        seen = np.stack([channels[name] for name in "RGB"], axis=-1)[row, column][has_light]
+        assert len(seen) > 50
+        np.testing.assert_allclose(seen, colour_of(points[inside][has_light]), atol=6)
+    assert names == sorted(expected)
+
+
+def lichtfeld_cameras(content):
+    """Return world-to-camera matrices by image, as LichtFeld's transforms.cpp computes them.
+
+    Its cameras look along z with y down. Its world is (x, −y, −z), for cameras and points alike.
+    """
+    flip = np.diag([1.0, -1, -1, 1])
+    return {
+        Path(frame["file_path"]): np.linalg.inv(np.array(frame["transform_matrix"]) @ flip) @ flip
+        for frame in content["frames"]
+    }
+
+
+def lichtfeld_pixels(content, local):
+    """Project points (n, 3), x right, y down and z forward, to pixels (n, 2)."""
+    x, y, z = local.T
+    if content["camera_model"] == "EQUIRECTANGULAR":
+        longitude, latitude = np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))
+        turns = np.column_stack([longitude / (2 * math.pi), latitude / math.pi])
+        return (turns + 0.5) * [content["w"], content["h"]]
+    scale = np.column_stack([x, y]) / z[:, None]
+    if content["camera_model"] == "OPENCV_FISHEYE":
+        angle = np.arctan2(np.hypot(x, y), z)
+        radius = angle + sum(content[f"k{i}"] * angle ** (2 * i + 1) for i in (1, 2, 3))
+        scale = np.column_stack([x, y]) * (radius / np.hypot(x, y))[:, None]
+    else:
+        assert content["camera_model"] == "PINHOLE"
+    pixels = scale * [content["fl_x"], content["fl_y"]] + [content["cx"], content["cy"]]
+    return np.where(z[:, None] > 0, pixels, np.nan)
+
+
+THREE_TERMS = LENSES["opencv"] | {"coefficients": [0.02, -0.01, 0.003, 0]}
+
+
+@pytest.mark.parametrize(
+    ("source", "form"),
+    [
+        ("perspective", "png"),
+        ("shifted", "exr"),
+        ("fisheye", "png"),
+        ("three_terms", "png"),
+        ("panorama", "exr"),
+    ],
+)
+def test_lichtfeld_shows_its_points_and_depth_where_they_are(dataset, tmp_path, source, form):
+    if source == "three_terms":
+        write_views(tmp_path / "dataset", THREE_TERMS, RIG)
+        dataset, source = tmp_path / "dataset", "views"
+    options = {"points": 400, "format": form, "depth": source != "panorama"}
+    folder = exported(dataset, "lichtfeld", source, tmp_path, **options)
+    content = json.loads((folder / "transforms.json").read_text())
+    vertices, _ = ply(folder / content["ply_file_path"])
+    points = np.stack([vertices[name] for name in "xyz"], axis=-1) * np.array([1, -1, -1])
+    on_sphere(points, 1e-5)
+    world_to_camera = lichtfeld_cameras(content)
+    assert len(world_to_camera) == 12
+    for path, matrix in world_to_camera.items():
+        assert path.suffix == f".{form}"
+        channels = images.read_image(folder / path).channels
+        picture = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float64)
+        if form == "exr":
+            picture = 255 * encode_srgb(picture.astype(np.float32))
+        mask = np.full(picture.shape[:2], 255)
+        if (folder / "masks" / f"{path.stem}.png").exists():
+            mask = images.read_image(folder / "masks" / f"{path.stem}.png").channels["Y"]
+        pixels = lichtfeld_pixels(content, points @ matrix[:3, :3].T + matrix[:3, 3])
+        with np.errstate(invalid="ignore"):
+            inside = ((pixels >= 0) & (pixels < [content["w"], content["h"]])).all(axis=1)
+        column, row = np.floor(pixels[inside]).astype(int).T
+        has_light = mask[row, column] > 0
+        colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
+        assert has_light.sum() > 50
+        shown = picture[row, column][has_light]
+        # The panorama's pixels are up to 0.4 m wide, and colour changes by 29 levels a metre.
+        np.testing.assert_allclose(shown, colours[inside][has_light], atol=12)
+        if source == "panorama":
+            continue
+        depth = images.read_image(folder / "depth" / f"{path.stem}.png").channels["Y"]
+        assert depth.dtype == np.uint16
+        assert depth.max() == 65535
+        assert ((depth > 0) == (mask > 0)).all()
+        row, column = np.nonzero(depth)
+        centres = np.column_stack([column, row]) + 0.5
+        # The axis of the fisheye is no pixel's centre.
+        steps = depth[row, column].astype(float)
+        rays = lenses.from_camera(THREE_TERMS if source == "views" else LENSES[source]).rays(
+            *centres.T
+        )
+        np.testing.assert_allclose(
+            lichtfeld_pixels(content, rays * [1, -1, -1]), centres, atol=1e-6
+        )
+        to_world = np.linalg.inv(matrix)
+        reach = steps[:, None] * rays * [1, -1, -1] / -rays[:, 2:] @ to_world[:3, :3].T
+        on_sphere(to_world[:3, 3] + lichtfeld_scale(reach, to_world[:3, 3]) * reach, 1e-3)
+
+
+def lichtfeld_scale(reach, place):
+    """Return the metres of a step of depth. The farthest of the points place + reach fits it."""
+    farthest = reach[np.argmax(np.linalg.norm(reach, axis=1))]
+    a, b, c = farthest @ farthest, farthest @ place, place @ place - RADIUS**2
+    return (-b + math.sqrt(b * b - a * c)) / a
+
+
+def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, LENSES["fisheye"], RIG | {"rotation": [10, 20, 30]})
+    with pytest.raises(UserError, match=r"normal/view_0000f.exr: is missing; normals need passes"):
+        exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+    lightfield = LightField.read(dataset / "lightfield.json")
+    rays = lightfield.lens.pixel_rays()
+    true_normals = {}
+    for view in lightfield.views:
+        distance = look(lightfield.lens, view.matrix)[1][..., None]
+        places = view.matrix[:3, 3] + rays @ view.matrix[:3, :3].T * distance
+        true_normals[view.name] = np.nan_to_num(-places / RADIUS)
+        planes = np.moveaxis(true_normals[view.name].astype(np.float32), -1, 0)
+        path = dataset / "normal" / f"{view.name}.exr"
+        path.parent.mkdir(exist_ok=True)
+        images.write_exr(path, dict(zip("RGB", planes, strict=True)))
+    folder = exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+    content = json.loads((folder / "transforms.json").read_text())
+    for path, matrix in lichtfeld_cameras(content).items():
+        channels = images.read_image(folder / "normals" / f"{path.stem}.png").channels
+        colours = np.stack([channels[name] for name in "RGB"], axis=-1)
+        world = (colours / 255 * 2 - 1) @ matrix[:3, :3] * [1, -1, -1]
+        np.testing.assert_allclose(world, true_normals[path.stem], atol=0.011)
+        assert (colours[~np.isfinite(rays[..., 0])] == 128).all()
+
+
 def ply(path):
     head, _, body = path.read_bytes().partition(b"end_header\n")
     kinds = {"float": "<f4", "uchar": "u1"}
@@ -701,7 +934,15 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
     ("name", "source", "camera", "options", "problem"),
     [
         ("colmap", "views", VIEWS, {}, "sees 180 degrees"),
-        ("colmap", "views", LENSES["panorama"], {}, "has a lens that COLMAP lacks; reproject"),
+        ("colmap", "views", LENSES["half"], {}, "is a part of a panorama; COLMAP takes whole"),
+        ("colmap", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
+        (
+            "colmap",
+            "views",
+            {"lens": "equisolid", "focal_length": 10, "fov": 120, "resolution": [64, 64]},
+            {},
+            "has a lens that COLMAP lacks; reproject",
+        ),
         ("colmap", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
         ("nerfstudio", "views", VIEWS | {"resolution": [65, 65]}, {}, "use even sizes"),
         (
@@ -721,6 +962,13 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
+        ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
+        ("lichtfeld", "views", VIEWS, {}, "sees 180 degrees, where LichtFeld's fisheye ends"),
+        ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
+        ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
+        ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not of EXR; give it format: exr"),
+        ("lichtfeld", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
+        ("lichtfeld", "again", VIEWS, {"normals": True}, r"give it passes: \[normal\]"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
@@ -795,6 +1043,8 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
         ("miv", "fisheye", "has a lens that MIV lacks"),
         ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
+        ("ncore", "panorama", "is not an equidistant fisheye or a pinhole"),
+        ("lichtfeld", "opencv", "has a fourth coefficient, which LichtFeld drops; reproject"),
     ],
 )
 def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(

@@ -282,6 +282,7 @@ def read_transforms(path, _):
 
 def export_list(rng):
     formats = ["nerfstudio", "nerf_synthetic", "opendibr", "miv", "scannetpp", "colmap"]
+    formats += ["ncore", "lichtfeld"]
     return {
         "format": rng.choice([*formats, "hci", "point_cloud", "poses_csv"]),
         "options": {"depth": True},
@@ -619,6 +620,8 @@ EXPORTS = {
     "opendibr": {},
     "miv": {},
     "hci": {},
+    "lichtfeld": {"points": 20, "depth": True},
+    "ncore": {"points": 20},
     "poses_csv": {},
     "point_cloud": {"voxel": 0.1},
 }

@@ -1,10 +1,11 @@
 """Reads the exports with the consumers' own code, and learns a radiance field from them.
 
-The consumers are pycolmap, nerfstudio and OpenCV. `make consumers` runs this in an environment of
-its own, after export.py. Prints the largest error of each export. An error beyond its limit ends in
-an AssertionError.
+The consumers are pycolmap, nerfstudio, NCore and OpenCV. `make consumers` runs this in an
+environment of its own, after export.py. Prints the largest error of each export. An error beyond
+its limit ends in an AssertionError.
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -31,8 +32,12 @@ def colmap(folder, name):
     import pycolmap
 
     model = pycolmap.Reconstruction(folder / "colmap" / name / "sparse" / "0")
-    names, matrices, _ = ours(folder, name)
+    names, matrices, rays = ours(folder, name)
     fewest, pixels, metres = 10**9, 0.0, 0.0
+    (camera,) = model.cameras.values()
+    row, column = np.nonzero(np.isfinite(rays[..., 0]))
+    centres = np.column_stack([column, row]) + 0.5
+    radians = angle(camera.cam_ray_from_img(centres), rays[row, column] * [1, -1, -1]).max()
     for image in model.images.values():
         seen = [point for point in image.points2D if point.has_point3D()]
         fewest = min(fewest, len(seen))
@@ -44,6 +49,8 @@ def colmap(folder, name):
             image.projection_center(), matrices[names.index(stem)][:3, 3], atol=1e-9
         )
         path = folder / "colmap" / name / "stereo/depth_maps" / f"{image.name}.geometric.bin"
+        if not path.exists():
+            continue
         width, height, _, body = path.read_bytes().split(b"&", 3)
         depth = np.frombuffer(body, "<f4").reshape(int(height), int(width))
         row, column = np.nonzero(depth)
@@ -54,10 +61,12 @@ def colmap(folder, name):
         metres = max(metres, np.abs(np.linalg.norm(world, axis=1) - RADIUS).max())
     print(
         f"pycolmap {pycolmap.__version__}, {name}: {len(model.images)} views, at least {fewest} "
-        f"points in each within {pixels:.2g} pixels; depth within {1000 * metres:.2g} mm"
+        f"points in each within {pixels:.2g} pixels, {pixels / camera.width:.2g} of the width; "
+        f"rays within {radians:.2g} rad; depth within {1000 * metres:.2g} mm"
     )
     assert fewest >= 1000
-    assert pixels < 0.5
+    assert pixels < 1e-9 * camera.width
+    assert radians < 1e-6
     assert metres < 1e-3
 
 
@@ -105,9 +114,71 @@ def nerfstudio(folder, name):
     assert metres < 2e-3
 
 
-def opencv(folder, name):
-    import json
+def ncore(folder, name):
+    """Check an NCore sequence through its loader, its pose graph and its camera class."""
+    import torch
+    from ncore.data import FrameTimepoint
+    from ncore.data.v4 import SequenceComponentGroupsReader, SequenceLoaderV4
+    from ncore.sensors import CameraModel
 
+    reader = SequenceComponentGroupsReader([folder / "ncore" / name / "views.json"])
+    assert (
+        reader.get_sequence_meta().component_stores[0].md5
+        == json.loads((folder / "ncore" / name / "views.json").read_text())["component_stores"][0][
+            "md5"
+        ]
+    )
+    loader = SequenceLoaderV4(reader)
+    names, matrices, rays = ours(folder, name)
+    (camera,) = map(loader.get_camera_sensor, loader.camera_ids)
+    model = CameraModel.from_parameters(camera.model_parameters, device="cpu", dtype=torch.float32)
+    seen = np.isfinite(rays[..., 0])
+    row, column = np.nonzero(seen)
+    local = rays[seen] * [1, -1, -1]
+    centres = np.column_stack([column, row]) + 0.5
+    projected = model.camera_rays_to_image_points(local)
+    assert projected.valid_flag.all()
+    pixels = np.abs(projected.image_points.numpy() - centres).max()
+    back = model.pixels_to_camera_rays(np.column_stack([column, row])).numpy()
+    radians = angle(back.astype(np.float64), local).max()
+    (lidar,) = map(loader.get_lidar_sensor, loader.lidar_ids)
+    cloud = lidar.get_frame_point_cloud(0, motion_compensation=True, with_start_points=True)
+    points = cloud.xyz_m_end.astype(np.float64)
+    metres = np.abs(np.linalg.norm(points, axis=1) - RADIUS).max()
+    assert (np.diff(camera.frames_timestamps_us[:, 1].astype(int)) > 0).all()
+    levels = 0.0
+    for index in range(camera.frames_count):
+        matrix = matrices[names.index(camera.get_frame_generic_meta_data(index)["name"])]
+        for moment in (FrameTimepoint.START, FrameTimepoint.END):
+            pose = camera.get_frames_T_source_target(
+                camera.sensor_id, "world", np.array(index), moment
+            ).reshape(4, 4)
+            np.testing.assert_allclose(pose @ np.diag([1, -1, -1, 1]), matrix, atol=1e-6)
+        picture = camera.get_frame_image_array(index)
+        mask = np.ones(seen.shape, bool)
+        if camera.has_frame_generic_data(index, "mask"):
+            mask = camera.get_frame_generic_data(index, "mask") > 0
+        assert (mask == seen).all()
+        toward = (points - pose[:3, 3]) @ pose[:3, :3]
+        shown = model.camera_rays_to_image_points(toward.astype(np.float32))
+        x, y = np.floor(shown.image_points.numpy()[shown.valid_flag.numpy()]).astype(int).T
+        colours = 40 + 175 * (points[shown.valid_flag.numpy()] / RADIUS / 2 + 0.5)
+        inside = mask[y, x]
+        assert inside.sum() > 1000
+        levels = max(levels, np.abs(picture[y, x] - colours)[inside].max())
+    print(
+        f"NCore, {name}, {type(model).__name__}: {camera.frames_count} views, rays up to "
+        f"{np.degrees(np.arccos(local[:, 2]).max()):.1f} degrees from the axis within {pixels:.2g} "
+        f"pixels, and back within {radians:.2g} rad; {len(points)} points within "
+        f"{1000 * metres:.2g} mm, their colours within {levels:.1f} levels"
+    )
+    assert pixels < 1e-3
+    assert radians < 1e-5
+    assert metres < 1e-2
+    assert levels < 10
+
+
+def opencv(folder, name):
     transforms = folder / "nerfstudio" / name / "transforms.json"
     if transforms.exists():
         lens = json.loads(transforms.read_text())
@@ -154,8 +225,8 @@ def radiance_field(folder):
 
 def main():
     folder = Path(sys.argv[1])
-    for check, kind in ((colmap, "colmap"), (nerfstudio, "nerfstudio")):
-        for path in sorted((folder / kind).iterdir()):
+    for check in (colmap, nerfstudio, ncore):
+        for path in sorted((folder / check.__name__).iterdir()):
             check(folder, path.name)
     for name in ("fisheye", "opencv"):
         opencv(folder, name)

@@ -22,8 +22,9 @@ RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.
 # Enough views for a radiance field to learn from.
 LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
-    "colmap": ("perspective", "shifted", "fisheye", "opencv"),
+    "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
+    "ncore": ("perspective", "shifted", "fisheye", "wide"),
 }
 
 
@@ -31,7 +32,7 @@ def main() -> None:
     folder = Path(sys.argv[1])
     shutil.rmtree(folder, ignore_errors=True)
     write_views(folder / "dataset", enlarged(LENSES["wide"], 2), RIG)
-    for name in sorted({*OF["colmap"], *OF["nerfstudio"]}):
+    for name in sorted({name for sources in OF.values() for name in sources}):
         write_views(folder / "dataset" / name, enlarged(LENSES[name], 2), RIG)
         source = SourceDataset(folder / "dataset", name, ".exr")
         np.savez(
@@ -42,9 +43,11 @@ def main() -> None:
         )
     for kind, sources in OF.items():
         for name in sources:
-            settings = settings_of(kind).model_validate(
-                {"sources": [name], "points": 40000, "depth": True}
-            )
+            options = {"sources": [name], "points": 40000}
+            # COLMAP has no depth maps of panoramas.
+            if kind != "ncore" and (kind, name) != ("colmap", "panorama"):
+                options["depth"] = True
+            settings = settings_of(kind).model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
     write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)

@@ -666,6 +666,10 @@ class Scene(Credits):
             reprojection = None if source == VIEWS else self.reprojections[source]
             if reprojection:
                 has_depth &= reprojection.format == "exr"
+            maker = reprojection or self.render
+            for name in export.needed_passes:
+                if maker and name not in (maker.passes or ()):
+                    raise ValueError(f"{key}: {source} has no {name}; give it passes: [{name}]")
             for name in (reprojection and reprojection.rigs) or self.rigs:
                 rig = self.rigs[name]
                 camera = (reprojection and reprojection.camera) or rig.camera

@@ -50,6 +50,11 @@ class Export(Settings):
         """The options that the export's own files record."""
         return self.model_dump(mode="json", exclude={"sources"})
 
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        """The names of the passes that each source must have."""
+        return ()
+
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         """Return why the consumer cannot take views of a lens, and what to do. None if it can.
 
@@ -165,6 +170,11 @@ class Colmap(Developed):
             # COLMAP projects only points in front of the camera.
             if lens.fov >= math.pi:
                 return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
+            if self.depth:
+                return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
         return NO_DEPTH if self.depth and not has_depth else None
@@ -264,6 +274,55 @@ class ScanNetPP(Developed):
         return "is not an equidistant fisheye below 180 degrees; reproject to one"
 
 
+class NCore(Developed):
+    """A sequence of NCore v4, for gsplat and 3DGRUT."""
+
+    is_for_training: ClassVar[bool] = True
+
+    points: PointCount = Field(50000, description="Most points lifted from depth.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | Rectilinear):
+            return None
+        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+
+
+class LichtFeld(Developed):
+    """A dataset for LichtFeld Studio."""
+
+    is_for_training: ClassVar[bool] = True
+
+    format: Literal["png", "exr"] = Field(
+        "png", description="The form of the images. exr keeps their light for HDR training."
+    )
+    points: PointCount = Field(50000, description="Most points of the point cloud.")
+    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
+    normals: bool = Field(
+        False, description="Write normals, too, from sources with the pass normal."
+    )
+
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        return ("normal",) if self.normals else ()
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | KannalaBrandt):
+            if lens.fov >= math.pi:
+                return "sees 180 degrees, where LichtFeld's fisheye ends; give it a smaller fov"
+            if isinstance(lens, KannalaBrandt) and lens.coefficients[3] != 0:
+                return "has a fourth coefficient, which LichtFeld drops; reproject to equidistant"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; LichtFeld takes whole ones; {TO_RECTILINEAR}"
+            if self.depth:
+                return "is a panorama, which has no depth along an axis; leave out depth: true"
+        elif not isinstance(lens, Rectilinear):
+            return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+        if self.format == "exr" and not has_depth:
+            return "is not of EXR; give it format: exr"
+        return NO_DEPTH if self.depth and not has_depth else None
+
+
 class PosesCsv(Export):
     """A table of poses: name, position, rotation."""
 
@@ -292,6 +351,10 @@ class Exports(Settings):
     miv: Miv | None = Field(None, description="For TMIV.")
     hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
     scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    ncore: NCore | None = Field(
+        None, description="For gsplat and 3DGRUT: NCore v4, fisheyes past 180° too."
+    )
+    lichtfeld: LichtFeld | None = Field(None, description="For LichtFeld Studio.")
     poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
     point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 

@@ -14,6 +14,8 @@ EXPORTS = (
     "miv",
     "hci",
     "scannetpp",
+    "ncore",
+    "lichtfeld",
     "poses_csv",
     "point_cloud",
 )

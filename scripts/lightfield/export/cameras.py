@@ -4,6 +4,7 @@ import math
 
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -30,13 +31,20 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
 
 
 def misreading(lens: Lens) -> str | None:
-    """Return how 3DGRUT misreads a fisheye in a COLMAP model, or None if it does not.
+    """Return how trainers misread a lens in a COLMAP model, or None if they do not.
+
+    The readers of gsplat, 3DGRUT and the original 3D Gaussian splatting stop at a panorama.
 
     3DGRUT's largest angle θ is the corner's distance from the axis divided by the focal length. It
     projects points up to there. It inverts r(θ) by Newton's method, starting from an angle
     proportional to r. So r(θ) must grow that far, and no pixel may see farther. Source: 3DGRUT's
     dataset_colmap.py and cameraProjections.cuh, and OpenCVFisheyeCameraModel in NCore.
     """
+    if isinstance(lens, Equirectangular):
+        return (
+            "is a panorama, which COLMAP reads since version 4.1, but gsplat, 3DGRUT and the "
+            "original 3D Gaussian splatting do not; give them perspective views"
+        )
     if not isinstance(lens, Equidistant | KannalaBrandt):
         return None
     fx, fy, *distortion = opencv_fisheye(lens)

@@ -7,7 +7,7 @@
 
 Poses are world to camera, with x right, y down and z forward. Points are lifted from depth. Each
 has the views that see it. One view is enough, because depth says where the point is. Source:
-COLMAP's format.rst and scene/reconstruction_io.
+COLMAP's format.rst, scene/reconstruction_io and sensor/models.h.
 """
 
 import struct
@@ -36,11 +36,14 @@ from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 PINHOLE = (1, "PINHOLE")
 OPENCV_FISHEYE = (5, "OPENCV_FISHEYE")
+# Whole panoramas. Since COLMAP 4.1.
+EQUIRECTANGULAR = (17, "EQUIRECTANGULAR")
 
 # A file beside the model, if the scene has a split: the names of the test images, one per line. The
 # original 3D Gaussian splatting reads it.
@@ -101,6 +104,8 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
     """Return COLMAP's model (id, name) of a lens, and its parameters in pixels."""
     if isinstance(lens, Rectilinear):
         return PINHOLE, [*cameras.focal_pixels(lens), *lens.center]
+    if isinstance(lens, Equirectangular):
+        return EQUIRECTANGULAR, [float(lens.width), float(lens.height)]
     fx, fy, *distortion = cameras.opencv_fisheye(lens)
     return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
 

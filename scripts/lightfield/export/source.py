@@ -76,6 +76,10 @@ class SourceDataset:
     def path(self, view: View) -> Path:
         return self._path(view, self.name or "exr", self.suffix)
 
+    def pass_path(self, view: View, name: str) -> Path:
+        """Return the file of a view's pass. It may be missing."""
+        return self._path(view, f"{self.name}/{name}" if self.name else name, ".exr")
+
     def _path(self, view: View, folder: str, suffix: str) -> Path:
         dataset, name = self._homes.get(view.name, (self.dataset, view.name))
         return dataset / folder / f"{name}{suffix}"

@@ -57,6 +57,13 @@ def _literal(model: type[BaseModel], key: str) -> str:
     return str(model.model_fields[key].annotation.__args__[0])  # type: ignore[union-attr]
 
 
+def _export_section(name: str) -> Section:
+    """Return the section of an exporter's own keys."""
+    model = exports.settings_of(name)
+    develops = issubclass(model, exports.Developed)
+    return Section(name, model, exports.Developed if develops else exports.Export)
+
+
 RIG_MODELS = _models(rigs.AnyRig)
 
 
@@ -136,10 +143,13 @@ KEY_PAGES: dict[str, Page] = {
     "export-keys.md": Page(
         "The keys of exports",
         "An entry of `exports` in a scene YAML writes files for one consumer. "
-        "[Export formats](export-formats.md) says what each consumer takes.",
+        "[Export formats](export-formats.md) says what each consumer takes. All but `instant_ngp` "
+        "and `poses_csv` are exports of pictures, and have their keys, too.",
         [
             Section("exports", exports.Exports),
-            *[Section(name, exports.settings_of(name)) for name in exports.Exports.model_fields],
+            Section("All exports", exports.Export),
+            Section("Exports of pictures", exports.Developed, exports.Export),
+            *[_export_section(name) for name in exports.Exports.model_fields],
         ],
     ),
     "job-keys.md": Page(

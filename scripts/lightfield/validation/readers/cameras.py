@@ -107,6 +107,34 @@ class PolynomialFisheye:
 
 
 @dataclass(frozen=True)
+class FTheta:
+    """NCore's f-theta camera: r = p0 + p1 θ + … + p5 θ⁵ in pixels, up to ``largest`` radians.
+
+    ``linear`` (c, d, e) maps r times the unit direction (x, y) to (c x + d y, e x + y).
+    """
+
+    width: int
+    height: int
+    cx: float
+    cy: float
+    terms: tuple[float, ...]
+    linear: tuple[float, ...]
+    largest: float
+
+    def pixels(self, rays: Floats) -> Floats:
+        x, y, z = np.moveaxis(rays, -1, 0)
+        side = np.hypot(x, y)
+        theta = np.arctan2(side, -z)
+        # The rim of a rounded angle belongs to the image.
+        seen = np.where(theta <= self.largest * (1 + 1e-9), theta, np.nan)
+        radius = polynomial.polyval(seen, np.array(self.terms))
+        along = _along(radius, side)
+        right, down = along * x, -along * y
+        c, d, e = self.linear
+        return np.stack([self.cx + c * right + d * down, self.cy + e * right + down], axis=-1)
+
+
+@dataclass(frozen=True)
 class Panorama:
     """Longitude is linear in x and grows to the right. Latitude is linear in y. Both in radians.
 

@@ -5,6 +5,7 @@ says twice: an image's points with the points' tracks, and a point's pixel in an
 projection.
 """
 
+import math
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import reading
-from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Pinhole
+from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from lightfield.validation.readers.contents import (
     FLOAT32,
     Cloud,
@@ -30,10 +31,19 @@ from lightfield.validation.readers.contents import (
 
 Ints = NDArray[np.int64]
 
+
+def _panorama(width: int, height: int, w: float, h: float) -> Panorama:
+    """Return COLMAP's EQUIRECTANGULAR. 2π of longitude take w pixels, and π of latitude take h."""
+    east = 2 * math.pi * (width / w) - math.pi
+    south = math.pi / 2 - math.pi * (height / h)
+    return Panorama(width, height, -math.pi, east, math.pi / 2, south)
+
+
 # COLMAP's id, name and class of each model, with the number of its parameters.
 MODELS: dict[int, tuple[str, Callable[..., Camera], int]] = {
     1: ("PINHOLE", Pinhole, 4),
     5: ("OPENCV_FISHEYE", OpenCVFisheye, 8),
+    17: ("EQUIRECTANGULAR", _panorama, 2),
 }
 NAMES = {name: number for number, (name, _, _) in MODELS.items()}
 
@@ -190,7 +200,9 @@ def _binary_cameras(path: Path) -> dict[int, Camera]:
     for _ in range(struct.unpack_from("<Q", content)[0]):
         number, model, width, height = struct.unpack_from("<iiQQ", content, place)
         if model not in MODELS:
-            raise ValueError(f"camera {number}: its model is {model}, not 1 or 5")
+            raise ValueError(
+                f"camera {number}: its model is {model}, not {' or '.join(map(str, MODELS))}"
+            )
         count = MODELS[model][2]
         parameters = numbers(np.frombuffer(content, "<f8", count, place + 24), (count,))
         cameras[number] = _camera(model, width, height, parameters)

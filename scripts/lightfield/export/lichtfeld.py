@@ -1,0 +1,112 @@
+"""Writes a dataset for LichtFeld Studio: perspective views, fisheyes and full panoramas.
+
+- ``transforms.json``: camera-to-world matrices as in lightfield.json (OpenGL axes, Z up).
+- ``images/``: the views as 8-bit PNG, or the EXR views themselves.
+- ``masks/``: 0 means ignored. Only for views with pixels that show nothing.
+- ``depth/``: 16-bit Z, if the settings ask for it. The farthest point of a view has 65535. 0 for
+  none. LichtFeld fits the scale of each view.
+- ``normals/``: 8-bit (n + 1) / 2 in the camera's axes, x right, y down and z forward, if the
+  settings ask for it. Grey for none.
+- ``points.ply``: a point cloud.
+- ``train.txt``, ``test.txt``: the names of the images to train and to test with.
+
+LichtFeld finds masks, depth and normals by the image's name without its suffix. Source: LichtFeld
+Studio's transforms.cpp, blender_loader.cpp, filesystem_utils.hpp and image_exr.cpp.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import link_or_copy, write_json, write_text
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import LichtFeld
+from lightfield.dataset.lightfield import View
+from lightfield.export import cameras
+from lightfield.export.points import lift, write_ply
+from lightfield.export.source import Floats, SourceDataset, check_size
+from lightfield.export.trainer_splits import splits
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+
+POINT_CLOUD = "points.ply"
+MOST = np.iinfo(np.uint16).max
+
+# From Blender's camera (y up, looks along −z) to that of normals (y down, looks along z).
+_FLIP = np.array([1.0, -1.0, -1.0])
+
+
+def export(source: SourceDataset, settings: LichtFeld, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    views = sorted(source.lightfield.views, key=lambda view: view.name)
+    suffix = f".{settings.format}"
+    frames = []
+    progress = Progress(len(views), "lichtfeld", "views")
+    for view in views:
+        image = folder / "images" / f"{view.name}{suffix}"
+        if settings.format == "exr":
+            link_or_copy(source.path(view), image)
+        else:
+            source.write_image(view, image)
+        valid = source.valid(view)
+        if not valid.all():
+            images.write_png(folder / "masks" / f"{view.name}.png", valid.astype(np.uint8) * 255)
+        if settings.depth:
+            images.write_png(folder / "depth" / f"{view.name}.png", _depth(source, view))
+        if settings.normals:
+            images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
+        path = image.relative_to(folder).as_posix()
+        frames.append({"file_path": path, "transform_matrix": view.matrix.tolist()})
+        progress.done()
+    write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
+    parts = splits(source.lightfield)
+    for part, part_views in (("train", parts.train), ("test", parts.test)):
+        names = "".join(f"{view.name}{suffix}\n" for view in part_views)
+        write_text(folder / f"{part}.txt", names)
+    content = {**camera(source.lens), "ply_file_path": POINT_CLOUD, "frames": frames}
+    write_json(folder / "transforms.json", content)
+
+
+def camera(lens: Lens) -> dict[str, Any]:
+    """Return the keys that describe a lens to LichtFeld."""
+    size = {"w": lens.width, "h": lens.height}
+    if isinstance(lens, Equirectangular):
+        return {"camera_model": "EQUIRECTANGULAR", **size}
+    center = {"cx": lens.center[0], "cy": lens.center[1]}
+    if isinstance(lens, Rectilinear):
+        fx, fy = cameras.focal_pixels(lens)
+        return {"camera_model": "PINHOLE", "fl_x": fx, "fl_y": fy, **center, **size}
+    fx, fy, k1, k2, k3, _ = cameras.opencv_fisheye(lens)
+    distortion = {"k1": k1, "k2": k2, "k3": k3}
+    focal = {"fl_x": fx, "fl_y": fy}
+    return {"camera_model": "OPENCV_FISHEYE", **focal, **center, **size, **distortion}
+
+
+def _depth(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uint16]]:
+    """Return a view's Z (h, w) in steps of the farthest surface / 65535. 0 for none."""
+    depth = source.depth(view, "z")
+    has_depth = np.isfinite(depth) & (depth > 0)
+    farthest = float(np.max(depth, where=has_depth, initial=0))
+    if farthest == 0:
+        return np.zeros(depth.shape, np.uint16)
+    # A surface that rounds to 0 would have none.
+    steps = np.maximum(np.round(depth / farthest * MOST), 1)
+    return np.where(has_depth, steps, 0).astype(np.uint16)
+
+
+def _normals(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Return a view's normals (h, w, 3) as colours. Raises `UserError` if it has none."""
+    path = source.pass_path(view, "normal")
+    if not path.is_file():
+        raise UserError(
+            f"{path}: is missing; normals need passes: [normal] in render and in the reprojection"
+        )
+    channels = images.read_image(path).channels
+    world: Floats = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float64)
+    check_size(path, source.lightfield, world)
+    local = world @ view.matrix[:3, :3] * _FLIP
+    return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)

@@ -1,0 +1,193 @@
+"""Writes a sequence of NCore v4, which gsplat and 3DGRUT read: fisheyes past 180° too.
+
+- ``views.json``: the sequence, and where its store is.
+- ``views.ncore4.zarr/``: the store.
+  - ``cameras/camera/frames/<time>/``: a view as PNG, its name, and a mask if the view has pixels
+    that show nothing. There 0 means ignored.
+  - ``intrinsics``: f-theta for fisheyes, OpenCV's pinhole for perspective views.
+  - ``poses``: camera to world, with x right, y down and z forward, in metres.
+  - ``lidars/points``: the points, as one frame of a lidar at the world's origin. gsplat and 3DGRUT
+    read no other points.
+
+Frames are in the order of the views' names. NCore needs a different time for each. So each is
+exposed a second after the one before, in microseconds, for an instant. Source: NCore's
+data/v4/components.py, data/types.py and sensors/camera.py, and gsplat's datasets/ncore.py.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import NCore
+from lightfield.dataset.lightfield import View
+from lightfield.export import cameras
+from lightfield.export.points import Points, lift
+from lightfield.export.source import SourceDataset
+from lightfield.export.zarr_store import ZarrStore
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+
+SEQUENCE = "views"
+CAMERA = "camera"
+LIDAR = "points"
+WORLD = "world"
+# NCore's readers open the component of this name.
+DEFAULT = "default"
+
+# Microseconds between the views.
+STEP = 1_000_000
+
+# From Blender's camera (y up, looks along −z) to NCore's (y down, looks along z).
+_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    views = sorted(source.lightfield.views, key=lambda view: view.name)
+    if len(views) < 2:
+        raise UserError(f"{source.lightfield.path}: frames: has one view; NCore needs two or more")
+    sequence = {
+        "sequence_id": SEQUENCE,
+        # The end is not included.
+        "sequence_timestamp_interval_us": {"start": 0, "stop": (len(views) - 1) * STEP + 1},
+        "generic_meta_data": {},
+        "version": "v4",
+    }
+    name = f"{SEQUENCE}.ncore4.zarr"
+    store = ZarrStore(folder / name, sequence | {"component_group_name": ""})
+    components = {
+        "cameras": CAMERA,
+        "cuboids": DEFAULT,
+        "intrinsics": DEFAULT,
+        "lidars": LIDAR,
+        "masks": DEFAULT,
+        "poses": DEFAULT,
+    }
+    for component, instance in components.items():
+        store.group(component)
+        names = {
+            "component_name": component,
+            "component_instance_name": instance,
+            "component_version": "v1",
+        }
+        store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
+    store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
+    _write_poses(store, views)
+    _write_lens(store, source.lens)
+    _write_points(store, lift(source, count=settings.points))
+    _write_frames(store, source, views)
+    digest = store.close()
+    versions = {
+        component: {instance: {"version": "v1", "generic_meta_data": {}}}
+        for component, instance in components.items()
+    }
+    stores = [{"path": name, "md5": digest, "components": versions}]
+    write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
+
+
+def camera(lens: Lens) -> dict[str, Any]:
+    """Return NCore's type of a lens, and its parameters in pixels and radians."""
+    common = {
+        "resolution": [lens.width, lens.height],
+        "shutter_type": "GLOBAL",
+        "external_distortion_parameters": None,
+    }
+    parameters: dict[str, Any]
+    if isinstance(lens, Rectilinear):
+        parameters = {
+            "principal_point": list(lens.center),
+            "focal_length": list(cameras.focal_pixels(lens)),
+            "radial_coeffs": [0.0] * 6,
+            "tangential_coeffs": [0.0] * 2,
+            "thin_prism_coeffs": [0.0] * 4,
+        }
+        # gsplat does not know NCore's "ideal-pinhole".
+        return {
+            "camera_model_type": "opencv-pinhole",
+            "camera_model_parameters": common | parameters,
+        }
+    if not isinstance(lens, Equidistant):
+        raise TypeError(f"{type(lens).__name__} is not a lens of this export")
+    pixels_a_radian = lens.height / lens.fov
+    parameters = {
+        # Here pixel centres are whole numbers.
+        "principal_point": [lens.center[0] - 0.5, lens.center[1] - 0.5],
+        "reference_poly": "ANGLE_TO_PIXELDIST",
+        "pixeldist_to_angle_poly": [0.0, 1 / pixels_a_radian, 0.0, 0.0, 0.0, 0.0],
+        "angle_to_pixeldist_poly": [0.0, pixels_a_radian, 0.0, 0.0, 0.0, 0.0],
+        "max_angle": lens.fov / 2,
+        # The first stretches x: the image circle touches all four edges.
+        "linear_cde": [lens.width / lens.height, 0.0, 0.0],
+    }
+    return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
+
+
+def _write_poses(store: ZarrStore, views: Sequence[View]) -> None:
+    poses = {
+        "poses": [(view.matrix @ _FLIP).tolist() for view in views],
+        "timestamps_us": [index * STEP for index in range(len(views))],
+        "dtype": "float64",
+    }
+    lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
+    store.group("poses/default/static_poses", {str((LIDAR, WORLD)): lidar})
+    store.group("poses/default/dynamic_poses", {str((CAMERA, WORLD)): poses})
+
+
+def _write_lens(store: ZarrStore, lens: Lens) -> None:
+    store.group("intrinsics/default/cameras")
+    store.group(f"intrinsics/default/cameras/{CAMERA}", camera(lens))
+    store.group("intrinsics/default/lidars")
+    # These are masks for all frames. Each frame has its own.
+    store.group("masks/default/cameras")
+    store.group(f"masks/default/cameras/{CAMERA}", {"mask_names": []})
+
+
+def _write_points(store: ZarrStore, points: Points) -> None:
+    """Write the points as what a lidar at the origin measures at time 0."""
+    count = len(points.positions)
+    distances = np.linalg.norm(points.positions, axis=1)
+    with np.errstate(invalid="ignore"):
+        directions = points.positions / distances[:, None]
+    directions[distances == 0] = [1, 0, 0]
+    frames = f"lidars/{LIDAR}/frames"
+    store.group(frames, {"frames_timestamps_us": [[0, 0]]})
+    frame = f"{frames}/0"
+    store.group(frame)
+    store.group(f"{frame}/generic_data", {})
+    store.array(f"{frame}/generic_data/rgb", points.colours)
+    store.group(f"{frame}/ray_bundle", {"n_rays": count})
+    store.array(f"{frame}/ray_bundle/direction", directions.astype("<f4"))
+    store.array(f"{frame}/ray_bundle/timestamp_us", np.zeros(count, "<u8"))
+    returns = f"{frame}/ray_bundle_returns"
+    store.group(returns, {"n_returns": 1})
+    store.array(f"{returns}/distance_m", distances.astype("<f4")[None])
+    store.array(f"{returns}/intensity", np.zeros((1, count), "<f4"))
+    is_valid = np.packbits(np.ones(count, bool))
+    sizes = {"n_returns": 1, "n_rays": count}
+    store.array(f"{frame}/ray_bundle_returns_valid_mask_packed", is_valid, sizes)
+
+
+def _write_frames(store: ZarrStore, source: SourceDataset, views: Sequence[View]) -> None:
+    frames = f"cameras/{CAMERA}/frames"
+    times = [index * STEP for index in range(len(views))]
+    store.group(frames, {"frames_timestamps_us": [[time, time] for time in times]})
+    progress = Progress(len(views), "ncore", "views")
+    for time, view in zip(times, views, strict=True):
+        frame = f"{frames}/{time}"
+        store.group(frame)
+        store.group(f"{frame}/generic_data", {"name": view.name})
+        valid = source.valid(view)
+        if not valid.all():
+            store.array(f"{frame}/generic_data/mask", valid.astype(np.uint8) * 255)
+        # gsplat takes three channels.
+        picture = store.folder / f"{view.name}.png"
+        images.write_png(picture, source.colour(view))
+        store.encoded(f"{frame}/image", picture, {"format": "png"})
+        progress.done()
