@@ -216,8 +216,8 @@ PROGRAM_PAGES = {
         "Programs that measure",
         "These programs measure error, quality, and time.",
         [
-            "evaluate", "synthesis_quality", "error_vs_time", "try_changes", "advise", "plan",
-            "gpu_check",
+            "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time",
+            "try_changes", "advise", "plan", "gpu_check",
         ],
     ),
 }  # fmt: skip
