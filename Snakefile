@@ -137,3 +137,4 @@ rule smoke:
 rule package:
     input:
         [dataset.package for dataset in CHOSEN],
+        documents_to_publish(),

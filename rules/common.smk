@@ -46,6 +46,7 @@ from lightfield.dataset.job_settings import (
     ValidationSettings,
 )
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
+from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore

@@ -77,8 +77,9 @@ def main() -> None:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 path.replace(target)
     print(
-        f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, FLIP "
-        f"{overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
+        f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, WS-PSNR {overall['ws_psnr']:.2f} dB, "
+        f"IV-PSNR {overall['iv_psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, "
+        f"FLIP {overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
     )
 
 

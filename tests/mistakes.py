@@ -35,6 +35,20 @@ RIGHT = {
     "exports": {"instant_ngp": {"sources": ["perspective"]}},
 }
 
+# What the author of a dataset says to publish it.
+PUBLISH = {
+    "creators": [{"name": "Ada Lovelace"}],
+    "licence": "CC-BY-4.0",
+    "url": "https://example.org/dataset",
+    "publisher": "Zenodo",
+    "date": "2026-11-30",
+    "limitations": "Few pixels.",
+    "biases": "One room.",
+    "personal_information": "None.",
+    "use_cases": "Tests.",
+    "social_impact": "None.",
+}
+
 # Instead of a value: removes the key. Its text is the same in all processes of the tests.
 REMOVE = ...
 
@@ -173,7 +187,10 @@ REFUSED = [
     ("rigs.LFCuboid.cameras", [0, 1, 1]),
     ("rigs.LFCuboid.camera.lens", LONG),
     *(("rigs", {name: SPHERE}) for name in NOT_A_NAME),
-    *(("rigs", {name: SPHERE}) for name in ("trials", "scene.blend", "inventory.json", "f00001")),
+    *(
+        ("rigs", {name: SPHERE})
+        for name in ("trials", "published", "scene.blend", "inventory.json", "f00001")
+    ),
     *(("reprojections", {name: PERSPECTIVE}) for name in NOT_A_NAME),
     *(
         ("reprojections", {name: PERSPECTIVE})
@@ -361,6 +378,13 @@ REFUSED = [
     *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),
     *(("report.panorama", value) for value in ("yes", 1)),
     *((key, value) for key in ("description", "licence", "credit") for value in (7, ["a"])),
+    *(("publish", PUBLISH | {"creators": value}) for value in ([], "Ada", [{"orcid": "1"}])),
+    *(("publish", PUBLISH | {"date": value}) for value in (2026, "soon", "2026-13-01")),
+    *(("publish", PUBLISH | {"url": value}) for value in ("example.org", 7)),
+    *(("publish", PUBLISH | {"licence": value}) for value in ("CC BY", "")),
+    *(("publish", PUBLISH | {"doi": value}) for value in ("https://doi.org/10.1/2", 10.1)),
+    *(("publish", PUBLISH | {key: ""}) for key in ("limitations", "biases", "use_cases")),
+    *(("publish", value) for value in (True, [])),
     *(("scene.parameters.detail", value) for value in (0, 1.1, "1")),
     *(("scene.parameters.seed", value) for value in (2**63, "7", 0.0)),
     *(("scene.frame", value) for value in (-1, 1048575, 1.0, "last", "file")),
@@ -381,6 +405,23 @@ EXPLAINED = [
         "scene",
         {"blend": "a.blend", "parameters": {"seed": 1}},
         "scene.parameters: goes with builder, not with blend",
+    ),
+    (
+        "publish",
+        {"creators": [{"name": "Ada Lovelace"}], "date": "2026-11-30"},
+        "publish: is missing url, publisher, limitations, biases, personal_information, use_cases, "
+        "social_impact, licence; description: is missing, and publish needs it",
+    ),
+    ("publish", PUBLISH, "description: is missing, and publish needs it"),
+    (
+        "publish",
+        PUBLISH | {"date": "soon"},
+        'publish.date: is "soon"; must be a date such as 2026-11-30',
+    ),
+    (
+        "publish",
+        PUBLISH | {"licence": "CC BY"},
+        'publish.licence: is "CC BY"; must be a short name from https://spdx.org/licenses',
     ),
     ("render.samples", "many", 'render.samples: is "many"; must be a whole'),
     ("render.samples", True, "render.samples: is true; must be a whole number"),

@@ -119,6 +119,7 @@ def test_energy_settings_and_full_size_are_checked(refused, tmp_path, content, p
 PAGE = ["--dataset", ".", "--name", "a/b", "--output", "made.html"]
 CAPTURE = {"scene": "a", "source": {"builder": "room"}, "render": {}, "rig": RIG}
 PACK = ["--folder", ".", "--output", "../made.tar"]
+PUBLISH = ["--folder", ".", "--output", "../made"]
 GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", "--output", "e"]
 
 
@@ -131,6 +132,7 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
         ("report_html.py", PAGE, {"rig": RIG, "yaml": ""}, "is missing the key command"),
         ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
         ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
+        ("publish.py", PUBLISH, {"scene": {"publish": {}}}, "scene.publish: is missing creators"),
         ("validate.py", ["."], {"records": {}}, "records: is {}; must be a list"),
         ("synthesis_quality.py", PAGE[1:2] + PAGE[-2:], {"views": 0}, "views: is 0; must be"),
         ("gpu_check.py", GPU, {"full": {"a": {"views": 1}}}, "full.a: is missing the key"),
@@ -151,6 +153,7 @@ def test_a_mistake_in_a_settings_file_is_named(
     [
         ("make_lightfield.py", PAGE[-2:], ["--rig", "LFSphere"]),
         ("package.py", PACK, ["--gigabytes", "1"]),
+        ("publish.py", PUBLISH, ["--gigabytes", "1"]),
         ("validate.py", ["."], ["--reprojection", "a"]),
         ("synthesis_quality.py", [".", "--output", "a"], ["--truth", "b"]),
     ],
@@ -198,6 +201,7 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
         ("reproject.py", "--depth-png", ["0", "-1e-05", "nan", "inf"]),
         ("export_instant_ngp.py", "--scale", ["0", "-1e-05", "nan", "inf"]),
         ("package.py", "--gigabytes", ["0", "-1e-05", "nan", "inf"]),
+        ("publish.py", "--gigabytes", ["0", "-1e-05", "nan", "inf"]),
     ],
 )
 def test_a_number_that_would_spoil_everything_is_refused(refused, program, flag, values):

@@ -47,7 +47,7 @@ def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     true = evaluation.truth(source, chosen_view, shown, BLACK)
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
     parts = evaluation.regions(source, chosen_view, counted, true.depth)
-    return dict(evaluation.errors(rendered, true, parts))
+    return dict(evaluation.errors(rendered, true, parts, source.lens))
 
 
 @pytest.mark.parametrize("name", LENSES)
@@ -74,6 +74,8 @@ def test_the_truth_has_no_error(dataset, tmp_path, name, run_program):
             "0.0",
         )
         assert row["depth"] == ("" if row["view"] == second.name else "0.0")
+        assert float(row["ws_psnr"]) == pytest.approx(100)
+        assert row["iv_psnr"] == ("100.0" if row["region"] == "all" else "")
     html = (tmp_path / "page" / "index.html").read_text()
     assert all(name in html for name in TESTS)
     assert html.count("data:image/webp") == 2
@@ -182,7 +184,7 @@ def compared(source, path, background):
     shown = evaluation.rendered(path, source, background)
     true = evaluation.truth(source, view, path, background)
     parts = {"all": np.ones((48, 64), bool)}
-    ((_, errors),) = evaluation.errors(shown, true, parts)
+    ((_, errors),) = evaluation.errors(shown, true, parts, source.lens)
     return errors, evaluation.background_problem(shown, true, parts["all"], background)
 
 

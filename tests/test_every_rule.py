@@ -72,7 +72,21 @@ exports:
   instant_ngp: {{sources: [views]}}
   nerfstudio: {{sources: [views], depth: true}}
 """
-IMPORTED = "scene: {dataset: published}\n"
+IMPORTED = """
+description: Views of others
+publish:
+  creators: [{name: Ada Lovelace}]
+  licence: CC-BY-4.0
+  url: https://example.org/dataset
+  publisher: Zenodo
+  date: 2026-11-30
+  limitations: Few pixels.
+  biases: One room.
+  personal_information: None.
+  use_cases: Tests.
+  social_impact: None.
+scene: {dataset: published}
+"""
 TARGETS = [
     *("all", "package", "plan", "advise", "error_vs_time", "reprojection_benchmark", "stability"),
     *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
@@ -284,13 +298,13 @@ ROUNDS = {
             {"build_scene"} | CAMERAS,
         ),
         "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
-        "imported": ("scene:", "licence: CC0-1.0\nscene:", {"pack"}),
+        "imported": ("Few pixels.", "Few views.", {"imported pack", "imported publish"}),
         "config.yaml": ("price_per_kwh: 0.32", "price_per_kwh: 0.4", {"costs"}),
     },
     "samples, and what may be missing": {
         "built": ("samples: 4", "samples: 5", CAMERAS),
         "brought": ("allow_missing: true", "allow_missing: false", {"inventory"}),
-        "config.yaml": ("device:", "package_gigabytes: 1\ndevice:", {"pack"}),
+        "config.yaml": ("device:", "package_gigabytes: 1\ndevice:", {"pack", "publish"}),
     },
     "the lens, and the view layers": {
         # A panorama has a lens of its own.

@@ -270,3 +270,41 @@ def test_iv_psnr_forgives_exactly_two_pixels_and_a_hundredth():
     luma = -10 * np.log10(0.02**2)
     expected = (4 * luma + 2 * 100) / 6
     assert metrics.iv_psnr(grey, grey + 0.03, counted) == pytest.approx(expected, abs=0.01)
+
+
+def patterns(width, height):
+    """Return a pattern, and the same shifted, brighter, and with an error that grows downward."""
+    row, column = np.mgrid[:height, :width, :1][:2].astype(float)
+    channel = np.arange(3)
+    truth = 0.5 + 0.3 * np.sin(column / 5 + channel) * np.cos(row / 7 + 2 * channel)
+    grain = np.sin(12.9898 * column + 78.233 * row + 37.719 * channel)
+    shown = np.roll(truth, (1, 1), (0, 1)) + 0.006 + 0.05 * grain * row / height
+    return truth, shown
+
+
+# Printed by QMIV 3.0 for these pictures at 10 bits: WS-PSNR of Y, Cb and Cr, and IV-PSNR.
+QMIV = {
+    "rectilinear": ((30.514, 29.882, 27.432), 35.699),
+    # Without its factor π / 2 (see `metrics.iv_psnr`).
+    "equirectangular": ((31.671, 30.994, 29.701), 42.387 - 10 * np.log10(np.pi / 2)),
+}
+
+
+@pytest.mark.parametrize("name", QMIV)
+def test_ws_psnr_and_iv_psnr_are_those_of_qmiv(name):
+    width, height = (96, 64) if name == "rectilinear" else (96, 48)
+    truth, shown = patterns(width, height)
+    weights = np.ones((height, width))
+    if name == "equirectangular":
+        lens = lenses.from_camera({"lens": name, "resolution": [width, height]})
+        weights = metrics.solid_angles(lens)
+    ws_psnr, iv_psnr = QMIV[name]
+    for component, expected in enumerate(ws_psnr):
+        true_component, shown_component = (
+            (picture @ metrics.TO_YCBCR.T)[..., component : component + 1]
+            for picture in (truth, shown)
+        )
+        measured = metrics.ws_psnr(true_component, shown_component, weights)
+        assert measured == pytest.approx(expected, abs=0.01)
+    counted = np.ones((height, width), bool)
+    assert metrics.iv_psnr(truth, shown, counted, weights) == pytest.approx(iv_psnr, abs=0.02)

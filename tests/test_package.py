@@ -113,7 +113,7 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
     assert instant_ngp_files == {"perspective/transforms.json"}
     assert transforms(folder) == [folder / path for path in instant_ngp_files]
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
-    assert "licence of the scene | not stated" in readme
+    assert "licence of the scene | CC-BY-4.0" in readme
     credited = load_scene("lone_monk_original")
     again = package.card(folder, NAME, credited)
     assert again["cite"][1] == credited.credit == "Lone Monk, by Carlo Bergonzini (Monorender)"

@@ -1,5 +1,17 @@
 # Functions for the rules of package.smk.
 
+# The folder of the scene's datasets as they are published.
+PUBLISHED = f"{RESULTS}/{{scene}}/{PUBLISHED_FOLDER}"
+
+
+def documents_to_publish():
+    """Return the descriptions of the chosen datasets whose scene YAML says how to publish them."""
+    files = []
+    for dataset in CHOSEN:
+        if load_scene(dataset.scene_name).publish:
+            files += dataset.published_documents
+    return files
+
 
 def packed(wildcards):
     """Return the datasets in an archive: that of a rig, or those of all its frames."""

@@ -2,7 +2,7 @@
 
 The consumers are pycolmap, nerfstudio, NCore and OpenCV. `make consumers` runs this in an
 environment of its own, after export.py. Prints the largest error of each export. An error beyond
-its limit ends in an AssertionError.
+its limit ends in an AssertionError. published.py reads what is published.
 """
 
 import json
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import published
 
 ROOT = Path(__file__).resolve().parents[2]
 RADIUS = 3.0  # The radius of the scene, a sphere around the origin.
@@ -225,6 +226,7 @@ def radiance_field(folder):
 
 def main():
     folder = Path(sys.argv[1])
+    published.check(folder / "publish" / "sphere")
     for check in (colmap, nerfstudio, ncore):
         for path in sorted((folder / check.__name__).iterdir()):
             check(folder, path.name)

@@ -15,17 +15,54 @@ sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 from sphere import LENSES, enlarged, write_views  # noqa: E402
 
 from lightfield import export  # noqa: E402
+from lightfield.core.files import sha256  # noqa: E402
+from lightfield.dataset.config import Credits  # noqa: E402
 from lightfield.dataset.exports import settings_of  # noqa: E402
+from lightfield.dataset.lightfield import LightField  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
+from lightfield.report.publish import publish  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 # Enough views for a radiance field to learn from.
 LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
+PUBLISHED = {
+    "description": "The inside of a sphere",
+    "licence": "CC-BY-4.0",
+    "publish": {
+        "creators": [
+            {"name": "Ada Lovelace", "orcid": "0000-0002-1825-0097", "affiliation": "London"},
+            {"name": "A Laboratory", "type": "organization"},
+        ],
+        "url": "https://example.org/sphere",
+        "publisher": "Zenodo",
+        "date": "2026-11-30",
+        "limitations": "Few pixels.",
+        "biases": "One sphere.",
+        "personal_information": "None.",
+        "use_cases": "Tests of programs.",
+        "social_impact": "None is known.",
+        "derived_from": ["https://example.org/textures"],
+    },
+}
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
     "ncore": ("perspective", "shifted", "fisheye", "wide"),
 }
+
+
+def publish_views(folder: Path) -> None:
+    """Publish views with a split and a reprojection."""
+    rig = RIG | {"split": {"every": 3}}
+    dataset = folder / "dataset"
+    write_views(dataset, LENSES["fisheye"], rig)
+    write_views(dataset / "perspective", LENSES["perspective"], rig, suffix=".png")
+    path = dataset / "lightfield.json"
+    LightField.read(path).changed(scene={"name": "sphere"}, render={"samples": 4}).write(path)
+    files = sorted(path for path in dataset.rglob("*") if path.is_file())
+    lines = [f"{sha256(path)}  {path.relative_to(dataset)}\n" for path in files]
+    (dataset / "sha256sums.txt").write_text("".join(lines))
+    publish(dataset, "sphere", Credits.model_validate(PUBLISHED), folder / "sphere", None)
 
 
 def main() -> None:
@@ -50,6 +87,7 @@ def main() -> None:
             settings = settings_of(kind).model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
+    publish_views(folder / "publish")
     write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
     settings = settings_of("nerfstudio").model_validate({"sources": ["views"], "depth": True})

@@ -102,6 +102,9 @@ def pattern(expression: str, meaning: str) -> str:
     return expression
 
 
+Address = Annotated[
+    str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
+]
 # The name of a folder.
 Name = Annotated[
     str,

@@ -26,6 +26,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.settings import (
     AS_WRITTEN,
+    Address,
     Name,
     Settings,
     checked,
@@ -36,6 +37,7 @@ from lightfield.dataset import published
 from lightfield.dataset.exports import Export, Exports
 from lightfield.dataset.names import VIEWS, builders
 from lightfield.dataset.passes import FLOW, PASSES, in_order
+from lightfield.dataset.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.dataset.reprojections import (
     ReprojectionOptions,
     ReprojectionSettings,
@@ -73,7 +75,7 @@ RESERVED = {
 # Names that a scene's folder cannot have, because other folders beside it have them.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 # The same for a rig's folder.
-RIG_NEIGHBOURS = {"trials"}
+RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
 # The same for a reprojection's folder.
 REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", FLOW.name, *PASSES}
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
@@ -123,9 +125,6 @@ PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]], AfterValidator(in_order)
 ]
 Auto = Literal["auto"]
-Address = Annotated[
-    str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
-]
 # The rules write this path into commands with {wildcards}.
 Folder = Annotated[
     str,
@@ -555,11 +554,44 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
 
 
 class Credits(Settings):
-    """What a package's card says of the scene."""
+    """What a package's card says of the scene, and what publishing needs beside that."""
 
     description: str | None = Field(None, description="One line about the scene.")
-    licence: str | None = Field(None, description="Of the scene, for a package's card.")
+    licence: str | None = Field(
+        None,
+        description="Of the scene, for a package's card. It is also the data's licence, unless "
+        "publish has another.",
+    )
     credit: str | None = Field(None, description="How the scene's artist is to be cited.")
+    publish: Publication | None = Field(
+        None,
+        description="Also write what a repository of datasets needs. Without it, a package is an "
+        "archive alone.",
+    )
+
+    @property
+    def data_licence(self) -> str | None:
+        """The short name of the data's licence: its own, or else that of the scene."""
+        if self.publish and self.publish.licence:
+            return self.publish.licence
+        is_short_name = self.licence and re.fullmatch(SPDX, self.licence)
+        return self.licence if is_short_name else None
+
+    @model_validator(mode="after")
+    def _can_be_published(self) -> Self:
+        if self.publish is None:
+            return self
+        missing = self.publish.missing_keys
+        if self.data_licence is None:
+            missing.append("licence")
+        problems = []
+        if missing:
+            problems.append(f"publish: is missing {', '.join(missing)}")
+        if not self.description:
+            problems.append("description: is missing, and publish needs it")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
 
 
 class Scene(Credits):

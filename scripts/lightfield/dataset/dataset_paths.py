@@ -7,6 +7,7 @@ from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.names import VIEWS
+from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
@@ -165,6 +166,13 @@ class DatasetPaths(Description):
     def package(self) -> str:
         """The archive of a rig's dataset with all frames of a sequence, named as SILVR's are."""
         return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
+
+    @property
+    def published_documents(self) -> list[str]:
+        """The files that describe the rig's dataset where it is published, beside its shards."""
+        name = f"{self.scene_folder}_{self.rig_name}"
+        folder = f"{self.results_root}/{self.scene_folder}/{PUBLISHED_FOLDER}/{name}"
+        return [f"{folder}/{document}" for document in DOCUMENTS]
 
     # The rig. A file may hold its places.
 

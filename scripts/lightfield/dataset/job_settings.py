@@ -96,7 +96,7 @@ class ValidationSettings(Settings):
 
 
 class PackSettings(Settings):
-    """The settings of scripts/package.py."""
+    """The settings of scripts/package.py and scripts/publish.py."""
 
     datasets: list[str] = Field(
         [], description="The datasets in the folder. With others the folder is packed again."
@@ -104,10 +104,13 @@ class PackSettings(Settings):
     gigabytes: float | None = Field(
         None,
         gt=0,
-        description="The largest size of a part. Without it, there is one part.",
+        description="The largest size of a part, or of a shard. Without it, a package "
+        "has one part, and a shard has 1 GB.",
         json_schema_extra={"unit": "GB"},
     )
-    scene: Credits = Field(Credits(), description="What the package's card says of the scene.")
+    scene: Credits = Field(
+        Credits(), description="What the card says of the scene, and what publishing needs."
+    )
 
 
 class SynthesisSettings(Settings):

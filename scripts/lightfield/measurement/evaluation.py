@@ -22,6 +22,8 @@ from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, SourceDataset, check_size
 from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
 from lightfield.measurement import metrics
@@ -231,18 +233,22 @@ def regions(
 
 
 def errors(
-    shown: Pictures, true: Pictures, parts: Mapping[str, Bools]
+    shown: Pictures, true: Pictures, parts: Mapping[str, Bools], lens: Lens
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the errors of each region: means over its pixels, None without depth or normals.
 
-    They are psnr in decibel (inf if equal), ssim (1 if equal), flip (0 if equal), depth as in
-    `metrics.depth_error`, and normal as the mean angle in degrees. Outside the region "all" both
-    pictures count as black.
+    They are psnr in decibel (inf if equal), ws_psnr and iv_psnr (100 if equal), ssim (1 if equal),
+    flip (0 if equal), depth as in `metrics.depth_error`, and normal as the mean angle in degrees.
+    Only the region "all" has iv_psnr, because a match may lie in another region. Outside the region
+    "all" both pictures count as black.
     """
     compared = parts["all"][..., np.newaxis]
     true_colour = np.where(compared, true.colour, 0)
     shown_colour = np.where(compared, shown.colour, 0)
     squares = ((true_colour - shown_colour) ** 2).mean(axis=-1)
+    # A pixel that is cut by the lens's border has no solid angle, but its centre has a ray.
+    angles = np.maximum(metrics.solid_angles(lens), 1e-12)
+    weights = angles if isinstance(lens, Equirectangular) else None
     similarity = metrics.ssim_map(true_colour, shown_colour)
     flip = metrics.flip_map(true_colour, shown_colour)
     for name, region in parts.items():
@@ -252,6 +258,10 @@ def errors(
             {
                 "pixels": int(region.sum()),
                 "psnr": -10 * math.log10(mean_square) if mean_square else math.inf,
+                "ws_psnr": metrics.ws_psnr(true_colour, shown_colour, np.where(region, angles, 0)),
+                "iv_psnr": metrics.iv_psnr(true_colour, shown_colour, region, weights)
+                if name == "all"
+                else None,
                 "ssim": float(similarity[region].mean()),
                 "flip": float(flip[region].mean()),
                 "depth": None

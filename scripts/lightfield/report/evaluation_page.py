@@ -93,7 +93,7 @@ def _compare(
         raise UserError(f"{path}: has colour that is not a number where it is compared")
     rows = [
         {"view": view.name, "region": region, **errors}
-        for region, errors in evaluation.errors(shown, true, regions)
+        for region, errors in evaluation.errors(shown, true, regions, source.lens)
     ]
     pictures = [np.nan_to_num(image.colour) for image in (true, shown)]
     flip = metrics.flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)

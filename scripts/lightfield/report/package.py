@@ -117,16 +117,16 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
         if re.fullmatch(r"\.\d+", old.name[len(target.stem) : -len(".tar")]):
             old.unlink()
     written = []
-    card_size = sum(_size(len(text.encode())) for text in texts.values())
+    card_size = sum(tar_size(len(text.encode())) for text in texts.values())
     for number, part in enumerate(_parts(paths, most, card_size), 1):
         name = target if number == 1 else target.with_name(f"{target.stem}.{number}.tar")
         progress = Progress(len(part), name.name, "files")
         with atomic_path(name) as temporary, tarfile.open(temporary, "w") as archive:
             for file, text in texts.items() if number == 1 else ():
-                _add(archive, f"{content['name']}/{file}", text.encode())
+                add_entry(archive, f"{content['name']}/{file}", text.encode())
             for path in part:
                 inside = f"{content['name']}/{path.relative_to(folder).as_posix()}"
-                _add(archive, inside, path)
+                add_entry(archive, inside, path)
                 progress.done()
         written.append(name)
     return written
@@ -145,7 +145,7 @@ def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[li
     part: list[Path] = []
     size = tarfile.RECORDSIZE + first
     for path in paths:
-        needed = _size(path.stat().st_size)
+        needed = tar_size(path.stat().st_size)
         if part and most is not None and size + needed > most:
             yield part
             part = []
@@ -155,12 +155,12 @@ def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[li
     yield part
 
 
-def _size(content: int) -> int:
+def tar_size(content: int) -> int:
     """Return the most bytes that a file takes in a tar: its header, and its content in blocks."""
     return content + 2 * tarfile.BLOCKSIZE
 
 
-def _add(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
+def add_entry(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
     """Add a file without any trace of this machine, user or time."""
     entry = tarfile.TarInfo(name)
     if isinstance(content, bytes):

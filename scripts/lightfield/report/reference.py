@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel, TypeAdapter
 
 from lightfield.core.settings import MEANINGS
-from lightfield.dataset import config, exports, job_settings, reprojections
+from lightfield.dataset import config, exports, job_settings, publication, reprojections
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.json_schema import Generator
 from lightfield.geometry import rigs
@@ -94,6 +94,8 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene: parameters", config.Parameters),
             Section("flow", config.Flow),
             Section("report", config.Report),
+            Section("publish", publication.Publication),
+            Section("publish: a creator", publication.Creator),
         ],
     ),
     "render-keys.md": Page(
@@ -164,8 +166,8 @@ KEY_PAGES: dict[str, Page] = {
             Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
-            Section("package.py", job_settings.PackSettings),
-            Section("package.py: scene", config.Credits),
+            Section("package.py and publish.py", job_settings.PackSettings),
+            Section("package.py and publish.py: scene", config.Credits),
             Section("report_figures.py", job_settings.FiguresSettings),
             Section("report_html.py", job_settings.PageSettings),
             Section("report_html.py: measurements", job_settings.Measurement),
@@ -205,7 +207,7 @@ PROGRAM_PAGES = {
     "programs-publish.md": (
         "Programs that publish and fetch",
         "These programs pack finished datasets, or bring them here.",
-        ["publish_checksums", "package", "take_dataset", "take_views"],
+        ["publish_checksums", "package", "publish", "take_dataset", "take_views"],
     ),
     "programs-check.md": (
         "Programs that check",
@@ -224,8 +226,8 @@ PROGRAM_PAGES = {
         "Programs that measure",
         "These programs measure error, quality, and time.",
         [
-            "evaluate", "synthesis_quality", "error_vs_time", "try_changes", "advise", "plan",
-            "gpu_check",
+            "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time",
+            "try_changes", "advise", "plan", "gpu_check",
         ],
     ),
 }  # fmt: skip

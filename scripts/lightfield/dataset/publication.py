@@ -1,0 +1,124 @@
+"""What only the author of a dataset knows, and publishing needs: the key `publish` of a scene YAML.
+
+Croissant, RO-Crate, DataCite and Hugging Face ask for these facts. The responsible-AI texts are
+those that NeurIPS asks for since 2026.
+"""
+
+import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from lightfield.core.settings import Address, Settings, pattern
+
+
+def _as_text(value: Any) -> Any:
+    """Return a date as a text, because YAML reads 2026-11-30 as a date."""
+    return value.isoformat() if type(value) is datetime.date else value
+
+
+Date = Annotated[
+    str,
+    BeforeValidator(_as_text),
+    Field(
+        pattern=pattern(
+            r"^[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])$", "a date such as 2026-11-30"
+        )
+    ),
+]
+# The folder beside those of the rigs that has a folder for each published dataset.
+PUBLISHED_FOLDER = "published"
+CARD = "README.md"
+CROISSANT = "croissant.json"
+DATACITE = "datacite.json"
+RO_CRATE = "ro-crate-metadata.json"
+# The files that describe a published dataset.
+DOCUMENTS = (CARD, CROISSANT, DATACITE, RO_CRATE)
+
+# The form of a licence's short name at https://spdx.org/licenses.
+SPDX = r"^[A-Za-z0-9][A-Za-z0-9.+-]*$"
+Licence = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            SPDX, "a short name from https://spdx.org/licenses, such as CC-BY-4.0 or CC0-1.0"
+        )
+    ),
+]
+Text = Annotated[
+    str, Field(min_length=1, pattern=pattern(r"\S", "a text with more than white space"))
+]
+
+
+class Creator(Settings):
+    """A person or an organization that made a dataset."""
+
+    name: Text = Field(description="The whole name.")
+    type: Literal["person", "organization"] = Field("person", description="What the creator is.")
+    orcid: str | None = Field(
+        None,
+        pattern=pattern(
+            r"^[0-9]{4}-[0-9]{4}-[0-9]{4}-[0-9]{3}[0-9X]$", "digits such as 0000-0002-1825-0097"
+        ),
+        description="ORCID of a person.",
+    )
+    affiliation: str | None = Field(None, description="Where a person works.")
+
+
+# The licence may be that of the scene.
+REQUIRED = (
+    *("creators", "url", "publisher", "date", "limitations", "biases", "personal_information"),
+    *("use_cases", "social_impact"),
+)
+
+
+class Publication(Settings):
+    """What only the author knows of a dataset. All of `REQUIRED` must have a value."""
+
+    creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
+        None, description="Who made the dataset."
+    )
+    licence: Licence | None = Field(
+        None,
+        description="Licence of the data, by its short name at https://spdx.org/licenses. Without "
+        "it, the licence of the scene.",
+    )
+    url: Address | None = Field(None, description="The page on which the dataset will be found.")
+    publisher: Text | None = Field(
+        None, description="Who keeps the dataset: Zenodo, Hugging Face, a university."
+    )
+    date: Date | None = Field(None, description="The day of publication, as 2026-11-30.")
+    limitations: Text | None = Field(None, description="What the dataset cannot show.")
+    biases: Text | None = Field(None, description="What it shows too often, or too seldom.")
+    personal_information: Text | None = Field(
+        None, description="Which information about persons it has. None, for most scenes."
+    )
+    use_cases: Text | None = Field(None, description="What it was made for, and what not.")
+    social_impact: Text | None = Field(None, description="Its use and its risks for society.")
+    title: Text | None = Field(
+        None, description="Title. Without it, the archive's name: <scene>_<rig>."
+    )
+    doi: str | None = Field(
+        None,
+        pattern=pattern(r"^10\.[0-9]{4,9}/\S+$", "a DOI such as 10.5281/zenodo.1234"),
+        description="DOI, if one is reserved.",
+    )
+    version: str = Field(
+        "1.0.0",
+        pattern=pattern(r"^[0-9]+\.[0-9]+\.[0-9]+$", "three numbers such as 1.0.0"),
+        description="Version of the dataset.",
+    )
+    synthetic: bool = Field(True, description="Whether the views are rendered, not photographed.")
+    keywords: list[Text] = Field(
+        ["light field", "novel view synthesis", "synthetic images"],
+        min_length=1,
+        description="Words to find it by.",
+    )
+    derived_from: list[Address] = Field(
+        [], description="Addresses of what the scene was made from: models, textures, scans."
+    )
+
+    @property
+    def missing_keys(self) -> list[str]:
+        """The keys that publishing requires and that have no value."""
+        return [name for name in REQUIRED if getattr(self, name) is None]

@@ -1,0 +1,52 @@
+"""Writes what a dataset is published with: WebDataset shards, and descriptions for repositories.
+
+Equal datasets and settings give equal bytes, because the date is the author's.
+"""
+
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json, write_text
+from lightfield.dataset.config import Credits
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
+from lightfield.report import croissant, datacite, hugging_face, package, ro_crate, shards
+from lightfield.report.published import Published
+from lightfield.validation.files import SUMS
+
+
+def publish(folder: Path, name: str, scene: Credits, output: Path, most: float | None) -> Published:
+    """Write the shards and the descriptions of the dataset in ``folder`` to ``output``.
+
+    A shard has at most ``most`` bytes, or `shards.SHARD_BYTES`. Raises `UserError` if the dataset
+    is not finished, or if the scene YAML does not say how to publish it.
+    """
+    if scene.publish is None:
+        raise UserError(
+            "publish: is missing in the scene YAML: see docs/how-to/publish-a-dataset.md"
+        )
+    card = package.card(folder, name, scene)
+    folders = sorted({path.parent for path in folder.glob(f"**/{SUMS}")})
+    if not folders:
+        raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
+    datasets = [shards.read_dataset(folder, dataset) for dataset in folders]
+    output.mkdir(parents=True, exist_ok=True)
+    written = shards.write_shards(output, name, datasets, most or shards.SHARD_BYTES)
+    rest = shards.write_others(output, name, datasets)
+    names = {field for dataset in datasets for sample in dataset.samples for field in sample.files}
+    published = Published(
+        name,
+        scene,
+        card,
+        LightField.read(folders[0] / NAME),
+        {split: package.listed(paths) for split, paths in written.items()},
+        package.listed([output / shards.INDEX, rest]),
+        ("json", *sorted(names)),
+        sum(len(dataset.samples) for dataset in datasets),
+    )
+    write_text(output / CARD, hugging_face.describe(published))
+    write_json(output / DATACITE, datacite.describe(published))
+    write_json(output / CROISSANT, croissant.describe(published))
+    documents = package.listed([output / name for name in (CARD, CROISSANT, DATACITE)])
+    write_json(output / RO_CRATE, ro_crate.describe(published, documents))
+    return published

@@ -1,0 +1,54 @@
+"""Write a finished dataset as it is published: WebDataset shards, and descriptions of them.
+
+The descriptions are a card for Hugging Face, Croissant, RO-Crate and DataCite. The scene YAML's key
+`publish` says what only the author knows. The same files give the same bytes.
+
+A settings file is JSON with the same keys as that of package.py.
+"""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import above_zero, check_settings, run
+from lightfield.core.errors import UserError
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
+    parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
+    parser.add_argument("--output", type=Path, required=True, help="folder to write")
+    add_settings_flags(parser)
+    arguments = parser.parse_args()
+    if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
+        raise UserError(f"--output {arguments.output}: must not be in what it publishes")
+    check_settings(arguments, add_settings_flags, "scene")
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.config import load_scene
+    from lightfield.dataset.job_settings import PackSettings
+    from lightfield.report.publish import publish
+
+    if arguments.settings:
+        settings = read_settings(PackSettings, arguments.settings)
+    else:
+        settings = PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
+    most = settings.gigabytes and settings.gigabytes * 1e9
+    name = arguments.output.resolve().name
+    published = publish(arguments.folder, name, settings.scene, arguments.output, most)
+    files = published.files
+    print(f"{arguments.output}: {len(files)} files, {sum(f['bytes'] for f in files) / 1e9:.3g} GB")
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--scene", help="name of a file in configs/scenes/ with the key publish")
+    flags.add_argument("--gigabytes", type=above_zero, help="size of a shard, at most (default: 1)")
+
+
+if __name__ == "__main__":
+    run(main)

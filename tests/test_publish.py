@@ -1,0 +1,262 @@
+"""Published datasets: shards with a view's pictures together, and descriptions of them."""
+
+import json
+import os
+import shutil
+import tarfile
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from sphere import LENSES, write_views
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, sha256, write_json
+from lightfield.dataset.config import Credits
+from lightfield.dataset.lightfield import LightField
+from lightfield.imaging import images
+from lightfield.report.publish import publish
+
+NAME = "smoke_LFPlane"
+RIG = {"type": "plane", "cameras": [3, 2], "size": 0.4, "split": {"every": 3}}
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+PUBLISH = {
+    "creators": [
+        {"name": "Ada Lovelace", "orcid": "0000-0002-1825-0097"},
+        {"name": "A Laboratory", "type": "organization"},
+    ],
+    "url": "https://example.org/dataset",
+    "publisher": "Zenodo",
+    "date": "2026-11-30",
+    "limitations": "Few pixels.",
+    "biases": "One room.",
+    "personal_information": "None: no person is in it.",
+    "use_cases": "Tests of programs.",
+    "social_impact": "None is known.",
+    "derived_from": ["https://example.org/textures"],
+}
+SCENE = {"description": "A sphere from within", "licence": "CC-BY-4.0", "publish": PUBLISH}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A finished dataset with a split, a pass, a reprojection with that pass, and an export."""
+    dataset = tmp_path_factory.mktemp("publish") / "LFPlane" / "dataset"
+    write_views(dataset, CAMERA, RIG)
+    write_views(dataset / "perspective", LENSES["perspective"], RIG, suffix=".png")
+    path = dataset / "lightfield.json"
+    lightfield = LightField.read(path)
+    content = {
+        "scene": {"name": "smoke", "builder": "room", "parameters": {"seed": 7}},
+        "render": {"samples": 4, "passes": ["normal"]},
+    }
+    lightfield.changed(**content).write(path)
+    reprojected = dataset / "perspective/lightfield.json"
+    LightField.read(reprojected).changed(**content, passes=["normal"]).write(reprojected)
+    normals = {name: np.zeros((16, 16), np.float32) for name in "RGB"}
+    for view in lightfield.views:
+        for place in ("normal", "perspective/normal"):
+            images.write_exr(dataset / place / f"{view.name}.exr", normals, {})
+    write_json(dataset / "perspective/exports/colmap/export.json", {"format": "colmap"})
+    write_json(dataset / "report/costs.json", {"not": "published"})
+    write_json(dataset / "validation.json", {"valid": True})
+    files = [path for path in dataset.rglob("*") if path.is_file() and "report" not in path.parts]
+    lines = [f"{sha256(path)}  {path.relative_to(dataset)}\n" for path in sorted(files)]
+    (dataset / "sha256sums.txt").write_text("".join(lines))
+    return dataset
+
+
+def published(folder, output, most=None, **changes):
+    publish(folder, NAME, Credits.model_validate(SCENE | changes), output, most)
+    return output
+
+
+@pytest.fixture(scope="module")
+def output(folder, tmp_path_factory):
+    return published(folder, tmp_path_factory.mktemp("published") / NAME)
+
+
+def members(tar):
+    with tarfile.open(tar) as archive:
+        return {entry.name: archive.extractfile(entry).read() for entry in archive}
+
+
+def test_a_view_is_a_sample_with_its_passes_and_reprojections_together(folder, output):
+    names = [name for tar in sorted(output.glob(f"{NAME}-*.tar")) for name in members(tar)]
+    # WebDataset ends a sample where the text before the first dot changes.
+    samples = [(key, [*group]) for key, group in groupby(names, lambda name: name.split(".")[0])]
+    views = [view.name for view in LightField.read(folder / "lightfield.json").views]
+    assert sorted(key for key, _ in samples) == sorted(views)
+    pictures = ["normal.exr", "perspective+normal.exr", "perspective.png", "views.exr"]
+    for key, group in samples:
+        assert group == [f"{key}.json", *(f"{key}.{name}" for name in pictures)]
+
+
+def test_each_part_of_the_split_has_shards_of_its_own(folder, output):
+    lightfield = LightField.read(folder / "lightfield.json")
+    for split in ("train", "test"):
+        keys = {name.split(".")[0] for name in members(output / f"{NAME}-{split}-00000.tar")}
+        assert keys == {view.name for view in lightfield.views if view.split == split}
+
+
+def test_a_sample_says_the_pose_and_the_bytes_of_each_picture(folder, output):
+    content = members(output / f"{NAME}-train-00000.tar")
+    view = next(name for name in content if name.endswith(".json")).removesuffix(".json")
+    sample = json.loads(content[f"{view}.json"])
+    (true,) = (v for v in LightField.read(folder / "lightfield.json").views if v.name == view)
+    for name, picture in sample["pictures"].items():
+        assert content[f"{view}.{name}"] == (folder / picture["path"]).read_bytes()
+        assert picture["sha256"] == sha256(folder / picture["path"])
+        assert picture["world_matrix"] == true.matrix.tolist()
+    assert sample["pictures"]["perspective.png"]["resolution"] == [64, 48]
+    assert sample["pictures"]["views.exr"]["resolution"] == [16, 16]
+
+
+def test_what_belongs_to_no_view_is_in_a_tar_of_its_own(folder, output):
+    names = {name.removeprefix(f"{NAME}/") for name in members(output / "other_files.tar")}
+    assert {"lightfield.json", "sha256sums.txt", "perspective/exports/colmap/export.json"} <= names
+    assert not any(name.startswith(("exr", "normal", "report")) for name in names)
+    in_shards = {
+        picture["path"]
+        for tar in output.glob(f"{NAME}-*.tar")
+        for name, content in members(tar).items()
+        if name.endswith(".json")
+        for picture in json.loads(content)["pictures"].values()
+    }
+    listed = {line.split("  ")[1] for line in (folder / "sha256sums.txt").read_text().splitlines()}
+    assert names | in_shards == listed | {"sha256sums.txt"}
+
+
+def test_the_same_files_are_published_with_the_same_bytes(folder, output, tmp_path):
+    for path in folder.rglob("*"):
+        os.utime(path, (1, 1))
+        path.chmod(0o777)
+    again = published(folder, tmp_path / "again")
+    written = {path.name: path.read_bytes() for path in output.iterdir()}
+    assert written == {path.name: path.read_bytes() for path in again.iterdir()}
+
+
+def test_a_shard_has_at_most_the_size_that_is_asked_for(folder, tmp_path):
+    output = published(folder, tmp_path / NAME)
+    stale = output / f"{NAME}-train-00009.tar"
+    stale.write_text("of an earlier publication")
+    published(folder, output, most=30_000)
+    shards = sorted(output.glob(f"{NAME}-train-*.tar"))
+    assert len(shards) > 1
+    assert stale not in shards
+    for path in shards:
+        keys = {name.split(".")[0] for name in members(path)}
+        assert path.stat().st_size <= 30_000 or len(keys) == 1
+
+
+def test_croissant_lists_the_files_and_what_only_the_author_knows(output):
+    content = read_json(output / "croissant.json")
+    files = [entry for entry in content["distribution"] if entry["@type"] == "cr:FileObject"]
+    listed = {entry["contentUrl"]: entry["sha256"] for entry in files}
+    assert listed == {
+        path.name: sha256(path) for path in output.iterdir() if path.suffix in (".tar", ".csv")
+    }
+    assert "http://mlcommons.org/croissant/1.1" in content["conformsTo"]
+    assert content["rai:dataLimitations"] == "Few pixels."
+    assert content["rai:personalSensitiveInformation"] == "None: no person is in it."
+    assert content["rai:hasSyntheticData"] is True
+    sources = [source["prov:label"] for source in content["prov:wasDerivedFrom"]]
+    assert sources == ["the scene room", "https://example.org/textures"]
+    assert content["license"].endswith("/CC-BY-4.0.html")
+    assert content["datePublished"] == "2026-11-30"
+
+
+def test_the_ro_crate_says_how_its_files_were_made(output):
+    graph = read_json(output / "ro-crate-metadata.json")["@graph"]
+    entities = {entity["@id"]: entity for entity in graph}
+    assert len(entities) == len(graph)
+    parts = {part["@id"] for part in entities["./"]["hasPart"]}
+    assert parts == {path.name for path in output.iterdir()} - {"ro-crate-metadata.json"}
+    for name in parts:
+        assert entities[name]["sha256"] == sha256(output / name)
+        assert entities[name]["contentSize"] == str((output / name).stat().st_size)
+    (action,) = (entity for entity in graph if entity["@type"] == "CreateAction")
+    settings = {
+        entities[part["@id"]]["name"]: entities[part["@id"]].get("value")
+        for part in action["object"]
+    }
+    assert settings["scene.parameters.seed"] == 7
+    assert settings["render.samples"] == 4
+    assert {part["@id"] for part in action["result"]} == parts
+
+
+def test_datacite_has_all_that_a_doi_needs(folder, tmp_path):
+    reserved = {"publish": PUBLISH | {"doi": "10.5281/zenodo.1234", "title": "A Room"}}
+    content = read_json(published(folder, tmp_path / NAME, **reserved) / "datacite.json")
+    assert content["doi"] == "10.5281/zenodo.1234"
+    assert [creator["nameType"] for creator in content["creators"]] == [
+        "Personal",
+        "Organizational",
+    ]
+    assert content["titles"] == [{"title": "A Room"}]
+    assert content["publisher"] == {"name": "Zenodo"}
+    assert content["publicationYear"] == "2026"
+    assert content["types"]["resourceTypeGeneral"] == "Dataset"
+
+
+@pytest.mark.parametrize(
+    ("licence", "shown"),
+    [
+        ("CC-BY-4.0", {"license": "cc-by-4.0"}),
+        (
+            "Etalab-2.0",
+            {
+                "license": "other",
+                "license_name": "etalab-2.0",
+                "license_link": "https://spdx.org/licenses/Etalab-2.0.html",
+            },
+        ),
+    ],
+)
+def test_the_card_has_the_front_matter_of_hugging_face(folder, tmp_path, licence, shown):
+    output = published(folder, tmp_path / NAME, licence=licence)
+    _, front_matter, text = (output / "README.md").read_text().split("---\n", 2)
+    content = yaml.safe_load(front_matter)
+    assert shown.items() <= content.items()
+    assert content["size_categories"] == ["n<1K"]
+    (config,) = content["configs"]
+    for data_files in config["data_files"]:
+        assert [*output.glob(data_files["path"])]
+    assert "Few pixels." in text
+    assert "Ada Lovelace" in text
+
+
+def test_the_licence_of_the_data_may_differ_from_that_of_the_scene(folder, tmp_path):
+    differing = {"licence": "CC0 (its models)", "publish": PUBLISH | {"licence": "CC-BY-4.0"}}
+    output = published(folder, tmp_path / NAME, **differing)
+    assert read_json(output / "croissant.json")["license"].endswith("/CC-BY-4.0.html")
+
+
+def test_an_unfinished_dataset_is_not_published(folder, tmp_path):
+    dataset = shutil.copytree(folder, tmp_path / "dataset")
+    (dataset / "sha256sums.txt").unlink()
+    with pytest.raises(UserError, match=r"sha256sums\.txt: is missing; only a valid dataset"):
+        published(dataset, tmp_path / NAME)
+    assert not (tmp_path / NAME).exists()
+
+
+def test_the_frames_of_a_sequence_are_samples_of_their_own(folder, tmp_path):
+    for frame in ("f00001", "f00002"):
+        shutil.copytree(folder, tmp_path / "sequence" / frame)
+    output = published(tmp_path / "sequence", tmp_path / NAME)
+    keys = {name.split(".")[0] for tar in output.glob(f"{NAME}-*.tar") for name in members(tar)}
+    assert len(keys) == 12
+    assert {key[:6] for key in keys} == {"f00001", "f00002"}
+
+
+@pytest.mark.slow
+def test_the_program_writes_shards_and_descriptions(run_program, folder, tmp_path):
+    settings = tmp_path / "settings.json"
+    write_json(settings, {"scene": SCENE, "gigabytes": 1})
+    output = tmp_path / NAME
+    arguments = ["--settings", settings, "--folder", folder, "--output", output]
+    said = run_program("publish.py", *arguments).stdout
+    assert said.startswith(f"{Path(output)}: 4 files")
+    assert (output / "croissant.json").is_file()
