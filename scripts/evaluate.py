@@ -16,7 +16,7 @@ from lightfield.dataset.names import VIEWS
 NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 
 
-def main() -> None:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("renders", type=Path, metavar="RENDERS", help="folder of the renders")
@@ -46,7 +46,11 @@ def main() -> None:
     )
     add("--masks", type=Path, help="folder of <view>.png, whose pixels of 0 are not compared")
     add("--output", type=Path, required=True, help="folder to write")
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    arguments = parse_arguments()
 
     # Only now, so that --help need not wait for these.
     import numpy as np
