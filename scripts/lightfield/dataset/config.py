@@ -140,6 +140,9 @@ QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
+DenoisePrefilter = Literal["accurate", "fast", "none"]
+
+
 class Preset(Settings):
     """Upper limits of a scene YAML's values. A key that is left out limits nothing."""
 
@@ -153,6 +156,9 @@ class Preset(Settings):
         None, description="Views of a rig.", json_schema_extra={"unit": "views"}
     )
     denoise: bool | None = Field(None, description="Denoise even if the scene YAML does not.")
+    denoise_prefilter: DenoisePrefilter | None = Field(
+        None, description="Prefilter of denoised views, unless the scene YAML names one."
+    )
 
 
 class Energy(Settings):
@@ -429,7 +435,7 @@ class Render(Settings):
     denoise_quality: Literal["high", "balanced", "fast"] | None = Field(
         None, description="Quality of the denoiser's network. The default is high."
     )
-    denoise_prefilter: Literal["accurate", "fast", "none"] | None = Field(
+    denoise_prefilter: DenoisePrefilter | None = Field(
         None,
         description="Prefilter of the albedo and normals that guide the denoiser. The default is "
         "accurate.",

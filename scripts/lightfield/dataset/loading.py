@@ -256,6 +256,8 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
         content["most_samples"] = limits.samples
     if limits.denoise is not None:
         content["denoise"] = limits.denoise
+    if limits.denoise_prefilter and content.get("denoise"):
+        content.setdefault("denoise_prefilter", limits.denoise_prefilter)
     if isinstance(render.target_error, TargetError):
         content["target_error"] = render.target_error.value
         if render.target_error.denoise == "never":
