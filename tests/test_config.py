@@ -118,9 +118,9 @@ def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     path = tmp_path / "one.yaml"
     path.write_text(yaml.safe_dump(content))
     assert config.read_scene(path).exports.colmap
-    content["exports"]["colmap"] = {"sources": ["views"]}
+    content["exports"]["colmap"] = {"sources": ["views"], "depth": True}
     path.write_text(yaml.safe_dump(content))
-    with pytest.raises(UserError, match="views has a lens that COLMAP lacks"):
+    with pytest.raises(UserError, match="views is a panorama, for which COLMAP has no depth maps"):
         config.read_scene(path)
 
 

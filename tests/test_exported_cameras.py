@@ -776,6 +776,10 @@ def test_points_of_unreadable_views_do_not_pass(dataset):
     assert "1 views cannot be read" in check.detail
 
 
+# Exports that hold the views of other rigs, too.
+OF_RIGS = ("colmap", "nerfstudio", "nerf_synthetic", "lichtfeld", "ncore")
+
+
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """A scene of a rig to train on, exported with a rig that tests it."""
@@ -787,7 +791,7 @@ def scene(tmp_path_factory):
             path.rename(folder / name / path.name)
         (folder / name / "dataset").rmdir()
     beside = {"along": folder / "along"}
-    for kind in ("colmap", "nerfstudio", "nerf_synthetic"):
+    for kind in OF_RIGS:
         options = {} if kind == "nerf_synthetic" else {"points": 60}
         write_export(folder / "around", "views", kind, options, beside)
     write_instant_ngp(folder / "around", "views", [])
@@ -800,7 +804,7 @@ def scene(tmp_path_factory):
 
 def test_views_of_a_rig_that_tests_are_compared_with_its_own_lightfield(scene):
     for rig in ("around", "along"):
-        for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
+        for kind in (*OF_RIGS, "instant_ngp"):
             if rig == "around" or kind == "instant_ngp":
                 assert problems(scene / rig, "views", kind) == []
     path = scene / "around" / "exports" / "nerf_synthetic" / "transforms_test.json"
@@ -817,7 +821,7 @@ def test_views_of_a_rig_that_tests_are_compared_with_its_own_lightfield(scene):
 def test_an_unpacked_dataset_may_lack_the_rigs_that_test_it(scene, tmp_path):
     for rig in ("around", "along"):
         shutil.copytree(scene / rig, tmp_path / f"scene_{rig}")
-    for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
+    for kind in (*OF_RIGS, "instant_ngp"):
         assert problems(tmp_path / "scene_around", "views", kind) == []
     assert problems(tmp_path / "scene_along", "views", "instant_ngp") == []
 

@@ -801,6 +801,22 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
         assert (colours[~np.isfinite(rays[..., 0])] == 128).all()
 
 
+def test_equal_ncore_sequences_have_equal_bytes(dataset, tmp_path):
+    first_export = exported(dataset, "ncore", "wide", tmp_path / "one", points=50)
+    second_export = exported(dataset, "ncore", "wide", tmp_path / "two", points=50)
+    assert (first_export / "export.json").read_bytes() == (
+        second_export / "export.json"
+    ).read_bytes()
+
+
+def test_an_ncore_sequence_needs_two_views(tmp_path):
+    rig = RIG | {"cameras": [1, 1]}
+    write_views(tmp_path / "dataset", LENSES["wide"], rig)
+    with pytest.raises(UserError, match=r"frames: has one view; NCore needs two or more"):
+        exported(tmp_path / "dataset", "ncore", "views", tmp_path)
+    assert not (tmp_path / "ncore").exists()
+
+
 def ply(path):
     head, _, body = path.read_bytes().partition(b"end_header\n")
     kinds = {"float": "<f4", "uchar": "u1"}

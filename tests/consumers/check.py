@@ -146,6 +146,11 @@ def ncore(folder, name):
     cloud = lidar.get_frame_point_cloud(0, motion_compensation=True, with_start_points=True)
     points = cloud.xyz_m_end.astype(np.float64)
     metres = np.abs(np.linalg.norm(points, axis=1) - RADIUS).max()
+    # gsplat's newer reader takes points from here, and their colours.
+    source = loader.get_point_clouds_source(lidar.sensor_id)
+    cloud = source.get_pc(0).transform("world", 0, loader.pose_graph)
+    np.testing.assert_allclose(cloud.xyz, points, atol=1e-6)
+    assert source.get_pc_generic_data(0, "rgb").shape == points.shape
     assert (np.diff(camera.frames_timestamps_us[:, 1].astype(int)) > 0).all()
     levels = 0.0
     for index in range(camera.frames_count):

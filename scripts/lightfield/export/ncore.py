@@ -6,8 +6,8 @@
     that show nothing. There 0 means ignored.
   - ``intrinsics``: f-theta for fisheyes, OpenCV's pinhole for perspective views.
   - ``poses``: camera to world, with x right, y down and z forward, in metres.
-  - ``lidars/points``: the points, as one frame of a lidar at the world's origin. gsplat and 3DGRUT
-    read no other points.
+  - ``lidars/points``: the points, as one frame of a lidar at the world's origin. All versions of
+    gsplat's and 3DGRUT's readers take these. With other points, too, they stop.
 
 Frames are in the order of the views' names. NCore needs a different time for each. So each is
 exposed a second after the one before, in microseconds, for an instant. Source: NCore's

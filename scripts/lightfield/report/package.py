@@ -43,7 +43,8 @@ LOADERS = {
     "hci": "import configparser\nparameters = configparser.ConfigParser()\n"
     "parameters.read('{}/parameters.cfg')",
     "scannetpp": "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT",
-    "ncore": "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json",
+    "ncore": "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
+    " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat",
     "lichtfeld": "LichtFeld-Studio --data-path {} --output-path output",
     "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
     "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
