@@ -34,12 +34,13 @@ from lightfield.dataset.config import accept_blend, load_config, load_scene, sce
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
-from lightfield.dataset.names import VIEWS
+from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,
     FiguresSettings,
     FreePlacesSettings,
     Measurement,
+    MeshSettings,
     PackSettings,
     PageSettings,
     SynthesisSettings,

@@ -46,6 +46,7 @@ reprojections:
   cubes:
     camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
     cube_map: true
+mesh: {{formats: [glb]}}
 exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
@@ -271,7 +272,7 @@ RENDERED_CAMERAS = {f"{scene} {rule}" for scene in ("built", "brought") for rule
 # The first rig has the probes.
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
 TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
-CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("exports:")]
+CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("mesh:")]
 TO_CUBES = BUILT[BUILT.index("render:") : BUILT.index("  cubes:")]
 INNER = BUILT[BUILT.index("  LFInner:") : BUILT.index("reprojections:")]
 # Each round makes one change in each scene YAML and in other files. It has the old and the new
@@ -306,7 +307,7 @@ ROUNDS = {
         "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
     },
     "the frame, and the scene": {
-        "built": ("frame: 1", "frame: 2", {"inventory"} | CAMERAS),
+        "built": ("frame: 1", "frame: 2", {"inventory", "mesh"} | CAMERAS),
         "brought": ("scene_name: First", "scene_name: Second", {"inventory", "free_places"}),
     },
     "the place, and the error": {
@@ -347,8 +348,8 @@ ROUNDS = {
     },
     "a reprojection more, and another scale": {
         "built": (
-            "exports:",
-            "  other: {camera: {lens: rectilinear, fov: 40, resolution: [8, 8]}}\nexports:",
+            "mesh:",
+            "  other: {camera: {lens: rectilinear, fov: 40, resolution: [8, 8]}}\nmesh:",
             {"costs"},
         ),
         "brought": ("instant_ngp: {", "instant_ngp: {scale: 2, ", {"export_to_instant_ngp"}),
@@ -375,6 +376,10 @@ ROUNDS = {
             "format: exr",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
+    },
+    "another format of meshes": {"built": ("[glb]", "[ply]", {"mesh"})},
+    "the numbers of objects": {
+        "built": ("samples: 4", "samples: 4, passes: [object]", {"mesh"} | CAMERAS),
     },
     "how pixels are resampled": {
         "built": (

@@ -6,7 +6,7 @@ from lightfield.dataset import passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST
-from lightfield.dataset.names import VIEWS
+from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
@@ -118,9 +118,14 @@ class DatasetPaths(Description):
         return files
 
     @property
+    def mesh_list(self) -> list[str]:
+        """The file in which the mesh's job lists its files, if the dataset has meshes."""
+        return [f"{self.folder}/{MESH}/{MANIFEST}"] if self.mesh else []
+
+    @property
     def export_lists(self) -> list[str]:
         """All files in which exports list their files. With a split, each part has one, too."""
-        lists = self.exported
+        lists = [*self.exported, *self.mesh_list]
         if self.rig.split:
             for path in self.exported:
                 if not path.endswith(MANIFEST):
@@ -136,7 +141,7 @@ class DatasetPaths(Description):
     @property
     def published(self) -> list[str]:
         """The files that have a job each: all but views and reports."""
-        return [*self.lightfields, *self.exported]
+        return [*self.lightfields, *self.exported, *self.mesh_list]
 
     @property
     def pictures(self) -> list[str]:

@@ -39,6 +39,8 @@ class Export(Settings):
 
     # Whether the export includes other rigs' views that test what is trained on these.
     is_for_training: ClassVar[bool] = False
+    # The passes that the views must have.
+    needed_passes: ClassVar[tuple[str, ...]] = ()
 
     sources: list[str] = Field(
         min_length=1,
@@ -264,6 +266,12 @@ class ScanNetPP(Developed):
         return "is not an equidistant fisheye below 180 degrees; reproject to one"
 
 
+class Coco(Export):
+    """COCO's list of the objects in each view, with their boxes."""
+
+    needed_passes: ClassVar[tuple[str, ...]] = ("object",)
+
+
 class PosesCsv(Export):
     """A table of poses: name, position, rotation."""
 
@@ -292,6 +300,7 @@ class Exports(Settings):
     miv: Miv | None = Field(None, description="For TMIV.")
     hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
     scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    coco: Coco | None = Field(None, description="For detectors: the boxes of objects in the views.")
     poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
     point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 

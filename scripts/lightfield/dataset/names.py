@@ -5,6 +5,9 @@ from pathlib import Path
 # The name of the rendered views among a dataset's reprojections.
 VIEWS = "views"
 
+# The folder of a dataset with the surface that its cameras can see.
+MESH = "mesh"
+
 # The formats of scripts/export.py. instant-ngp has a program of its own.
 EXPORTS = (
     "colmap",
@@ -14,6 +17,7 @@ EXPORTS = (
     "miv",
     "hci",
     "scannetpp",
+    "coco",
     "poses_csv",
     "point_cloud",
 )

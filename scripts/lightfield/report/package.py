@@ -43,7 +43,9 @@ LOADERS = {
     "hci": "import configparser\nparameters = configparser.ConfigParser()\n"
     "parameters.read('{}/parameters.cfg')",
     "scannetpp": "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT",
+    "coco": "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')",
     "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
+    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')",
     "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
 }
 

@@ -86,6 +86,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene", config.SceneSource),
             Section("scene: parameters", config.Parameters),
             Section("flow", config.Flow),
+            Section("mesh", config.MeshFiles),
             Section("report", config.Report),
         ],
     ),
@@ -151,6 +152,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("build_scene.py", job_settings.BuildSettings),
             Section("make_lightfield.py", LightfieldSettings),
             Section("free_places.py", job_settings.FreePlacesSettings),
+            Section("surface.py", job_settings.MeshSettings),
             Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
@@ -159,6 +161,13 @@ KEY_PAGES: dict[str, Page] = {
             Section("report_figures.py", job_settings.FiguresSettings),
             Section("report_html.py", job_settings.PageSettings),
             Section("report_html.py: measurements", job_settings.Measurement),
+        ],
+    ),
+    "measurement-keys.md": Page(
+        "The keys of the settings files of measurements",
+        "These programs measure or estimate something, and read a "
+        "[settings file](job-keys.md) like the others.",
+        [
             Section("synthesis_quality.py", job_settings.SynthesisSettings),
             Section("costs.py", CostSettings),
             Section("costs.py: full_size", FullSize),
@@ -166,6 +175,9 @@ KEY_PAGES: dict[str, Page] = {
         ],
     ),
 }
+
+# The pages of the programs' settings files.
+JOB_PAGES = ("job-keys.md", "measurement-keys.md")
 
 # The programs of each page, in the order of the pages.
 PROGRAM_PAGES = {
@@ -190,7 +202,7 @@ PROGRAM_PAGES = {
     "programs-export.md": (
         "Programs that export",
         "These programs make other files of finished views.",
-        ["flow", "splits", "export", "export_instant_ngp", "synthesize"],
+        ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     ),
     "programs-publish.md": (
         "Programs that publish and fetch",
@@ -236,12 +248,13 @@ def link_targets() -> dict[str, str]:
     targets = {
         schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
         for file, page in KEY_PAGES.items()
-        if file != "job-keys.md"
+        if file not in JOB_PAGES
         for section in page.sections
     }
     jobs = {
-        schema_of(section.model)["title"]: f"job-keys.md#{slug(section.title)}"
-        for section in KEY_PAGES["job-keys.md"].sections
+        schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
+        for file in JOB_PAGES
+        for section in KEY_PAGES[file].sections
     }
     # A scene YAML's `rigs` may be any of these.
     any_rig = {schema_of(model)["title"]: "rig-type-keys.md" for model in RIG_MODELS}

@@ -17,9 +17,11 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.dataset.exports import MANIFEST
 from lightfield.validation.readers import (
+    coco,
     colmap,
     hci,
     instant_ngp,
+    mesh,
     miv,
     nerf_synthetic,
     nerfstudio,
@@ -31,8 +33,10 @@ from lightfield.validation.readers import (
 from lightfield.validation.readers.contents import Exported
 
 READERS = {
+    "coco": coco.read,
     "colmap": colmap.read,
     "hci": hci.read,
+    "mesh": mesh.read,
     "miv": miv.read,
     "nerf_synthetic": nerf_synthetic.read,
     "nerfstudio": nerfstudio.read,
