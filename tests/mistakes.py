@@ -231,6 +231,15 @@ REFUSED = [
     ("reprojections.perspective.rigs", ["x\ny"]),
     ("scene.builder", "../../etc/passwd"),
     ("scene.builder", "room\n"),
+    *(
+        (
+            f"exports.{name}",
+            {"sources": ["perspective"]},
+            f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
+        )
+        for name in ("dnerf", "colmap_frames")
+    ),
+    ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),
     *(("mesh.formats", value) for value in ([], ["obj"], "glb", ["glb", "glb"], ["GLB"])),

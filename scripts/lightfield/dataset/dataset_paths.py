@@ -111,11 +111,28 @@ class DatasetPaths(Description):
         """The file of each export and source that its job writes last."""
         files = []
         for name, export in self.exports.selected.items():
+            if export.is_of_sequence:
+                continue
             file = "transforms.json" if name == "instant_ngp" else f"exports/{name}/{MANIFEST}"
             for source in export.sources:
                 folder = self.folder if source == VIEWS else f"{self.folder}/{source}"
                 files.append(f"{folder}/{file}")
         return files
+
+    @property
+    def rig_home(self) -> str:
+        """The rig's folder. In a sequence it holds the folders of the frames."""
+        return f"{self.results_root}/{self.scene_folder}/{self.rig_name}"
+
+    @property
+    def sequence_exports(self) -> list[str]:
+        """The list of each export that is made of the whole sequence, which all frames share."""
+        return [
+            f"{self.rig_home}/{'' if source == VIEWS else f'{source}/'}exports/{name}/{MANIFEST}"
+            for name, export in self.exports.selected.items()
+            if export.is_of_sequence
+            for source in export.sources
+        ]
 
     @property
     def mesh_list(self) -> list[str]:

@@ -20,7 +20,13 @@ EXPORTS = (
     "coco",
     "poses_csv",
     "point_cloud",
+    "dnerf",
+    "neural_3d_video",
+    "colmap_frames",
 )
+
+# Those of them that are made of a whole sequence.
+SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames")
 
 BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
 

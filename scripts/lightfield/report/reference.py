@@ -17,6 +17,7 @@ from lightfield.core.settings import MEANINGS
 from lightfield.dataset import config, exports, job_settings, reprojections
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.json_schema import Generator
+from lightfield.dataset.names import SEQUENCE_EXPORTS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
@@ -140,8 +141,18 @@ KEY_PAGES: dict[str, Page] = {
         "[Export formats](export-formats.md) says what each consumer takes.",
         [
             Section("exports", exports.Exports),
-            *[Section(name, exports.settings_of(name)) for name in exports.Exports.model_fields],
+            *[
+                Section(name, exports.settings_of(name))
+                for name in exports.Exports.model_fields
+                if name not in SEQUENCE_EXPORTS
+            ],
         ],
+    ),
+    "sequence-export-keys.md": Page(
+        "The keys of exports of a sequence",
+        "These entries of `exports` in a scene YAML write one export of all frames of a rig "
+        "with `frames`. [How to train on a sequence](../how-to/train-on-a-sequence.md).",
+        [Section(name, exports.settings_of(name)) for name in SEQUENCE_EXPORTS],
     ),
     "job-keys.md": Page(
         "The keys of the programs' settings files",
