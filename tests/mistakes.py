@@ -240,6 +240,7 @@ REFUSED = [
         for name in ("dnerf", "colmap_frames")
     ),
     ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
+    ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),
     *(("mesh.formats", value) for value in ([], ["obj"], "glb", ["glb", "glb"], ["GLB"])),

@@ -215,3 +215,89 @@ def test_a_frame_with_other_views_and_a_moving_camera_are_refused(sequence, tmp_
     file.write_text(json.dumps(content))
     with pytest.raises(UserError, match=r"f00005.*has another lens or other views"):
         source_of(tmp_path / "rig")
+
+
+# ---- scene flow -----------------------------------------------------------------------------
+
+MOVES = np.array([0.3, -0.2, 0.12])
+CAMERAS = {
+    "pinhole": {"lens": "rectilinear", "fov": 70, "resolution": [96, 72]},
+    "panorama": {"lens": "equirectangular", "resolution": [192, 96]},
+}
+
+
+def pixels_of_ball(lens, matrix, place):
+    """Return the distance (h, w) to the sphere with a ball at a place, and where the ball is."""
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    position = matrix[:3, 3]
+    along = rays @ position
+    distance = -along + np.sqrt(along**2 + RADIUS**2 - position @ position)
+    to_ball = place - position
+    middle = rays @ to_ball
+    with np.errstate(invalid="ignore"):
+        near = middle - np.sqrt(BALL_RADIUS**2 - (to_ball @ to_ball - middle**2))
+    on_ball = np.isfinite(near) & (near > 0)
+    return np.where(on_ball, near, distance), on_ball
+
+
+def write_moving_ball(folder, camera):
+    """Write two frames in which the ball moves. Return the distance and where the ball is."""
+    lens = lenses.from_camera(camera)
+    rig = {"type": "plane", "cameras": [1, 1], "center": [0.1, -0.2, 0.1]}
+    seen = []
+    for number, way in enumerate((MOVES, -MOVES), 1):
+        keys = {"depth": "distance", "frame": number, "passes": ["motion"]}
+        lightfield = LightField.from_rig(rig, lens, **keys)
+        (view,) = lightfield.views
+        frame = folder / f"f{number:05}"
+        lightfield.write(frame / "lightfield.json")
+        distance, on_ball = pixels_of_ball(lens, view.matrix, BALL + MOVES * (number - 1))
+        local = lens.pixel_rays() * distance[..., None]
+        moved = lens.pixels(local + np.where(on_ball[..., None], way @ view.matrix[:3, :3], 0))
+        own = np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5
+        motion = np.where(on_ball[..., None], moved - own, 0).astype(np.float32)
+        attributes = {images.DEPTH_ATTRIBUTE: "distance"}
+        colour = {name: np.zeros(distance.shape, np.float16) for name in "RGB"}
+        channels = colour | {"Z": distance.astype(np.float32)}
+        images.write_exr(frame / f"exr/{view.name}.exr", channels, attributes)
+        direction, other = ("next", "previous") if number == 1 else ("previous", "next")
+        planes = {f"{direction}.{axis}": motion[..., place] for place, axis in enumerate("XY")}
+        planes |= {f"{other}.{axis}": np.zeros(distance.shape, np.float32) for axis in "XY"}
+        images.write_exr(frame / f"motion/{view.name}.exr", planes)
+        seen.append((distance, on_ball))
+    return view, seen
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_scene_flow_is_the_motion_of_the_ball_and_0_around_it(camera, tmp_path):
+    rig = tmp_path / "rig"
+    view, ((_, on_ball), (_, ball_later)) = write_moving_ball(rig, CAMERAS[camera])
+    settings = settings_of("scene_flow")(sources=["views"])
+    source = SourceSequence.of_folders(rig, ["f00001", "f00002"], "", ".exr", {})
+    export.run("scene_flow", source, settings, tmp_path / "flow")
+    assert not (tmp_path / "flow/f00002").exists()
+    image = images.read_image(tmp_path / f"flow/f00001/{view.name}.exr")
+    flow = np.stack([image.channels[axis] for axis in "XYZ"], axis=-1)
+    is_known = image.channels["V"] > 0
+    assert (flow[~is_known] == 0).all()
+    # The ball's edge is hidden by nothing, but its pixels are next to the sphere.
+    assert is_known[on_ball].mean() > 0.6
+    # The distance is interpolated between pixels on a curved surface.
+    off = np.linalg.norm(flow - MOVES, axis=-1)[is_known & on_ball]
+    assert np.median(off) < 2e-3
+    assert off.max() < 0.06
+    around = ~on_ball & ~ball_later
+    assert is_known[around].mean() > 0.99
+    assert np.abs(flow[around]).max() < 1e-5
+    # The ball hides this part of the sphere in the next frame.
+    assert not is_known[~on_ball & ball_later].any()
+
+
+def test_scene_flow_needs_every_frame(tmp_path):
+    write_moving_ball(tmp_path, CAMERAS["pinhole"])
+    file = tmp_path / "f00002/lightfield.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"frame": 4}))
+    source = SourceSequence.of_folders(tmp_path, ["f00001", "f00002"], "", ".exr", {})
+    settings = settings_of("scene_flow")(sources=["views"])
+    with pytest.raises(UserError, match="frame 1 is followed by 4"):
+        export.run("scene_flow", source, settings, tmp_path / "flow")

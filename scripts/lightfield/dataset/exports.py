@@ -310,6 +310,21 @@ class ColmapFrames(Colmap):
         return super().refusal(lens, has_depth)
 
 
+class SceneFlow(Export):
+    """How far each surface moves in the world from one frame to the next."""
+
+    is_of_sequence: ClassVar[bool] = True
+    needed_passes: ClassVar[tuple[str, ...]] = ("motion",)
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return None if has_depth else NO_DEPTH
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if rig.sequence and rig.sequence.step != 1:
+            return "leaves out frames, but the pass motion leads to the very next; give it step: 1"
+        return super().rig_refusal(rig)
+
+
 class Coco(Export):
     """COCO's list of the objects in each view, with their boxes."""
 
@@ -351,6 +366,9 @@ class Exports(Settings):
     )
     colmap_frames: ColmapFrames | None = Field(
         None, description="A sequence, for SpacetimeGaussians."
+    )
+    scene_flow: SceneFlow | None = Field(
+        None, description="A sequence: the motion of surfaces in the world."
     )
     poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
     point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")

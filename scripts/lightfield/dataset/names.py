@@ -23,10 +23,11 @@ EXPORTS = (
     "dnerf",
     "neural_3d_video",
     "colmap_frames",
+    "scene_flow",
 )
 
 # Those of them that are made of a whole sequence.
-SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames")
+SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "scene_flow")
 
 BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
 
