@@ -34,12 +34,13 @@ from lightfield.dataset.config import accept_blend, load_config, load_scene, sce
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
-from lightfield.dataset.names import VIEWS
+from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,
     FiguresSettings,
     FreePlacesSettings,
     Measurement,
+    MeshSettings,
     PackSettings,
     PageSettings,
     SynthesisSettings,
@@ -131,7 +132,7 @@ wildcard_constraints:
     reprojection=r"(?!f\d{5,7}/|flow/|render/)[A-Za-z0-9_.-]+",
     # Of an export: nothing for the views, or a reprojection's name and a slash.
     source=r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
-    format="[a-z_]+",
+    format="[a-z0-9_]+",
     first=r"\d+",
     end=r"\d+",
 

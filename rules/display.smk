@@ -18,6 +18,7 @@ PHASES = {
     "error": "calibration",
     "reproject": "reprojections",
     "export": "exports",
+    "mesh": "exports",
     "validate": "validation",
     "costs": "report",
 }
@@ -47,6 +48,7 @@ BLENDER_RULES = (
     "check_cameras",
     "free_places",
     "inventory",
+    "mesh",
     "probe_cameras",
 )
 

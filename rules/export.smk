@@ -27,6 +27,34 @@ rule export_to_instant_ngp:
         " --output {output} > {log} 2>&1"
 
 
+# The frames of a sequence lie in the rig's folder, beside the exports of all of them.
+rule export_sequence:
+    input:
+        settings=sequence_export_settings,
+        views=exported_frames,
+    output:
+        f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
+    wildcard_constraints:
+        rig="[A-Za-z0-9_.-]+",
+        format="|".join(SEQUENCE_EXPORTS),
+    log:
+        log_of("{scene}/{rig}/{source}export_{format}"),
+    benchmark:
+        times_of("{scene}/{rig}/export/{source}{format}")
+    resources:
+        mem_mb=4000,
+        runtime=240,
+    params:
+        rig=DATASET,
+        folder=subpath(output[0], parent=True),
+    message:
+        "Exporting the sequence {wildcards.scene}/{wildcards.rig} for {wildcards.format}"
+    shell:
+        f"{taking('input.views')}python {SCRIPTS}/export.py"
+        " {wildcards.format} --settings {input.settings} --dataset {params.rig}"
+        " --output {params.folder} > {log} 2>&1"
+
+
 rule export:
     input:
         settings=export_settings,
@@ -35,6 +63,8 @@ rule export:
         dataset=f"{DATASET}/lightfield.json",
     output:
         f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
+    wildcard_constraints:
+        format=f"(?!(?:{'|'.join(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:

@@ -3,14 +3,15 @@
 A settings file is JSON: {"options": {"sources": ["perspective"], "points": 50000}, "suffix":
 ".png"}. `options` has the keys of the scene YAML's `exports`, with one source. `suffix` is the
 suffix of the source's views, by default .exr. `tested_by` maps rigs to the folders of datasets
-whose views test what is trained on these. An earlier export in the same folder is replaced.
+whose views test what is trained on these. An export of a sequence reads the folder of a rig, and
+`frames` lists the folders of the frames in it. An earlier export in the same folder is replaced.
 """
 
 import argparse
 from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
-from lightfield.dataset.names import EXPORTS, VIEWS
+from lightfield.dataset.names import EXPORTS, SEQUENCE_EXPORTS, VIEWS
 
 
 def main() -> None:
@@ -18,7 +19,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("format", choices=EXPORTS, help="format to write")
-    parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
+    parser.add_argument(
+        "--dataset", type=Path, required=True, help="the dataset's folder; of a sequence, the rig's"
+    )
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     add_settings_flags(parser)
@@ -31,6 +34,7 @@ def main() -> None:
     from lightfield import export
     from lightfield.core.settings import checked, read_settings
     from lightfield.dataset.exports import export_settings_of
+    from lightfield.export.sequence import SourceSequence
     from lightfield.export.source import SourceDataset
 
     model = export_settings_of(arguments.format)
@@ -44,9 +48,12 @@ def main() -> None:
         key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
     }
     test_folders = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
-    source = SourceDataset(
-        arguments.dataset, settings.source, settings.suffix, test_folders, **development
-    )
+    views = (settings.source, settings.suffix, test_folders)
+    if arguments.format in SEQUENCE_EXPORTS:
+        folders = settings.frames or [path.name for path in arguments.dataset.glob("f[0-9]*")]
+        source = SourceSequence.of_folders(arguments.dataset, folders, *views, **development)
+    else:
+        source = SourceDataset(arguments.dataset, *views, **development)
     files = export.run(arguments.format, source, options, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
 

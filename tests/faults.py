@@ -81,6 +81,7 @@ KINDS = {
         f"{HDR}/exports/point_cloud/points.ply",
         f"{HDR}/exports/nerfstudio/points.ply",
     ),
+    "surface": (f"results/{CUBOID}/mesh/scene.glb", f"results/{CUBOID}/mesh/scene.ply"),
     "validation": (f"results/{CUBOID}/validation.json", f"results/{LATTICE}/validation.json"),
     "sums of work": (f"work/{PLANE}/checksums.txt", f"work/{LATTICE}/checksums.txt"),
     "published sums": (f"results/{CUBOID}/sha256sums.txt", f"results/{LATTICE}/sha256sums.txt"),

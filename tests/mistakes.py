@@ -194,7 +194,17 @@ REFUSED = [
     *(("reprojections", {name: PERSPECTIVE}) for name in NOT_A_NAME),
     *(
         ("reprojections", {name: PERSPECTIVE})
-        for name in ("render", "exr", "report", "exports", "panorama", "f00001", "a.json", "a.txt")
+        for name in (
+            "render",
+            "exr",
+            "report",
+            "exports",
+            "mesh",
+            "panorama",
+            "f00001",
+            "a.json",
+            "a.txt",
+        )
     ),
     ("reprojections.perspective.samples", HUGE),
     ("reprojections.perspective.exposure", 1e31),
@@ -238,6 +248,20 @@ REFUSED = [
     ("reprojections.perspective.rigs", ["x\ny"]),
     ("scene.builder", "../../etc/passwd"),
     ("scene.builder", "room\n"),
+    *(
+        (
+            f"exports.{name}",
+            {"sources": ["perspective"]},
+            f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
+        )
+        for name in ("dnerf", "colmap_frames")
+    ),
+    ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
+    ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
+    ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
+    *(("mesh", value) for value in (None, True, "glb", [])),
+    *(("mesh.formats", value) for value in ([], ["obj"], "glb", ["glb", "glb"], ["GLB"])),
+    *(("mesh.rigs", value) for value in ([], "LFSphere", ["LFSpher"])),
     ("scene.frame", HUGE),
     ("scene.parameters", {"seed": -1}),
     ("scene.parameters", {"detail": float("nan")}),
@@ -700,6 +724,14 @@ PROGRAMS = [
             ({"options": {"sources": ["views"], "scal": 1}}, "options.scal: unknown key; did you"),
             ({"options": {"sources": ["views"], "scale": -1}}, "options.scale: is -1; must be a"),
             ({"options": {"sources": ["views"]}, "suffix": ".jpg"}, "suffix: is "),
+        )
+    ),
+    *(
+        ("mesh.json", content, said)
+        for content, said in (
+            ({"formats": ["obj"]}, "formats.[0]: is "),
+            ({"frame": -1}, "frame: is -1; must be"),
+            ({"format": ["glb"]}, "format: unknown key; did you mean formats?"),
         )
     ),
     *(

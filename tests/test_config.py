@@ -113,7 +113,6 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
 def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     content = changed("reprojections.same", {"rigs": ["LFSphere"]})
     content["rigs"]["LFSphere"]["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
-    content["rigs"]["LFCuboid"]["camera"] |= {"lens": "equisolid", "fov": 180, "focal_length": 9}
     content["exports"]["colmap"] = {"sources": ["same"]}
     path = tmp_path / "one.yaml"
     path.write_text(yaml.safe_dump(content))

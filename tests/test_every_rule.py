@@ -46,6 +46,7 @@ reprojections:
   cubes:
     camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
     cube_map: true
+mesh: {{formats: [glb]}}
 exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
@@ -87,11 +88,25 @@ publish:
   social_impact: None.
 scene: {dataset: published}
 """
+# A sequence, whose frames share an export.
+MOVED = """
+scene: {builder: still_life}
+render: {samples: 4}
+rigs:
+  LFMoving:
+    type: plane
+    cameras: [2, 1]
+    size: 1
+    frames: {first: 1, last: 2}
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+exports:
+  dnerf: {sources: [views], points: 9}
+"""
 TARGETS = [
     *("all", "package", "plan", "advise", "error_vs_time", "reprojection_benchmark", "stability"),
     *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
 ]
-CHOSEN = ["--config", "scenes=[built,brought,imported]", "rigs=all", "preset=full"]
+CHOSEN = ["--config", "scenes=[built,brought,imported,moved]", "rigs=all", "preset=full"]
 # Rules without output: a target is read or always runs, or only asks for other targets.
 WITHOUT_OUTPUT = {
     *("all", "smoke", "report_html", "package", "error_vs_time", "gpu_check", "synthesis"),
@@ -122,7 +137,7 @@ class Build:
     """A checkout in which stand-ins built everything, and Snakemake's own metadata is lost."""
 
     def __init__(self, folder):
-        self.folder = checkout(folder, built=BUILT, brought=BROUGHT, imported=IMPORTED)
+        self.folder = checkout(folder, built=BUILT, brought=BROUGHT, imported=IMPORTED, moved=MOVED)
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
         write_views(folder / "published/LFPlane", camera, {"type": "plane", "cameras": [2, 1]})
         for program in [*ROOT.glob("scripts/*.py"), *ROOT.glob("benchmarks/*.py")]:
@@ -276,16 +291,19 @@ def assert_made_from_present_inputs(build, jobs):
         assert line["files"][first_output][0] == build.sha256(first_output)
 
 
-SCENES = {name: f"configs/scenes/{name}.yaml" for name in ("built", "brought", "imported")}
+SCENES = {name: f"configs/scenes/{name}.yaml" for name in ("built", "brought", "imported", "moved")}
 ROOM = "scripts/scenes/room/__init__.py"
 OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
 # The cameras of a light field, its panorama and its probes follow from the same settings.
 CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
-RENDERED_CAMERAS = {f"{scene} {rule}" for scene in ("built", "brought") for rule in CAMERAS}
+RENDERED_CAMERAS = {
+    f"{scene} {rule}" for scene in ("built", "brought", "moved") for rule in CAMERAS
+}
+BUILDING = {"build_scene"} | CAMERAS
 # The first rig has the probes.
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
 TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
-CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("exports:")]
+CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("mesh:")]
 TO_CUBES = BUILT[BUILT.index("render:") : BUILT.index("  cubes:")]
 INNER = BUILT[BUILT.index("  LFInner:") : BUILT.index("reprojections:")]
 # Each round makes one change in each scene YAML and in other files. It has the old and the new
@@ -320,7 +338,7 @@ ROUNDS = {
         "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
     },
     "the frame, and the scene": {
-        "built": ("frame: 1", "frame: 2", {"inventory"} | CAMERAS),
+        "built": ("frame: 1", "frame: 2", {"inventory", "mesh"} | CAMERAS),
         "brought": ("scene_name: First", "scene_name: Second", {"inventory", "free_places"}),
     },
     "the place, and the error": {
@@ -361,8 +379,8 @@ ROUNDS = {
     },
     "a reprojection more, and another scale": {
         "built": (
-            "exports:",
-            "  other: {camera: {lens: rectilinear, fov: 40, resolution: [8, 8]}}\nexports:",
+            "mesh:",
+            "  other: {camera: {lens: rectilinear, fov: 40, resolution: [8, 8]}}\nmesh:",
             {"costs"},
         ),
         "brought": ("instant_ngp: {", "instant_ngp: {scale: 2, ", {"export_to_instant_ngp"}),
@@ -389,6 +407,10 @@ ROUNDS = {
             "format: exr",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
+    },
+    "another format of meshes": {"built": ("[glb]", "[ply]", {"mesh"})},
+    "the numbers of objects": {
+        "built": ("samples: 4", "samples: 4, passes: [object]", {"mesh"} | CAMERAS),
     },
     "how pixels are resampled": {
         "built": (
@@ -424,7 +446,7 @@ ROUNDS = {
         "scripts/scenes/library/lights.py": (
             '"""',
             '""" ',
-            {f"built {rule}" for rule in {"build_scene"} | CAMERAS},
+            {f"{scene} {rule}" for scene in ("built", "moved") for rule in BUILDING},
         ),
     },
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
@@ -435,6 +457,10 @@ ROUNDS = {
             {"inventory", "probe_cameras", "check_gpu", "LFPlane pack"},
         ),
     },
+    "a longer sequence": {
+        "moved": ("last: 2", "last: 3", {"inventory", "export_sequence", "pack"})
+    },
+    "other points of a sequence": {"moved": ("points: 9", "points: 8", {"export_sequence"})},
     "a description, and somebody's light field": {
         "built": ("Cameras in a room", "Some cameras", {"pack"}),
         "published/LFPlane/lightfield.json": ("{", "{ ", {"imported lightfield"}),
@@ -461,6 +487,8 @@ ROUNDS = {
 CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
 CONSTANT |= {"synthesis.json views", "lightfield.json scene", "panorama.json scene"}
 CONSTANT |= {"probes.json scene", "panorama.json flow"}
+# The sequence is of rendered views, and no other rig tests it.
+CONSTANT |= {"dnerf.json suffix", "dnerf.json tested_by"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 

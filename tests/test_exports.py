@@ -984,7 +984,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
         ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not of EXR; give it format: exr"),
         ("lichtfeld", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
-        ("lichtfeld", "again", VIEWS, {"normals": True}, r"give it passes: \[normal\]"),
+        ("lichtfeld", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )

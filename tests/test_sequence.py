@@ -1,6 +1,7 @@
 """Sequences: every frame of an animation is a dataset of its own in its rig's folder."""
 
 import json
+import tarfile
 
 import numpy as np
 import pytest
@@ -99,6 +100,51 @@ def test_a_forecast_has_a_row_for_all_frames_of_a_sequence(tmp_path):
     rows = [line.split() for line in result.stdout.splitlines()]
     views = {row[0]: row[2] for row in rows if row and row[0].startswith("moving/")}
     assert views == {"moving/LFStill": "2", "moving/LFSequence": "3"}
+
+
+TRAINED = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  LFPair:
+    type: plane
+    cameras: [2, 1]
+    size: 0.5
+    center: [0, 0, 1.2]
+    frames: {first: 2, last: 3}
+    camera: {lens: rectilinear, fov: 70, resolution: [16, 16]}
+exports:
+  dnerf: {sources: [views], points: 20}
+  poses_csv: {sources: [views]}
+"""
+
+
+@pytest.mark.slow
+def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
+    folder = checkout(tmp_path, moving=TRAINED)
+    arguments = ("package", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    assert planned(folder, *arguments)["export_sequence"] == 1
+    result = snakemake(folder, "--cores", "2", *arguments)
+    assert result.returncode == 0, result.stdout + result.stderr
+    rig = folder / "results/moving/LFPair"
+    lists = {path.name for path in rig.glob("exports/dnerf/*.json")}
+    parts = ("train", "val", "test")
+    assert lists == {"export.json", *(f"transforms_{part}.json" for part in parts)}
+    content = json.loads((rig / "exports/dnerf/transforms_train.json").read_text())
+    assert [frame["time"] for frame in content["frames"]] == [0, 1]
+    # Other exports are made frame by frame.
+    assert len([*rig.glob("f0000?/exports/poses_csv/poses.csv")]) == 2
+    with tarfile.open(folder / "results/moving/moving_LFPair.tar") as archive:
+        assert "moving_LFPair/exports/dnerf/transforms_test.json" in archive.getnames()
+        card = json.load(archive.extractfile("moving_LFPair/card.json"))
+    assert "exports/dnerf" in card["loaders"]
+    damaged = rig / "exports/dnerf" / f"{content['frames'][0]['file_path']}.png"
+    damaged.write_bytes(b"")
+    assert planned(folder, *arguments)["export_sequence"] == 1
+    assert snakemake(folder, "--cores", "2", *arguments).returncode == 0
+    assert damaged.stat().st_size > 0
+    plan = snakemake(folder, "-n", *arguments)
+    assert "Nothing to be done" in plan.stdout + plan.stderr
 
 
 def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):

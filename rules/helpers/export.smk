@@ -10,8 +10,12 @@ def export_of(wildcards):
 
 def tested_by(wildcards):
     """Return the datasets whose views go into an export of this one, to test with."""
-    dataset = dataset_of(wildcards)
-    rigs = dataset.tested_by if export_of(wildcards).is_for_training else ()
+    return testing(dataset_of(wildcards), export_of(wildcards))
+
+
+def testing(dataset, export):
+    """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
+    rigs = dataset.tested_by if export.is_for_training else ()
     return [DATASETS[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
 
@@ -23,11 +27,59 @@ def exported_views(wildcards):
     dataset = dataset_of(wildcards)
     files = [*dataset.records("render"), *records(wildcards)]
     for test_dataset in tested_by(wildcards):
-        files += test_dataset.records("render")
-        files += test_dataset.records(stage_of(wildcards))
-        for source in ("", wildcards.source):
-            files.append(f"{test_dataset.folder}/{source}lightfield.json")
+        files += views_of_source(test_dataset, wildcards)
     return list(dict.fromkeys(files))
+
+
+def views_of_source(dataset, wildcards):
+    """Return the records and light fields of a dataset's views, and of those of the source."""
+    files = [*dataset.records("render"), *dataset.records(stage_of(wildcards))]
+    for source in ("", wildcards.source):
+        files.append(f"{dataset.folder}/{source}lightfield.json")
+    return files
+
+
+def frames_of(wildcards):
+    """Return the datasets of a rig's sequence, in the order of time."""
+    name = f"{wildcards.scene}/{wildcards.rig}"
+    frames = [
+        dataset
+        for dataset in DATASETS.values()
+        if f"{dataset.scene_folder}/{dataset.rig_name}" == name
+        and dataset.rig.sequence
+    ]
+    if not frames or wildcards.format not in frames[0].exports.selected:
+        sys.exit(
+            f"error: {RESULTS}/{name}/exports/{wildcards.format}: the scene YAML asks for no such "
+            "export of a sequence"
+        )
+    return frames
+
+
+def exported_frames(wildcards):
+    """Return the inputs of an export of a sequence: the views of all frames."""
+    files = []
+    for dataset in frames_of(wildcards):
+        export = dataset.exports.selected[wildcards.format]
+        for each in (dataset, *testing(dataset, export)):
+            files += views_of_source(each, wildcards)
+    return list(dict.fromkeys(files))
+
+
+def sequence_export_settings(wildcards):
+    """Return the settings file of an export of a sequence."""
+    frames = frames_of(wildcards)
+    first = frames[0]
+    source = wildcards.source.rstrip("/") or VIEWS
+    options = first.exports.selected[wildcards.format]
+    settings = export_settings_of(wildcards.format)(
+        options=options.model_copy(update={"sources": [source]}),
+        suffix=first.reprojections[source].suffix if source != VIEWS else ".exr",
+        tested_by={d.rig_name: d.rig_home for d in testing(first, options)},
+        frames=[Path(dataset.folder).name for dataset in frames],
+    )
+    folder = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/exports"
+    return settings_file(f"{folder}/{source}/{wildcards.format}.json", settings.as_json())
 
 
 def trained_by(wildcards):

@@ -30,6 +30,7 @@ def packed_sums(wildcards):
     """
     datasets = packed(wildcards)
     files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
+    files += datasets[0].sequence_exports
     if STORE:
         for dataset in datasets:
             files += [f"{dataset.folder}/validation.json", *dataset.published]

@@ -8,7 +8,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -35,7 +35,7 @@ from lightfield.core.settings import (
 )
 from lightfield.dataset import published
 from lightfield.dataset.exports import Export, Exports
-from lightfield.dataset.names import VIEWS, builders
+from lightfield.dataset.names import MESH, VIEWS, builders
 from lightfield.dataset.passes import FLOW, PASSES, in_order
 from lightfield.dataset.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.dataset.reprojections import (
@@ -77,7 +77,10 @@ SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 # The same for a rig's folder.
 RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
 # The same for a reprojection's folder.
-REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", FLOW.name, *PASSES}
+REPROJECTION_NEIGHBOURS = {
+    *("exr", "exports", MESH, "panorama", "render", "report", FLOW.name),
+    *PASSES,
+}
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
 OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
 # For keys of a camera in lightfield.json: Blender's least and largest value, the unit of messages,
@@ -534,6 +537,21 @@ class Flow(Settings):
     )
 
 
+class MeshFiles(Settings):
+    """The surface that cameras can see, as meshes, and the boxes and poses of its objects."""
+
+    formats: Annotated[list[Literal["glb", "ply"]], AfterValidator(_unique)] = Field(
+        ["glb", "ply"],
+        description="glb: instances share a mesh, and objects keep their names. ply: all triangles "
+        "in the world.",
+    )
+    rigs: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="The rigs whose datasets hold it. Without it, all of them.",
+    )
+
+
 class Report(Settings):
     """The contents of a dataset's page."""
 
@@ -618,6 +636,9 @@ class Scene(Credits):
     flow: Flow | None = Field(
         None, description="Optical flow from depth and poses, for a scene that stands still."
     )
+    mesh: MeshFiles | None = Field(
+        None, description="The surface that cameras can see, as meshes, and its objects' boxes."
+    )
     exports: Exports = Field(Exports(), description="Files for trainers.")
     report: Report = Field(Report(), description="The contents of a dataset's page.")
 
@@ -648,6 +669,8 @@ class Scene(Credits):
                 raise ValueError("render.samples: file goes with scene.blend")
             if self.render.depth_of_field:
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
+        if self.mesh:
+            self._check_mesh(self.mesh)
         for name, reprojection in self.reprojections.items():
             _check_name(f"reprojections.{name}", name, REPROJECTION_NEIGHBOURS)
             self._check_reprojection(f"reprojections.{name}", reprojection)
@@ -660,15 +683,23 @@ class Scene(Credits):
 
     def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
         """Check that a reprojection's rigs and passes exist."""
-        for rig_name in reprojection.rigs or ():
-            if rig_name not in self.rigs:
-                hint = suggestion(rig_name, self.rigs)
-                raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
+        self._check_rig_names(f"{key}.rigs", reprojection.rigs or ())
         for pass_name in reprojection.passes or ():
             if self.render is None or pass_name not in (self.render.passes or ()):
                 raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
             if PASSES[pass_name].kind == "motion":
                 raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
+
+    def _check_mesh(self, mesh: MeshFiles) -> None:
+        if self.scene.dataset:
+            raise ValueError("mesh: does not go with scene.dataset, which has no scene to read")
+        self._check_rig_names("mesh.rigs", mesh.rigs or ())
+
+    def _check_rig_names(self, key: str, names: Iterable[str]) -> None:
+        for name in names:
+            if name not in self.rigs:
+                hint = suggestion(name, self.rigs)
+                raise ValueError(f"{key}: there is no rig {name!r}{hint}")
 
     def _check_split_rigs(self) -> None:
         """Check rigs of which one trains and others test: trainers see them as one dataset."""
@@ -704,10 +735,7 @@ class Scene(Credits):
             reprojection = None if source == VIEWS else self.reprojections[source]
             if reprojection:
                 has_depth &= reprojection.format == "exr"
-            maker = reprojection or self.render
-            for name in export.needed_passes:
-                if maker and name not in (maker.passes or ()):
-                    raise ValueError(f"{key}: {source} has no {name}; give it passes: [{name}]")
+            self._check_passes_of(key, source, export)
             for name in (reprojection and reprojection.rigs) or self.rigs:
                 rig = self.rigs[name]
                 camera = (reprojection and reprojection.camera) or rig.camera
@@ -717,6 +745,17 @@ class Scene(Credits):
                     raise ValueError(f"{key}: {source} is of the rig {name}, without a centre")
                 if refusal := export.rig_refusal(rig):
                     raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
+
+    def _check_passes_of(self, key: str, source: str, export: Export) -> None:
+        """Check that the views of a source have the passes that an export needs."""
+        passes = self.render and self.render.passes
+        place = "render.passes"
+        if source != VIEWS:
+            passes = self.reprojections[source].passes
+            place = f"reprojections.{source}.passes"
+        for pass_name in export.needed_passes if self.render else ():
+            if pass_name not in (passes or ()):
+                raise ValueError(f"{key}: {source} lacks the pass {pass_name}; add it to {place}")
 
     def _check_rig(self, key: str, name: str, rig: Rig) -> None:
         """Check a rig with its camera, its file and the depth."""

@@ -61,6 +61,7 @@ class Dataset(DatasetPaths):
             f"{self.folder}/sha256sums.txt",
             *_paths(self.splits),
             *self.published,
+            *self.sequence_exports,
             *self.pictures,
             self.costs,
             self.page,

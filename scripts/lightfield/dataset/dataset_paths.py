@@ -6,7 +6,7 @@ from lightfield.dataset import passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST
-from lightfield.dataset.names import VIEWS
+from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
@@ -112,6 +112,8 @@ class DatasetPaths(Description):
         """The file of each export and source that its job writes last."""
         files = []
         for name, export in self.exports.selected.items():
+            if export.is_of_sequence:
+                continue
             file = "transforms.json" if name == "instant_ngp" else f"exports/{name}/{MANIFEST}"
             for source in export.sources:
                 folder = self.folder if source == VIEWS else f"{self.folder}/{source}"
@@ -119,9 +121,29 @@ class DatasetPaths(Description):
         return files
 
     @property
+    def rig_home(self) -> str:
+        """The rig's folder. In a sequence it holds the folders of the frames."""
+        return f"{self.results_root}/{self.scene_folder}/{self.rig_name}"
+
+    @property
+    def sequence_exports(self) -> list[str]:
+        """The list of each export that is made of the whole sequence, which all frames share."""
+        return [
+            f"{self.rig_home}/{'' if source == VIEWS else f'{source}/'}exports/{name}/{MANIFEST}"
+            for name, export in self.exports.selected.items()
+            if export.is_of_sequence
+            for source in export.sources
+        ]
+
+    @property
+    def mesh_list(self) -> list[str]:
+        """The file in which the mesh's job lists its files, if the dataset has meshes."""
+        return [f"{self.folder}/{MESH}/{MANIFEST}"] if self.mesh else []
+
+    @property
     def export_lists(self) -> list[str]:
         """All files in which exports list their files. With a split, each part has one, too."""
-        lists = self.exported
+        lists = [*self.exported, *self.mesh_list]
         if self.rig.split:
             for path in self.exported:
                 if not path.endswith(MANIFEST):
@@ -137,7 +159,7 @@ class DatasetPaths(Description):
     @property
     def published(self) -> list[str]:
         """The files that have a job each: all but views and reports."""
-        return [*self.lightfields, *self.exported]
+        return [*self.lightfields, *self.exported, *self.mesh_list]
 
     @property
     def pictures(self) -> list[str]:

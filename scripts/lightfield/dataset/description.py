@@ -32,6 +32,7 @@ class Description(Capture):
     rig_folder: str
     reprojections: dict[str, config.Reprojection]
     flow: config.Flow | None
+    mesh: config.MeshFiles | None
     exports: Exports
     # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool

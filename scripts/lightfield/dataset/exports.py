@@ -39,6 +39,8 @@ class Export(Settings):
 
     # Whether the export includes other rigs' views that test what is trained on these.
     is_for_training: ClassVar[bool] = False
+    # Whether the export is made of all frames of a sequence.
+    is_of_sequence: ClassVar[bool] = False
 
     sources: list[str] = Field(
         min_length=1,
@@ -64,6 +66,8 @@ class Export(Settings):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
+        if self.is_of_sequence and (rig.sequence is None or len(rig.sequence.numbers) < 2):
+            return "has no two frames, and the export is of a sequence; give it frames"
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
             return "has one view, so none is left to test with"
         return None
@@ -323,6 +327,72 @@ class LichtFeld(Developed):
         return NO_DEPTH if self.depth and not has_depth else None
 
 
+class Dnerf(Developed):
+    """D-NeRF's layout of a sequence: NeRF's synthetic layout with a time for each picture."""
+
+    is_for_training: ClassVar[bool] = True
+    is_of_sequence: ClassVar[bool] = True
+
+    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return _centred_pinhole(lens)
+
+
+class Neural3dVideo(Developed):
+    """The layout of Neural 3D Video: a video for each camera, and LLFF's poses_bounds.npy."""
+
+    is_for_training: ClassVar[bool] = True
+    is_of_sequence: ClassVar[bool] = True
+
+    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+    rate: float = Field(
+        30, gt=0, le=1000, description="Frames a second.", json_schema_extra={"unit": "Hz"}
+    )
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if shutil.which("ffmpeg") is None:
+            return "is to be a video, for which ffmpeg must be installed"
+        return _centred_pinhole(lens) or _odd_size_refusal(lens)
+
+
+class ColmapFrames(Colmap):
+    """A COLMAP model for each frame of a sequence, for SpacetimeGaussians."""
+
+    is_of_sequence: ClassVar[bool] = True
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if not isinstance(lens, Rectilinear):
+            return f"is not a pinhole, the only camera of SpacetimeGaussians; {TO_RECTILINEAR}"
+        return super().refusal(lens, has_depth)
+
+
+class SceneFlow(Export):
+    """How far each surface moves in the world from one frame to the next."""
+
+    is_of_sequence: ClassVar[bool] = True
+
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        return ("motion",)
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return None if has_depth else NO_DEPTH
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if rig.sequence and rig.sequence.step != 1:
+            return "leaves out frames, but the pass motion leads to the very next; give it step: 1"
+        return super().rig_refusal(rig)
+
+
+class Coco(Export):
+    """COCO's list of the objects in each view, with their boxes."""
+
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        return ("object",)
+
+
 class PosesCsv(Export):
     """A table of poses: name, position, rotation."""
 
@@ -355,6 +425,17 @@ class Exports(Settings):
         None, description="For gsplat and 3DGRUT: NCore v4, fisheyes past 180° too."
     )
     lichtfeld: LichtFeld | None = Field(None, description="For LichtFeld Studio.")
+    coco: Coco | None = Field(None, description="For detectors: the boxes of objects in the views.")
+    dnerf: Dnerf | None = Field(None, description="A sequence, for D-NeRF and 4DGaussians.")
+    neural_3d_video: Neural3dVideo | None = Field(
+        None, description="A sequence, for readers of Neural 3D Video."
+    )
+    colmap_frames: ColmapFrames | None = Field(
+        None, description="A sequence, for SpacetimeGaussians."
+    )
+    scene_flow: SceneFlow | None = Field(
+        None, description="A sequence: the motion of surfaces in the world."
+    )
     poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
     point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 
@@ -390,6 +471,9 @@ class ExportSettings(Settings, Generic[Options]):
     suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the views.")
     tested_by: dict[str, str] = Field(
         {}, description="Folders of the rigs' datasets whose views test what is trained on these."
+    )
+    frames: list[str] | None = Field(
+        None, min_length=2, description="Folders of a sequence's frames in the rig's folder."
     )
     trained_by: str | None = Field(
         None, description="The training views' transforms.json, which gives these views its scale."

@@ -56,6 +56,22 @@ class FreePlacesSettings(Settings):
     )
 
 
+class MeshSettings(Settings):
+    """The settings of scripts/surface.py."""
+
+    formats: list[Literal["glb", "ply"]] = Field(
+        ["glb", "ply"], min_length=1, description="As in the scene YAML."
+    )
+    frame: Frame | Literal["file"] = Field(1, description=f"{FILE}: the .blend's own frame.")
+    scene_name: str | None = Field(None, description="As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None, description="As in the scene YAML."
+    )
+    numbered: bool = Field(
+        False, description="Whether objects.json has the numbers of the passes object and instance."
+    )
+
+
 class FiguresSettings(Settings):
     """The settings of scripts/report_figures.py."""
 

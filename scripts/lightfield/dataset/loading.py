@@ -113,6 +113,7 @@ def scene_datasets(
                 rig=_rig_of(scene, name, written, preset, limits),
                 reprojections=reprojections,
                 flow=written.flow,
+                mesh=_mesh_of(name, written),
                 exports=_exports_of(rig, written, reprojections),
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
@@ -176,6 +177,12 @@ def _exports_of(
         belongs_elsewhere = is_tested_elsewhere and export.is_for_training
         exports[key] = None if belongs_elsewhere else export.model_copy(update={"sources": sources})
     return written.exports.model_copy(update=exports)
+
+
+def _mesh_of(name: str, written: config.Scene) -> config.MeshFiles | None:
+    """Return which meshes a rig's dataset holds, if any."""
+    mesh = written.mesh
+    return mesh if mesh and name in (mesh.rigs or written.rigs) else None
 
 
 def _has_panorama(rig: Rig, written: config.Scene) -> bool:

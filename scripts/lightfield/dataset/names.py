@@ -5,6 +5,9 @@ from pathlib import Path
 # The name of the rendered views among a dataset's reprojections.
 VIEWS = "views"
 
+# The folder of a dataset with the surface that its cameras can see.
+MESH = "mesh"
+
 # The formats of scripts/export.py. instant-ngp has a program of its own.
 EXPORTS = (
     "colmap",
@@ -16,9 +19,17 @@ EXPORTS = (
     "scannetpp",
     "ncore",
     "lichtfeld",
+    "coco",
     "poses_csv",
     "point_cloud",
+    "dnerf",
+    "neural_3d_video",
+    "colmap_frames",
+    "scene_flow",
 )
+
+# Those of them that are made of a whole sequence.
+SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "scene_flow")
 
 BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
 

@@ -8,11 +8,15 @@ instant-ngp's files lie beside the views, and have a program of their own.
 
 import importlib
 import shutil
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.exports import MANIFEST, Export
+from lightfield.dataset.lightfield import NAME
+from lightfield.dataset.names import MESH
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export import instant_ngp
 from lightfield.export.source import SourceDataset
@@ -31,24 +35,52 @@ def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dic
     reason = settings.refusal(source.lens, source.has_depth)
     if reason:
         raise UserError(f"{source.lightfield.path}: {reason}")
+    exporter = importlib.import_module(f"lightfield.export.{name}")
+    return replace_folder(
+        name,
+        settings.recorded,
+        folder,
+        lambda target: exporter.export(source, settings, target),
+        is_own=folder.resolve() == (source.dataset / source.name / FOLDER / name).resolve(),
+    )
+
+
+def replace_folder(
+    name: str,
+    options: Mapping[str, Any],
+    folder: Path,
+    write: Callable[[Path], None],
+    is_own: bool,
+) -> dict[str, str]:
+    """Let ``write`` fill ``folder``, and list its files in export.json. Return their SHA-256.
+
+    ``name`` and ``options`` are what export.json says of them. Replaces an earlier export. Leaves
+    no files behind if it fails. ``is_own`` says whether the folder is one of the workflow's, where
+    a killed run may have left an export without its export.json. Raises `UserError` if another
+    folder holds other files.
+    """
     # If the folder is a link, replace what it leads to, and keep the link.
     folder = folder.resolve()
-    # In the dataset's own exports, a killed run may have left an export without its export.json.
-    if folder != (source.dataset / source.name / FOLDER / name).resolve():
+    if not is_own:
         _check_replaceable(folder)
     shutil.rmtree(folder, ignore_errors=True)
     try:
-        importlib.import_module(f"lightfield.export.{name}").export(source, settings, folder)
+        write(folder)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
-    write_json(folder / MANIFEST, {"format": name, "options": settings.recorded, "files": files})
+    write_json(folder / MANIFEST, {"format": name, "options": options, "files": files})
     store = ViewStore.configured()
     if store:
         store.put_list(folder / MANIFEST, paths)
     return files
+
+
+def is_mesh_of_dataset(folder: Path) -> bool:
+    """Return whether ``folder`` is the one for the surface of a dataset."""
+    return folder.name == MESH and (folder.parent / NAME).is_file()
 
 
 def _check_replaceable(folder: Path) -> None:
@@ -87,4 +119,5 @@ def _pictures(path: Path) -> list[str]:
 MANIFESTS = [
     instant_ngp.MANIFEST,
     Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=_files),
+    Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=_files),
 ]

@@ -33,6 +33,7 @@ class SourceDataset:
 
     - ``beside``: the datasets of other rigs, by the rigs' names. Their views are test views for
       these. Their names begin with the rig's name: spiral_view_0000f.
+    - ``renamed``: if there are any, only these views in this order: new names and the views'.
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
     """
@@ -43,10 +44,16 @@ class SourceDataset:
     beside: Mapping[str, Path] = field(default_factory=dict)
     exposure: float = 0.0
     reinhard: float = 1.0
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def lightfield(self) -> LightField:
-        return self._read(self.name)
+        lightfield = self._read(self.name)
+        if not self.renamed:
+            return lightfield
+        by_name = {view.name: view for view in lightfield.views}
+        views = [replace(by_name[old], name=new) for new, old in self.renamed.items()]
+        return lightfield.changed(views=views)
 
     @cached_property
     def rendered(self) -> LightField:
@@ -74,14 +81,16 @@ class SourceDataset:
         return self.suffix == ".exr" and self.lightfield.depth is not None
 
     def path(self, view: View) -> Path:
-        return self._path(view, self.name or "exr", self.suffix)
+        name = self.renamed.get(view.name, view.name)
+        return self._path(name, self.name or "exr", self.suffix)
 
     def pass_path(self, view: View, name: str) -> Path:
         """Return the file of a view's pass. It may be missing."""
-        return self._path(view, f"{self.name}/{name}" if self.name else name, ".exr")
+        folder = f"{self.name}/{name}" if self.name else name
+        return self._path(self.renamed.get(view.name, view.name), folder, ".exr")
 
-    def _path(self, view: View, folder: str, suffix: str) -> Path:
-        dataset, name = self._homes.get(view.name, (self.dataset, view.name))
+    def _path(self, view_name: str, folder: str, suffix: str) -> Path:
+        dataset, name = self._homes.get(view_name, (self.dataset, view_name))
         return dataset / folder / f"{name}{suffix}"
 
     @cached_property
@@ -182,8 +191,9 @@ class SourceDataset:
         rays = self.rendered.lens.pixel_rays()
         for view in views:
             # The name of a cube map's face begins with its view's: view_0000f_l.
-            rendered = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
-            path = self._path(rendered, "exr", ".exr")
+            name = self.renamed.get(view.name, view.name)
+            rendered = by_name.get(name) or by_name[name.rpartition("_")[0]]
+            path = self._path(rendered.name, "exr", ".exr")
             distance = depth_of(path, self.rendered, rays, "distance")
             yield view, Surface(self.rendered.lens, rendered, rays, distance)
 

@@ -1,4 +1,7 @@
-"""Flow between two views of a still scene: where one view shows what the other shows."""
+"""Flow between two views: where one view shows what the other shows.
+
+Either the scene stands still and the cameras differ, or one camera sees the scene at two frames.
+"""
 
 import numpy as np
 
@@ -11,6 +14,10 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 HIDDEN = 0.01
 # Two cameras are equally near if their distances differ by less than this part.
 AS_NEAR = 1e-6
+# A surface is followed if its way there and back ends within this many pixels.
+RETURNS = 0.5
+# The pixels around a point belong to one surface if their distances differ by less than this part.
+SAME_SURFACE = 0.1
 
 
 def neighbours(matrices: Array) -> list[int]:
@@ -66,6 +73,71 @@ def flow(
     motion = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
     motion[..., 0] = shorter(lens, motion[..., 0])
     return motion, visible
+
+
+def scene_flow(
+    lens: Lens,
+    matrix: Array,
+    distance: Array,
+    motion: Array,
+    next_distance: Array,
+    next_motion: Array,
+) -> tuple[Array, Array]:
+    """Return how far (h, w, 3) the surface at each pixel moves in the world, and where it is known.
+
+    Flow is in metres, from one frame to the next, and 0 where it is not known. The camera at
+    ``matrix`` (4, 4) stands still. The distances (h, w) are along the ray, in metres, at the two
+    frames. ``motion`` (h, w, 2) is the way in pixels to the surface's place in the next frame, and
+    ``next_motion`` that of the next frame back to this one.
+
+    The surface is at the distance that the next frame has around its new place. 1/distance is
+    interpolated there, which is linear on a plane. Flow is not known where
+
+    - a ray hits nothing, or the surface leaves the frame;
+    - another surface hides it in the next frame, so that the way back leads elsewhere;
+    - the four pixels around its new place are not of one surface.
+    """
+    height, width = distance.shape
+    pixels = np.indices((height, width))[::-1].transpose(1, 2, 0) + 0.5
+    target = pixels + motion
+    is_known = np.isfinite(distance)
+    inverse = np.zeros((height, width))
+    nearest = np.full((height, width), np.inf)
+    farthest = np.zeros((height, width))
+    # The centre of the pixel to the upper left, and the parts of the way to its neighbours.
+    corner = np.floor(target - 0.5)
+    parts = target - 0.5 - corner
+    back = np.zeros((height, width, 2))
+    for right in (0, 1):
+        for down in (0, 1):
+            column, row, inside = _pixel(lens, corner + np.array([right, down]))
+            around = np.where(inside, next_distance[row, column], np.inf)
+            weights = np.abs(parts - (1 - right, 1 - down)).prod(axis=-1)
+            # A pixel without weight does not matter: the last column has none to its right.
+            matters = weights > 0
+            is_known &= ~matters | np.isfinite(around)
+            nearest = np.where(matters, np.fmin(nearest, around), nearest)
+            farthest = np.where(matters, np.fmax(farthest, around), farthest)
+            inverse += weights / np.where(matters, around, 1)
+            back += weights[..., None] * next_motion[row, column]
+    returned = motion + back
+    returned[..., 0] = shorter(lens, returned[..., 0])
+    is_known &= np.linalg.norm(returned, axis=-1) < RETURNS
+    is_known &= farthest < (1 + SAME_SURFACE) * nearest
+    rays = lens.rays(target[..., 0], target[..., 1])
+    is_known &= np.isfinite(rays).all(axis=-1)
+    before = lens.pixel_rays() * np.where(is_known, distance, 0)[..., None]
+    after = rays * np.where(is_known, 1 / np.where(inverse > 0, inverse, 1), 0)[..., None]
+    return np.where(is_known[..., None], (after - before) @ matrix[:3, :3].T, 0), is_known
+
+
+def _pixel(lens: Lens, place: Array) -> tuple[Array, Array, Array]:
+    """Return the column and row of pixels (h, w, 2), and which are in the frame."""
+    column, row = np.moveaxis(place, -1, 0).astype(int)
+    if isinstance(lens, Equirectangular) and lens.is_full:
+        column = column % lens.width
+    inside = (column >= 0) & (column < lens.width) & (row >= 0) & (row < lens.height)
+    return column.clip(0, lens.width - 1), row.clip(0, lens.height - 1), inside
 
 
 def shorter(lens: Lens, across: Array) -> Array:

@@ -11,16 +11,27 @@ from lightfield.imaging.pictures import Array
 
 
 @contextmanager
-def video(path: Path, size: tuple[int, int], rate: int) -> Iterator[Callable[[Array], None]]:
+def video(
+    path: Path,
+    size: tuple[int, int],
+    rate: float,
+    rate_factor: int = 18,
+    is_reproducible: bool = False,
+) -> Iterator[Callable[[Array], None]]:
     """Yield a function that appends a picture to an MP4 (H.264) of ``size`` (w, h).
 
-    Pictures are sRGB, (h, w, 3) uint8. The file appears when the block ends without an error.
-    Raises `UserError` if ffmpeg is missing, or cannot write the file.
+    Pictures are sRGB, (h, w, 3) uint8. ``rate_factor`` is H.264's constant rate factor: a smaller
+    one loses less. The bytes depend on the number of processors, unless ``is_reproducible``. The
+    file appears when the block ends without an error. Raises `UserError` if ffmpeg is missing, or
+    cannot write the file.
     """
     command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
     command += ["-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
     # H.264 codes 2 × 2 pixels at once.
-    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18"]
+    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264"]
+    command += ["-crf", str(rate_factor)]
+    if is_reproducible:
+        command += ["-threads", "1", "-bitexact"]
     command += ["-pix_fmt", "yuv420p", "-f", "mp4"]
     with atomic_path(path) as temporary:
         try:

@@ -109,17 +109,22 @@ def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
     """Return by name the number, the object's index, and whether it is an instance."""
     entries = {}
     for entry in depsgraph.object_instances:
-        obj = entry.object.original
-        if has_no_surface(obj):
-            continue
-        name = str(obj.name_full)
-        number = int(obj.pass_index)
-        if entry.is_instance:
-            places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
-            name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
-            number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
-        entries[name] = (number, int(obj.pass_index), bool(entry.is_instance))
+        if not has_no_surface(entry.object.original):
+            name, number, index = name_and_numbers(entry)
+            entries[name] = (number, index, bool(entry.is_instance))
     return entries
+
+
+def name_and_numbers(entry: Any) -> tuple[str, int, int]:
+    """Return the name, the number and the object's index of an entry of a dependency graph."""
+    obj = entry.object.original
+    name = str(obj.name_full)
+    index = int(obj.pass_index)
+    if not entry.is_instance:
+        return name, index, index
+    places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
+    name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
+    return name, min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST), index
 
 
 def decoded(passes: dict[str, Array], objects: Array) -> Array:

@@ -20,6 +20,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.config import Credits
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.names import SEQUENCE_EXPORTS
 from lightfield.dataset.passes import PASSES
 from lightfield.export import transforms
 from lightfield.imaging import images
@@ -46,7 +47,13 @@ LOADERS = {
     "ncore": "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
     " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat",
     "lichtfeld": "LichtFeld-Studio --data-path {} --output-path output",
+    "dnerf": "python train.py -s {} --configs arguments/dnerf/lego.py  # 4DGaussians",
+    "neural_3d_video": "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians",
+    "colmap_frames": "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians",
+    "scene_flow": "import OpenEXR\nflow = OpenEXR.File('{}/{frame}/{view}.exr').channels()",
+    "coco": "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')",
     "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
+    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')",
     "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
 }
 
@@ -80,7 +87,7 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
         "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
         "software": f"Cycles in bpy {bpy}" if bpy else None,
         "cite": [SILVR, *([scene.credit] if scene.credit else [])],
-        "loaders": dict(_loaders(first, view)),
+        "loaders": dict([*_loaders(first, view), *_loaders_of_sequence(folder, first)]),
     }
 
 
@@ -91,11 +98,30 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
         place = path.parent.relative_to(folder).as_posix()
         yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
     for path in sorted(folder.rglob(MANIFEST)):
-        place = path.parent.relative_to(folder).as_posix()
+        yield _loader(path, folder)
+
+
+def _loaders_of_sequence(folder: Path, first: Path) -> Iterator[tuple[str, str]]:
+    """Yield each export of a whole sequence, and how to load it.
+
+    ``first`` is the folder of the first frame. It is ``folder`` itself if there is no sequence.
+    """
+    if first == folder:
+        return
+    lists = [*folder.glob(f"exports/*/{MANIFEST}"), *folder.glob(f"*/exports/*/{MANIFEST}")]
+    for path in sorted(lists):
         name = read_keys(path, "export.py", "format")["format"]
-        if name not in LOADERS:
-            raise UserError(f"{path}: format: is {name!r}; must be one of {', '.join(LOADERS)}")
-        yield place, LOADERS[name].replace("{}", place)
+        if name in SEQUENCE_EXPORTS:
+            yield _loader(path, folder)
+
+
+def _loader(path: Path, folder: Path) -> tuple[str, str]:
+    """Return the place of an export in ``folder``, and how to load it. ``path`` is its list."""
+    place = path.parent.relative_to(folder).as_posix()
+    name = read_keys(path, "export.py", "format")["format"]
+    if name not in LOADERS:
+        raise UserError(f"{path}: format: is {name!r}; must be one of {', '.join(LOADERS)}")
+    return place, LOADERS[name].replace("{}", place)
 
 
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:

@@ -17,6 +17,7 @@ from lightfield.core.settings import MEANINGS
 from lightfield.dataset import config, exports, job_settings, publication, reprojections
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.json_schema import Generator
+from lightfield.dataset.names import SEQUENCE_EXPORTS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
@@ -93,6 +94,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene", config.SceneSource),
             Section("scene: parameters", config.Parameters),
             Section("flow", config.Flow),
+            Section("mesh", config.MeshFiles),
             Section("report", config.Report),
             Section("publish", publication.Publication),
             Section("publish: a creator", publication.Creator),
@@ -151,8 +153,18 @@ KEY_PAGES: dict[str, Page] = {
             Section("exports", exports.Exports),
             Section("All exports", exports.Export),
             Section("Exports of pictures", exports.Developed, exports.Export),
-            *[_export_section(name) for name in exports.Exports.model_fields],
+            *[
+                _export_section(name)
+                for name in exports.Exports.model_fields
+                if name not in SEQUENCE_EXPORTS
+            ],
         ],
+    ),
+    "sequence-export-keys.md": Page(
+        "The keys of exports of a sequence",
+        "These entries of `exports` in a scene YAML write one export of all frames of a rig "
+        "with `frames`. [How to train on a sequence](../how-to/train-on-a-sequence.md).",
+        [Section(name, exports.settings_of(name)) for name in SEQUENCE_EXPORTS],
     ),
     "job-keys.md": Page(
         "The keys of the programs' settings files",
@@ -163,6 +175,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("build_scene.py", job_settings.BuildSettings),
             Section("make_lightfield.py", LightfieldSettings),
             Section("free_places.py", job_settings.FreePlacesSettings),
+            Section("surface.py", job_settings.MeshSettings),
             Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
@@ -171,6 +184,13 @@ KEY_PAGES: dict[str, Page] = {
             Section("report_figures.py", job_settings.FiguresSettings),
             Section("report_html.py", job_settings.PageSettings),
             Section("report_html.py: measurements", job_settings.Measurement),
+        ],
+    ),
+    "measurement-keys.md": Page(
+        "The keys of the settings files of measurements",
+        "These programs measure or estimate something, and read a "
+        "[settings file](job-keys.md) like the others.",
+        [
             Section("synthesis_quality.py", job_settings.SynthesisSettings),
             Section("costs.py", CostSettings),
             Section("costs.py: full_size", FullSize),
@@ -178,6 +198,9 @@ KEY_PAGES: dict[str, Page] = {
         ],
     ),
 }
+
+# The pages of the programs' settings files.
+JOB_PAGES = ("job-keys.md", "measurement-keys.md")
 
 # The programs of each page, in the order of the pages.
 PROGRAM_PAGES = {
@@ -202,7 +225,7 @@ PROGRAM_PAGES = {
     "programs-export.md": (
         "Programs that export",
         "These programs make other files of finished views.",
-        ["flow", "splits", "export", "export_instant_ngp", "synthesize"],
+        ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     ),
     "programs-publish.md": (
         "Programs that publish and fetch",
@@ -248,12 +271,13 @@ def link_targets() -> dict[str, str]:
     targets = {
         schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
         for file, page in KEY_PAGES.items()
-        if file != "job-keys.md"
+        if file not in JOB_PAGES
         for section in page.sections
     }
     jobs = {
-        schema_of(section.model)["title"]: f"job-keys.md#{slug(section.title)}"
-        for section in KEY_PAGES["job-keys.md"].sections
+        schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
+        for file in JOB_PAGES
+        for section in KEY_PAGES[file].sections
     }
     # A scene YAML's `rigs` may be any of these.
     any_rig = {schema_of(model)["title"]: "rig-type-keys.md" for model in RIG_MODELS}
@@ -439,11 +463,17 @@ def page_of_keys(page: Page, table: Table) -> str:
     lines = [f"# {page.title}", "", NOTE, "", page.text, ""]
     for section in page.sections:
         lines += [f"## {section.title}", ""]
-        first = (section.model.__doc__ or "").partition("\n\n")[0]
-        if first and not first.startswith("The settings of scripts/"):
-            lines += [escaped(first), ""]
+        text = (section.model.__doc__ or "").partition("\n\n")[0]
+        if text.startswith("The settings of scripts/"):
+            text = ""
         rows = table.of(section)
-        lines += [*rows, ""] if len(rows) > 2 else ["It has no keys of its own.", ""]
+        has_keys = len(rows) > 2
+        if not has_keys:
+            text = f"{text} It has no keys of its own.".strip()
+        if text:
+            lines += [escaped(text), ""]
+        if has_keys:
+            lines += [*rows, ""]
     return "\n".join(lines)
 
 

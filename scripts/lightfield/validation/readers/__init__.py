@@ -17,10 +17,12 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.dataset.exports import MANIFEST
 from lightfield.validation.readers import (
+    coco,
     colmap,
     hci,
     instant_ngp,
     lichtfeld,
+    mesh,
     miv,
     ncore,
     nerf_synthetic,
@@ -33,9 +35,11 @@ from lightfield.validation.readers import (
 from lightfield.validation.readers.contents import Exported
 
 READERS = {
+    "coco": coco.read,
     "colmap": colmap.read,
     "hci": hci.read,
     "lichtfeld": lichtfeld.read,
+    "mesh": mesh.read,
     "miv": miv.read,
     "ncore": ncore.read,
     "nerf_synthetic": nerf_synthetic.read,
