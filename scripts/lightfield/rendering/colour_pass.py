@@ -97,7 +97,12 @@ def _composed(view_pass: Pass, passes: Mapping[str, Array]) -> Array:
     if view_pass.kind == "matte":
         return np.concatenate(parts, axis=-1)
     total = np.sum(parts, axis=0)
-    return np.asarray(total * passes[view_pass.factor] if view_pass.factor else total)
+    if view_pass.factor:
+        total = total * passes[view_pass.factor]
+    if view_pass.without:
+        # Rounding may leave a little less than nothing.
+        total = np.maximum(total - passes[view_pass.without], 0)
+    return np.asarray(total)
 
 
 def _manifest(attributes: Mapping[str, Attribute]) -> dict[str, str]:

@@ -24,7 +24,7 @@ from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_ma
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.geometry import Target
-from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.job import Job, Light, SourceView
 from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
@@ -58,6 +58,8 @@ class SourcePixels:
         high = np.max(windows, axis=0)
         self.rows = (int(low[0]), int(high[1]))
         self.columns = (int(low[2]), int(high[3]))
+        self._job = job
+        self._view = view
         faces = [self._read(job, path) for path in view.paths]
         self.colour = _side_by_side([face.colour for face in faces])
         depths = [face.depth for face in faces if face.depth is not None]
@@ -66,6 +68,19 @@ class SourcePixels:
         # Trust the file first: another program may have written the lightfield.json.
         meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
+
+    def light_up(self, light: Light) -> None:
+        """Replace the colour by the sum of the light groups with the weights of a light."""
+        if light.weights is None:
+            return
+        total = np.zeros((*self.colour.shape[:2], 3), np.float32)
+        for group, weights in light.weights.items():
+            if any(weights):
+                path = self._job.group_path(self._view, group)
+                pixels = read_image(path, "RGB", self.rows).colour
+                total += pixels[:, slice(*self.columns)] * np.array(weights, np.float32)
+        # Pixels without a source stay so.
+        self.colour[..., :3] = np.where(np.isnan(self.colour[..., :3]), np.nan, total)
 
     def _read(self, job: Job, path: Path) -> _Face:
         lens = job.source.face if isinstance(job.source, CubeMap) else job.source
