@@ -19,6 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
+from lightfield.report import lights as light_pictures
 from lightfield.report.packing import webp
 from lightfield.validation.files import IMAGES, REPORT, SUMS
 
@@ -61,6 +62,9 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     validation = tables.validation(folder / "validation.json")
     packed = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]
+    lights = light_pictures.collect(folder, lightfield, middle, packed.data["exposure"])
+    if lights:
+        packed.data["lights"] = lights
     report = folder / REPORT
     measurements = _measurements(origin, folder, lightfield)
     page.write(
@@ -75,6 +79,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(origin, lightfield),
         packed=packed,
+        lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
         passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
