@@ -15,6 +15,11 @@ from lightfield.dataset import light_groups
 # The names of the passes of light groups begin so, here and in Cycles.
 GROUP_PREFIX = "Combined_"
 
+# The names of passes that materials write begin so in Cycles. In INEXACT a surface writes 1 if it
+# is not one opaque Principled BSDF.
+AOV_PREFIX = "plenoforge_"
+INEXACT = f"{AOV_PREFIX}inexact"
+
 # The JSON beside images of ids, which maps names to ids.
 NAMES = "names.json"
 
@@ -31,7 +36,8 @@ class Pass:
     - "motion" and "flow": not at all, because they are in pixels of their own lens.
 
     Its values are the sum of the Cycles passes ``cycles``, times the Cycles pass ``factor`` if it
-    has one, less the Cycles pass ``without`` if it has one. A matte has them side by side. Light,
+    has one, less the Cycles pass ``without`` if it has one. They are 0 where the Cycles pass
+    ``unless`` is not. A matte has them side by side. Light,
     values and mattes are means over all samples. Other passes describe the surface at the pixel's
     centre, as depth does.
     """
@@ -44,6 +50,7 @@ class Pass:
     cycles: tuple[str, ...]
     factor: str | None = None
     without: str | None = None
+    unless: str | None = None
 
     @property
     def of_colour(self) -> bool:
@@ -53,7 +60,7 @@ class Pass:
     @property
     def needed(self) -> tuple[str, ...]:
         """All Cycles passes that it is computed from."""
-        others = [name for name in (self.factor, self.without) if name]
+        others = [name for name in (self.factor, self.without, self.unless) if name]
         return (*self.cycles, *others)
 
     @property
@@ -100,6 +107,18 @@ def _scattered(name: str) -> Pass:
     )
 
 
+def _surface(name: str, meaning: str, is_colour: bool = False) -> Pass:
+    return Pass(
+        name,
+        "light" if is_colour else "value",
+        ("R", "G", "B") if is_colour else ("Y",),
+        "float16",
+        meaning,
+        (f"{AOV_PREFIX}{name}",),
+        unless=INEXACT,
+    )
+
+
 _ALL_PASSES = (
     Pass(
         "normal",
@@ -129,6 +148,20 @@ _ALL_PASSES = (
     _light("volume_light", "light scattered by volumes", "Volume Direct", "Volume Indirect"),
     _light("emission", "light that the surface itself emits", "Emission"),
     _light("environment", "light of the world, seen directly", "Environment"),
+    _surface("base_colour", "base colour of surfaces of one Principled BSDF", is_colour=True),
+    _surface("roughness", "roughness of surfaces of one Principled BSDF"),
+    _surface("metallic", "how metallic surfaces of one Principled BSDF are"),
+    _surface("transmission", "transmission weight of surfaces of one Principled BSDF"),
+    _surface(
+        "surface_emission",
+        "emission colour times strength of surfaces of one Principled BSDF",
+        is_colour=True,
+    ),
+    _surface(
+        "surface_mask",
+        "the part of the pixel whose surface is one opaque Principled BSDF; 0 beside any other "
+        "surface",
+    ),
 )
 PASSES = {view_pass.name: view_pass for view_pass in _ALL_PASSES}
 

@@ -10,7 +10,7 @@ from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
-from lightfield.dataset.passes import GROUP_PREFIX, Pass
+from lightfield.dataset.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import (
     animation,
@@ -20,6 +20,7 @@ from lightfield.rendering import (
     instances,
     light_groups,
     pruning,
+    surfaces,
     volumes,
 )
 
@@ -38,7 +39,7 @@ SAMPLING = {
 
 # The names of passes that a scene has only once they are added to it begin so: those of light
 # groups, and what materials write.
-ADDED_PASSES = (GROUP_PREFIX, "plenoforge_")
+ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
 
 # The passes of Cycles that make up a view's geometry, and their channels.
 GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
@@ -79,6 +80,7 @@ def set_up(
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
+    surfaces.set_up(view_layer(scene), passes)
     if groups := lightfield.render.get("light_groups"):
         light_groups.set_up(view_layer(scene), groups)
     _use_device(scene, device)

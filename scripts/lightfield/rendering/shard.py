@@ -348,7 +348,8 @@ def pass_channels(
         return named, passes.matte_header(colour.manifest)
     if view_pass.of_colour:
         channels, attributes = colour_channels(colour.passes[view_pass.name])
-        return {name: np.nan_to_num(plane, nan=0) for name, plane in channels.items()}, attributes
+        planes = [np.nan_to_num(plane, nan=0) for plane in channels.values()]
+        return dict(zip(view_pass.channels, planes, strict=True)), attributes
     assert geometry
     attributes = {}
     match view_pass.name:

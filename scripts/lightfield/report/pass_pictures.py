@@ -47,11 +47,13 @@ def collect(
 def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
     """Return a pass's pixels (height, width, channels) as 8-bit sRGB (height, width, 3)."""
     match view_pass.kind:
-        case "light" if view_pass.name == "albedo":
-            # Albedo lies between 0 and 1, so it needs no exposure.
+        case "light" if view_pass.name in ("albedo", "base_colour"):
+            # These lie between 0 and 1, so they need no exposure.
             return to_8_bit(np.ascontiguousarray(pixels, np.float32))
         case "light":
             return pictures.develop(pixels.astype(np.float32), exposure)
+        case "value":
+            colours = np.repeat(pixels.astype(np.float32), 3, axis=-1)
         case "normal":
             colours = np.where(pixels.any(axis=-1, keepdims=True), pixels / 2 + 0.5, 0)
         case "id":

@@ -46,8 +46,11 @@ def _resampled_channels(
     if view_pass.kind == "normal":
         length = np.linalg.norm(pixels, axis=-1, keepdims=True)
         pixels = np.divide(pixels, length, out=np.zeros_like(pixels), where=length > 1e-6)
-    elif view_pass.kind in ("light", "value"):
+    elif view_pass.kind == "light":
         pixels = pixels.clip(-HALF_MAX, HALF_MAX)
+    elif view_pass.kind == "value":
+        # A filter may overshoot at edges.
+        pixels = pixels.clip(0, 1)
     resampled_planes = np.moveaxis(pixels.astype(view_pass.dtype), -1, 0)
     return dict(zip(view_pass.channels, resampled_planes, strict=True))
 
