@@ -36,11 +36,13 @@ def main() -> None:
         capture = capture.resolved(arguments.inventory)
     elif capture.source.blend:
         raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
-    render = with_groups(capture.render, arguments.inventory)
+    render = capture.render
     if settings.panorama_width:
         capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
         render = passes.without(render)
-    elif isinstance(capture.rig, rigs.Random):
+    else:
+        render = with_groups(render, arguments.inventory)
+    if isinstance(capture.rig, rigs.Random):
         if arguments.places is None:
             raise UserError("--places: is missing; scripts/free_places.py writes it")
         capture = replace(capture, rig=capture.rig.placed(arguments.places))

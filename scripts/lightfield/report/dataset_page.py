@@ -11,7 +11,7 @@ import numpy as np
 from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import FLOW
+from lightfield.dataset.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
@@ -234,10 +234,12 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
-    passes = [*lightfield.passes]
+    passes = [each for each in lightfield.passes if not is_group(each)]
     if lightfield.views[0].flow:
         passes.append(FLOW)
     meanings += [(f"{view_pass.name}/", view_pass.meaning) for view_pass in passes]
+    if lightfield.light_groups:
+        meanings.append((f"{GROUP_PREFIX}*/", "the light of each light group; the sum is the view"))
     if (folder.parent / SPLITS).is_file():
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):

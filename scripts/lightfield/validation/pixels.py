@@ -53,6 +53,7 @@ class Facts:
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
     - ``sum_error``: by which part of the colour the sum of the light groups differs from it.
+    - ``not_summed``: why the light groups need not add up to the colour.
     - ``of_depth``: the answer to the question about its depth.
     """
 
@@ -67,6 +68,7 @@ class Facts:
     missed: float = 0.0
     patches: Patches | None = None
     sum_error: float | None = None
+    not_summed: str | None = None
     of_depth: depth_questions.Answer | None = None
 
     def fault(self, check: str, text: str, is_fault: bool | int = True) -> None:
@@ -174,16 +176,18 @@ class Examiner:
         self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
     ) -> None:
         """Compare the sum of a view's light groups with its colour."""
-        source = rendered(self.sets) if image_set.name else None
+        rendered_set = rendered(self.sets) if image_set.name else None
+        source = rendered_set.lightfield if rendered_set else None
         lightfield = image_set.lightfield
-        if light_sums.reason_against(lightfield, source.lightfield if source else None):
+        facts.not_summed = light_sums.reason_against(lightfield, source)
+        if facts.not_summed:
             return
         colour = np.stack([image.channels[name] for name in "RGB"])
         folder = self.dataset / image_set.name
         view = image_set.views[file.view]
         facts.sum_error = light_sums.error(folder, view, lightfield.light_groups, colour)
         if facts.sum_error is not None:
-            is_off = not facts.sum_error <= light_sums.MOST_OFF
+            is_off = not facts.sum_error <= light_sums.most_off(lightfield, source)
             text = f"the sum of the light groups is off by {facts.sum_error:.2g} of the colour"
             facts.fault("light_groups", text, is_off)
 
@@ -209,7 +213,7 @@ class Examiner:
         if not shows_nothing and _has_one_colour(colour, in_circle):
             depth = image.channels.get("Z")
             is_empty = depth is not None and bool(np.isposinf(depth).all())
-            facts.constant = not is_rendered
+            facts.constant = not is_rendered and not image_set.lightfield.is_relit
             facts.fault("colour", "has one colour everywhere", is_rendered and not is_empty)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
@@ -379,8 +383,11 @@ def checks(
 
 def _of_light_groups(image_set: ImageSet, facts: Mapping[File, Facts]) -> Check:
     """Return the check that the light groups of each view add up to its colour."""
+    reasons = {fact.not_summed for fact in facts.values() if fact.not_summed}
+    if reasons:
+        return Check(f"{image_set.prefix}light_groups", None, "; ".join(sorted(reasons)))
     summed = {file: fact for file, fact in facts.items() if fact.sum_error is not None}
-    claim = f"are the sum of their light groups, within {light_sums.MOST_OFF:g} of it"
+    claim = "are the sum of their light groups, within the rounding of halves"
     check = _outcome(image_set, "light_groups", summed, claim)
     errors = [fact.sum_error for fact in summed.values() if fact.sum_error is not None]
     if errors:
