@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from light_group_views import LENSES
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.config import Scene
+from lightfield.dataset.capture import LightfieldSettings
+from lightfield.dataset.config import Preset, Scene
 from lightfield.dataset.light_groups import names_in, resolved
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
@@ -330,3 +333,74 @@ def test_settings_without_light_groups_are_as_before():
 def test_impossible_lights_are_refused(more, problem):
     with pytest.raises(ValueError, match=re.escape(problem)):
         scene(**more)
+
+
+# The plan.
+
+
+def write_scene(folder, monkeypatch, **render):
+    """Write a scene YAML into a user's own folder, and return its only dataset."""
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 8, "light_groups": "each", **render},
+        "rigs": {"LFOne": {"type": "lattice", "cameras": [2, 1, 1], "camera": CAMERA}},
+        "relight": {"olat": "each"},
+    }
+    path = folder / "configs/scenes/lit.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(content))
+    monkeypatch.chdir(folder)
+    (dataset,) = scene_datasets("lit", "full", Preset(denoise=True))
+    return dataset
+
+
+def test_a_preset_does_not_denoise_light_groups(tmp_path, monkeypatch):
+    assert write_scene(tmp_path, monkeypatch).render["denoise"] is False
+
+
+def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch):
+    few, many = (
+        write_scene(tmp_path, monkeypatch, light_groups=[f"lamp {n}" for n in range(count)])
+        for count in (1, 100)
+    )
+    pixels = 16**2
+    more_memory = many.estimate.view_memory_bytes - few.estimate.view_memory_bytes
+    # At least Cycles' own buffers and halves.
+    assert more_memory > 99 * 12 * pixels
+    assert many.estimate.view_bytes > 10 * few.estimate.view_bytes
+    assert many.estimate.all_view_bytes - many.estimate.view_bytes > 10 * (
+        few.estimate.all_view_bytes - few.estimate.view_bytes
+    )
+
+
+@pytest.fixture
+def make_lightfield(tmp_path, monkeypatch, run_program):
+    """Return a function that runs make_lightfield.py on a scene with a group for each emitter."""
+
+    def run(*arguments, check=True, **keys):
+        dataset = write_scene(tmp_path, monkeypatch)
+        path = tmp_path / "settings.json"
+        write_json(path, LightfieldSettings.of_capture(dataset, **keys).as_json())
+        output = tmp_path / "lightfield.json"
+        arguments = ("--settings", path, "--output", output, *arguments)
+        result = run_program("make_lightfield.py", *arguments, check=check, cwd=tmp_path)
+        return json.loads(output.read_text())["render"] if output.exists() else result.stderr
+
+    return run
+
+
+def test_lightfield_json_names_the_emitters_of_each_group(make_lightfield, tmp_path):
+    write_json(tmp_path / "inventory.json", {"emitters": ["World", "Lamp.001"]})
+    render = make_lightfield("--inventory", tmp_path / "inventory.json")
+    assert render["light_groups"] == {"World": ["World"], "Lamp_001": ["Lamp.001"]}
+
+
+def test_light_groups_need_an_inventory_that_lists_the_emitters(make_lightfield, tmp_path):
+    message = "--inventory: is missing; scripts/inventory.py names the light groups"
+    assert message in make_lightfield(check=False)
+    write_json(tmp_path / "inventory.json", {})
+    assert "emitters" in make_lightfield("--inventory", tmp_path / "inventory.json", check=False)
+
+
+def test_a_panorama_of_the_page_has_no_light_groups(make_lightfield):
+    assert "light_groups" not in make_lightfield(panorama_width=64)
