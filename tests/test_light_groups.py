@@ -317,7 +317,7 @@ def test_settings_without_light_groups_are_as_before():
     ("more", "problem"),
     [
         ({"relight": {"night": {"lmp": 0}}}, "relight.night: there is no light group 'lmp'; did "),
-        ({"relight": {"each": {}}}, "reprojections.each: the name each is taken"),
+        ({"relight": {"each": {}}}, "relight.each: the name each is taken"),
         ({"reprojections": {"flat": {"relight": "nigt"}}, "relight": {"night": {}}}, "mean night?"),
         (
             {"relight": {"olat": "each"}, "exports": {"colmap": {"sources": ["olat"]}}},
@@ -404,3 +404,12 @@ def test_light_groups_need_an_inventory_that_lists_the_emitters(make_lightfield,
 
 def test_a_panorama_of_the_page_has_no_light_groups(make_lightfield):
     assert "light_groups" not in make_lightfield(panorama_width=64)
+
+
+def test_a_light_group_of_another_size_is_refused(develop, tmp_path):
+    folder = tmp_path / "rig"
+    dataset(folder)
+    write(folder, "Combined_sky", "view_0000f", np.ones((8, 8, 3)))
+    result = develop("night", {"lamp": 0}, check=False)
+    assert result.returncode and "Traceback" not in result.stderr
+    assert "Combined_sky/view_0000f.exr" in result.stderr

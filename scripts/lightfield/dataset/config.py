@@ -696,7 +696,11 @@ class Scene(Credits):
             if self.render.depth_of_field:
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
-            _check_name(f"reprojections.{name}", name, REPROJECTION_NEIGHBOURS)
+            block = "relight" if name in self.relight else "reprojections"
+            neighbours = REPROJECTION_NEIGHBOURS
+            if name.startswith(GROUP_PREFIX) or (block == "relight" and name == light_groups.EACH):
+                neighbours = {name}
+            _check_name(f"{block}.{name}", name, neighbours)
             self._check_reprojection(f"reprojections.{name}", reprojection)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
@@ -875,8 +879,7 @@ def _check_cube_map(key: str, rig: Rig) -> None:
 
 
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:
-    is_taken = name in neighbours or name.startswith(GROUP_PREFIX) or name == light_groups.EACH
-    if is_taken or OTHER_NEIGHBOURS.fullmatch(name):
+    if name in neighbours or OTHER_NEIGHBOURS.fullmatch(name):
         raise ValueError(f"{key}: the name {name} is taken; choose another")
 
 

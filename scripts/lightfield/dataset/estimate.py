@@ -122,7 +122,13 @@ class Estimate:
     def reprojection_seconds(self, name: str) -> float:
         """Return the seconds that one core takes to read and reproject a view."""
         read_pixels = self.dataset.pixels
-        return read_pixels * READ_SECONDS + self._reprojected_pixels(name) * REPROJECTION_SECONDS
+        made_pixels = self._reprojected_pixels(name)
+        light = self.dataset.reprojections[name].relight
+        if light is not None:
+            read_pixels *= 1 + self.light_group_count
+        if light == light_groups.EACH:
+            made_pixels *= self.light_group_count
+        return read_pixels * READ_SECONDS + made_pixels * REPROJECTION_SECONDS
 
     @property
     def import_seconds(self) -> float:

@@ -37,9 +37,8 @@ class Pass:
 
     Its values are the sum of the Cycles passes ``cycles``, times the Cycles pass ``factor`` if it
     has one, less the Cycles pass ``without`` if it has one. They are 0 where the Cycles pass
-    ``unless`` is not. A matte has them side by side. Light,
-    values and mattes are means over all samples. Other passes describe the surface at the pixel's
-    centre, as depth does.
+    ``unless`` is not. A matte has them side by side. Light, values and mattes are means over all
+    samples. Other passes describe the surface at the pixel's centre, as depth does.
     """
 
     name: str

@@ -218,7 +218,8 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
         suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
         sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), SHEET_QUALITY)
-        yield path.parent.name, lens.description, count, len(shown), sheet
+        title = f"{lens.description}{', relit' if lightfield.is_relit else ''}"
+        yield path.parent.name, title, count, len(shown), sheet
 
 
 def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, str]]:
@@ -243,9 +244,10 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
     if (folder.parent / SPLITS).is_file():
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):
-        lens = LightField.read(reprojection).lens.description
-        name = f"{reprojection.parent.name}/"
-        meanings.append((name, f"the same views through another lens: {lens}"))
+        reprojected = LightField.read(reprojection)
+        change = "under other lights" if reprojected.is_relit else "through another lens"
+        meaning = f"the same views {change}: {reprojected.lens.description}"
+        meanings.append((f"{reprojection.parent.name}/", meaning))
     meanings.append(("validation.json", "the checks and their results"))
     if valid:
         meanings.append((SUMS, f"checksums of all files: sha256sum -c {SUMS}"))

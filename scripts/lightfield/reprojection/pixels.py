@@ -8,13 +8,14 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.depth import with_precision
-from lightfield.geometry.lenses import Array
+from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
     Attribute,
+    Header,
     read_header,
     read_image,
     write_exr,
@@ -77,19 +78,16 @@ class SourcePixels:
         for group, weights in light.weights.items():
             if any(weights):
                 path = self._job.group_path(self._view, group)
-                pixels = read_image(path, "RGB", self.rows).colour
-                total += pixels[:, slice(*self.columns)] * np.array(weights, np.float32)
+                _check_size(path, read_header(path), self._job.source)
+                pixels = read_image(path, "RGB", self.rows).colour[:, slice(*self.columns)]
+                total += pixels * np.array(weights, np.float32)
         # Pixels without a source stay so.
         self.colour[..., :3] = np.where(np.isnan(self.colour[..., :3]), np.nan, total)
 
     def _read(self, job: Job, path: Path) -> _Face:
         lens = job.source.face if isinstance(job.source, CubeMap) else job.source
         header = read_header(path)
-        if (header.width, header.height) != (lens.width, lens.height):
-            raise UserError(
-                f"{path}: has {header.width} × {header.height} pixels; "
-                f"the lens expects {lens.width} × {lens.height}"
-            )
+        _check_size(path, header, lens)
         names = header.channels
         colours = "RGB" if {"R", "G", "B"} <= set(names) else "YYY"
         if colours[0] not in names:
@@ -117,6 +115,15 @@ class SourcePixels:
         columns = slice(column - self.columns[0], end_column - self.columns[0])
         colour = np.ascontiguousarray(self.colour[rows, columns])
         return colour, None if self.depth is None else self.depth[rows, columns]
+
+
+def _check_size(path: Path, header: Header, lens: Lens) -> None:
+    """Raise `UserError` if an image has not the size of a lens."""
+    if (header.width, header.height) != (lens.width, lens.height):
+        raise UserError(
+            f"{path}: has {header.width} × {header.height} pixels; "
+            f"the lens expects {lens.width} × {lens.height}"
+        )
 
 
 def _side_by_side(faces: list[Array]) -> Array:
