@@ -666,6 +666,11 @@ PROGRAMS = [
             ({"formats": ["png"], "exposur": 1}, "exposur: unknown key; did you mean exposure?"),
             ({"formats": ["png"], "exposure": 101}, "exposure: is 101; must be a number at most"),
             ({"formats": ["jpg"]}, "formats.[0]: is "),
+            (
+                {"formats": ["exr"], "relight": {"Lamp": -1}},
+                "relight.Lamp: is -1; must be a number",
+            ),
+            ({"formats": ["exr"], "relight": "all"}, 'relight: is "all"; must be each'),
             ({"formats": ["png"], "camera": CAMERA_OF_90 | {"fov": "90"}}, "camera.fov: is "),
             (
                 {"formats": ["png"], "camera": CAMERA_OF_90, "cube_map": True},
