@@ -4,6 +4,7 @@ Prints for each lens, of the first view:
 
 - sum: by how much the parts of light differ from the colour, relative to it, at most. "inside"
   leaves out the rim.
+- groups: the same of the light groups, of which each emitter has one, and the number of groups.
 - objects: the part of the pixels whose object is the one that Blender's ray casts hit.
 - mattes: the part of the pixels whose first Cryptomatte entry is that object.
 - depth: its relative difference from the ray casts' distance, median and 99th percentile.
@@ -15,6 +16,8 @@ Prints for each lens, of the first view:
 - lost inside: pixels that have no normal although they are not at a rim.
 - albedo of paint: albedo over paint, median, 5th and 95th percentile. It covers the surfaces
   that are nothing but painted, by Blender's nodes; painted is their part of the pixels.
+- base colour of paint: base_colour over paint, where surface_mask is 1 and the surface painted.
+- surfaces: the part of the pixels whose surface_mask is 1, and the part where it is not 0.
 - visible: the part of the pixels that a second view, 5 cm beside the first, also sees.
 - warped: the mean difference of albedo to that view, where flow leads; not warped: without flow.
 
@@ -39,13 +42,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core.cli import run
 from lightfield.dataset import keys
 from lightfield.dataset.journal import read
+from lightfield.dataset.light_groups import resolved
 from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES
+from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES, of_group
 from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
-from lightfield.rendering import shard
+from lightfield.rendering import blend_file, inventory, light, shard
 from lightfield.rendering.colour_pass import render_colour
 
 Array = np.ndarray[Any, Any]
@@ -67,6 +71,7 @@ STEPS = {
     "and instance": [*GEOMETRY, "motion", "instance"],
     "and cryptomatte": [*GEOMETRY, "motion", "instance", "cryptomatte"],
     "all": list(PASSES),
+    "surfaces alone": [name for name, each in PASSES.items() if each.unless],
 }
 
 
@@ -80,20 +85,31 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=4, help="a pixel (default: 4)")
     arguments = parser.parse_args()
     poses = LightField.read(arguments.lightfield)
+    groups = _groups(arguments.blend)
     with tempfile.TemporaryDirectory() as name:
         for lens in LENSES:
             content = _content(poses, lens, arguments.size, arguments.samples, list(PASSES))
+            content = content.changed(render={**content.render, "light_groups": groups})
             folder = Path(name, lens)
             content.write(folder / NAME)
             _render(content, arguments.blend, folder)
             print(lens, json.dumps(_figures(content, folder)), flush=True)
-        for step, passes in STEPS.items():
+        for step, passes in {**STEPS, "light groups alone": []}.items():
             content = _content(poses, "fisheye", arguments.size, arguments.samples, passes)
+            if step.startswith("light groups"):
+                content = content.changed(render={**content.render, "light_groups": groups})
             folder = Path(name, step)
             seconds, geometry = _render(content, arguments.blend, folder)
             sizes = {path.parent.name: path.stat().st_size for path in folder.rglob("view_*.exr")}
             costs = f"{seconds:.2f} core seconds a view, {geometry:.2f} of them for geometry,"
             print(step, costs, json.dumps(sizes), flush=True)
+
+
+def _groups(blend: Path) -> dict[str, list[str]]:
+    """Return a light group for each emitter of a scene."""
+    blend_file.open_scene(blend)
+    inventory.inventory([bpy.context.scene.frame_current])
+    return resolved("each", light.emitters())
 
 
 def _content(
@@ -152,6 +168,10 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     covered = np.isfinite(rays[..., 0])
     inside = binary_erosion(covered, np.ones((3, 3)), iterations=2, border_value=0)
     sum_error = np.abs(total - colour) / np.maximum(colour, 1e-3)
+    group_paths = [of_group(name).path(folder, view.name) for name in content.light_groups]
+    group_sum = sum(images.read_image(path).colour.astype(np.float64) for path in group_paths)
+    group_error = np.abs(group_sum - colour) / np.maximum(colour, 1e-3)
+    mask = passes["surface_mask"][..., 0]
     objects = passes["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
     names, normals, cast_distance = _cast(content)
@@ -171,6 +191,11 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     paint = _paint(content)
     painted = ((paint > 0.01) & (paint < UNPAINTED / 2 / content.render["samples"])).all(axis=-1)
     paint_ratio: list[float] = []
+    base_ratio: list[float] = []
+    exact = painted & (mask == 1)
+    if exact.any():
+        base = passes["base_colour"][exact] / paint[exact]
+        base_ratio = np.quantile(base, (0.5, 0.05, 0.95)).tolist()
     if painted.any():
         quantiles = np.quantile(albedo[painted] / paint[painted], (0.5, 0.05, 0.95))
         paint_ratio = quantiles.tolist()
@@ -181,6 +206,7 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     return {
         "sum": float(sum_error.max()),
         "sum inside": float(sum_error[inside].max()),
+        "groups": [float(group_error.max()), len(content.light_groups)],
         "objects": float((objects == cast)[covered].mean()),
         "mattes": float((matte == expected_matte)[hit].mean()),
         "depth": np.quantile(np.abs(distance / cast_distance - 1)[same], (0.5, 0.99)).tolist(),
@@ -190,6 +216,8 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
         "nan": {name: count for name, (_, count) in read.items() if count},
         "lost inside": int((hit & inside & ~passes["normal"].any(axis=-1)).sum()),
         "albedo of paint": paint_ratio,
+        "base colour of paint": base_ratio,
+        "surfaces": [float((mask == 1).sum() / covered.sum()), float((mask > 0).mean())],
         "painted": float(painted.sum() / covered.sum()),
         "visible": float((visible & hit).sum() / hit.sum()),
         "warped": float(np.abs(albedo[row, column] - beside_albedo[y, x]).mean()),

@@ -8,7 +8,7 @@ include: "helpers/error.smk"
 rule probe_cameras:
     input:
         settings=probe_settings,
-        inventory=of_first("blend_inventory"),
+        inventory=of_first("lightfield_inventory"),
         places=of_first("places"),
     output:
         f"{WORK}/{{scene}}/probes.json",

@@ -33,7 +33,7 @@ rule free_places:
 rule lightfield:
     input:
         settings=settings_of("lightfield", lightfield_settings),
-        inventory=of_dataset("blend_inventory"),
+        inventory=of_dataset("lightfield_inventory"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
     output:

@@ -58,9 +58,12 @@ def check_disk_space():
         needs.append(disk_space.Need(Path(WORK), 0, len(jobs)))
     if renders and RUNS_HERE:
         # Each render job writes a view's passes to memory, or to TMPDIR if memory is too small.
-        pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
+        view_size = max(
+            d.pixels * memory.passes_pixel_bytes(d.estimate.light_group_count)
+            for d in datasets.values()
+        )
         at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
-        size = at_once * pixels * memory.PASSES_PIXEL_BYTES
+        size = at_once * view_size
         if not disk_space.fast_folder(size):
             needs.append(disk_space.Need(Path(tempfile.gettempdir()), size))
     for warning in disk_space.check(needs):

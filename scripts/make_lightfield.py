@@ -7,6 +7,7 @@ hand, --scene and --rig name a dataset at full size.
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.cli import check_settings, run
 from lightfield.core.errors import UserError
@@ -39,7 +40,9 @@ def main() -> None:
     if settings.panorama_width:
         capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
         render = passes.without(render)
-    elif isinstance(capture.rig, rigs.Random):
+    else:
+        render = with_groups(render, arguments.inventory)
+    if isinstance(capture.rig, rigs.Random):
         if arguments.places is None:
             raise UserError("--places: is missing; scripts/free_places.py writes it")
         capture = replace(capture, rig=capture.rig.placed(arguments.places))
@@ -55,6 +58,19 @@ def main() -> None:
     lightfield.write(arguments.output)
 
 
+def with_groups(render: dict[str, Any], inventory: Path | None) -> dict[str, Any]:
+    """Return a ``render`` block with the emitters of each light group, by the scene's inventory."""
+    from lightfield.dataset import light_groups
+    from lightfield.dataset.inventory import read_inventory
+
+    if "light_groups" not in render:
+        return render
+    if inventory is None:
+        raise UserError("--inventory: is missing; scripts/inventory.py names the light groups")
+    emitters = read_inventory(inventory, "emitters")["emitters"]
+    return {**render, "light_groups": light_groups.resolved(render["light_groups"], emitters)}
+
+
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -66,7 +82,9 @@ def parse() -> argparse.Namespace:
         help="JSON of scripts/calibrate.py, for a scene with target_error",
     )
     parser.add_argument(
-        "--inventory", type=Path, help="JSON of scripts/inventory.py, for a user's .blend"
+        "--inventory",
+        type=Path,
+        help="JSON of scripts/inventory.py, for a user's .blend, and for light_groups",
     )
     parser.add_argument(
         "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"

@@ -421,6 +421,39 @@ REFUSED = [
 # Wrong settings of a scene YAML, and the message after the file's name.
 EXPLAINED = [
     ("render.samples", REMOVE, "render: is missing the key samples"),
+    (
+        "render",
+        {"samples": 4, "light_groups": "each", "denoise": True},
+        "render.denoise: does not go with light_groups",
+    ),
+    (
+        "render",
+        {"target_error": 0.01, "light_groups": ["Lamp"]},
+        "render.target_error: may choose to denoise",
+    ),
+    (
+        "render.light_groups",
+        {"a": ["Lamp"], "b": ["Lamp"]},
+        "render.light_groups: Lamp is in two groups; must be in one",
+    ),
+    ("render.light_groups", {"a": ["x"], "A": ["y"]}, "render.light_groups: the name a is taken"),
+    ("render.light_groups", {"rest": ["x"]}, "render.light_groups: the name rest is taken"),
+    ("render.light_groups", {"a b": ["x"]}, "render.light_groups: 'a b' is not a name of at most"),
+    ("render.light_groups", {}, "render.light_groups: must have one group or more"),
+    ("render.light_groups", "all", 'render.light_groups: is "all"; must be each or a list'),
+    ("relight", {"night": {"Lamp": 0}}, "relight.night: goes with render.light_groups"),
+    ("relight", {"night": {"Lamp": -1}}, "relight.night.Lamp: is -1; must be a number at least 0"),
+    ("relight", {"perspective": {}}, "relight.perspective: is the name of a reprojection, too"),
+    (
+        "reprojections.perspective.relight",
+        "night",
+        "reprojections.perspective.relight: goes with render.light_groups",
+    ),
+    (
+        "reprojections.perspective.passes",
+        ["light_groups"],
+        "reprojections.perspective.passes: light_groups go with render.light_groups",
+    ),
     ("exports.nerfstudio", None, "exports.nerfstudio: is null; must have a value, or be left out"),
     ("rigs.LFSphere", None, "rigs.LFSphere: is null; must be a mapping of keys to values"),
     ("rigs.LFSphere.size", "1m", 'size: is "1m"; must be a number or a list of 3'),
@@ -701,6 +734,11 @@ PROGRAMS = [
             ({"formats": ["png"], "exposur": 1}, "exposur: unknown key; did you mean exposure?"),
             ({"formats": ["png"], "exposure": 101}, "exposure: is 101; must be a number at most"),
             ({"formats": ["jpg"]}, "formats.[0]: is "),
+            (
+                {"formats": ["exr"], "relight": {"Lamp": -1}},
+                "relight.Lamp: is -1; must be a number",
+            ),
+            ({"formats": ["exr"], "relight": "all"}, 'relight: is "all"; must be each'),
             ({"formats": ["png"], "camera": CAMERA_OF_90 | {"fov": "90"}}, "camera.fov: is "),
             (
                 {"formats": ["png"], "camera": CAMERA_OF_90, "cube_map": True},

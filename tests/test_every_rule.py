@@ -435,6 +435,16 @@ ROUNDS = {
             CAMERAS | {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    # The inventory lists the emitters, of which a light field's groups are made.
+    "light groups, and another light": {
+        "built": (
+            TO_CUBES,
+            TO_CUBES.replace("samples: 4", "samples: 4, light_groups: [lamp]").replace(
+                "exposure: -1", "exposure: -1\n    relight: {lamp: 2}"
+            ),
+            {"inventory", "perspective reproject", "perspective reprojected_lightfield"} | CAMERAS,
+        ),
+    },
     "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
     "another builder": {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)

@@ -31,7 +31,7 @@ def test_every_imported_name_is_exported(module):
 
 
 def test_every_module_is_in_the_page():
-    entries = [page.TEMPLATES / f"{name}/main.js" for name in ("page", "walk", "index")]
+    entries = [page.TEMPLATES / f"{name}/main.js" for name in ("page", "walk", "relight", "index")]
     assert {module for entry in entries for module in scripts.modules(entry)} == set(MODULES)
 
 

@@ -726,3 +726,75 @@ def test_light_and_depth_survive_packing():
     assert codes[1] == packing.NO_DEPTH
     back = 2 ** (near + (codes[2:] - 1) / (packing.MISS - 2) * (far - near))
     np.testing.assert_allclose(back, depth[2:], rtol=2e-3)
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory):
+    """The page of views whose colour is the sum of two light groups, and their lightfield.json."""
+    folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
+    lightfield = write_dataset(folder, SPHERE)
+    render = {**lightfield.render, "light_groups": {"lamp": ["Lamp"], "World": ["World"]}}
+    lightfield = lightfield.changed(render=render)
+    lightfield.write(folder / "lightfield.json")
+    for view in lightfield.views:
+        colour = images.read_image(folder / "exr" / f"{view.name}.exr").colour
+        for group, part in (("lamp", 0.75), ("World", 0.25)):
+            path = folder / f"Combined_{group}" / f"{view.name}.exr"
+            images.write_exr(path, channels_of((part * colour).astype(np.float16)))
+    draw(folder, SPHERE, folder / "report")
+    return make_page(folder, SPHERE)
+
+
+def brightness(tab):
+    """Return the mean of each channel of the relit picture."""
+    return tab.evaluate(
+        """async () => {
+          const canvas = document.getElementById("lit");
+          for (let frame = 0; frame < 2; frame++) await new Promise(requestAnimationFrame);
+          const copy = new OffscreenCanvas(canvas.width, canvas.height);
+          const context = copy.getContext("2d");
+          context.drawImage(canvas, 0, 0);
+          const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+          const sums = [0, 0, 0];
+          data.forEach((value, place) => { if (place % 4 < 3) sums[place % 4] += value; });
+          return sums.map((sum) => (4 * sum) / data.length);
+        }"""
+    )
+
+
+def move(tab, slider, value):
+    tab.evaluate(
+        """([id, value]) => {
+          const input = document.getElementById(id);
+          input.value = value;
+          input.dispatchEvent(new Event("input"));
+        }""",
+        [slider, value],
+    )
+
+
+def test_a_page_relights_a_view(lit, show):
+    tab = show(lit)
+    assert tab.locator("#relight code").all_inner_texts()[:2] == ["lamp", "World"]
+    tab.locator("#lit[aria-busy=false]").wait_for()
+    rendered = brightness(tab)
+    # The viewer shows the same light, developed in the same way.
+    assert min(rendered) > 20
+    tab.locator("#light-only-0").click()
+    lamp = brightness(tab)
+    tab.locator("#light-only-1").click()
+    world = brightness(tab)
+    assert all(w < one < both for w, one, both in zip(world, lamp, rendered, strict=True))
+    # Four times a quarter of the light is all of it.
+    move(tab, "light-1", 4)
+    np.testing.assert_allclose(brightness(tab), rendered, rtol=0.02)
+    move(tab, "light-colour-1", "#ff0000")
+    red, green, blue = brightness(tab)
+    assert red == pytest.approx(rendered[0], rel=0.02) and green == blue == 0
+    tab.locator("#lit-reset").click()
+    np.testing.assert_allclose(brightness(tab), rendered, rtol=1e-6)
+
+
+def test_a_page_without_light_groups_relights_nothing(sphere):
+    text = sphere.page.read_text()
+    assert 'id="lit"' not in text and "drawLit" not in text

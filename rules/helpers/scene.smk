@@ -19,7 +19,7 @@ def inventory_settings(dataset):
     """Return the settings of a scene's inventory: what it depends on in the scene YAML."""
     written = load_scene(dataset.scene_name)
     datasets = scene_datasets(dataset.scene_name)
-    return {
+    settings = {
         # Raise this number when the program lists something else.
         "version": 4,
         "scene_name": written.scene.scene_name,
@@ -30,6 +30,9 @@ def inventory_settings(dataset):
         # Like the program, leave out rigs without frames.
         "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
+    if written.render.light_groups:
+        settings["light_groups"] = written.render.light_groups
+    return settings
 
 
 def blend_of(wildcards):

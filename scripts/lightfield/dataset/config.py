@@ -33,12 +33,14 @@ from lightfield.core.settings import (
     pattern,
     suggestion,
 )
-from lightfield.dataset import published
+from lightfield.dataset import light_groups, published
 from lightfield.dataset.exports import Export, Exports
 from lightfield.dataset.names import MESH, VIEWS, builders
-from lightfield.dataset.passes import FLOW, PASSES, in_order
+from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES, in_order
 from lightfield.dataset.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.dataset.reprojections import (
+    LIGHT_GROUPS,
+    Light,
     ReprojectionOptions,
     ReprojectionSettings,
     Stops,
@@ -118,6 +120,27 @@ def _unique(names: list[str]) -> list[str]:
     return names
 
 
+def _check_groups(groups: dict[str, list[str]]) -> None:
+    """Check that no two light groups have the same emitter or equal names."""
+    if not groups:
+        raise ValueError("light_groups: must have one group or more")
+    emitters: set[str] = set()
+    names: set[str] = {light_groups.REST}
+    for name, members in groups.items():
+        if not re.fullmatch(light_groups.NAME_PATTERN, name):
+            raise ValueError(
+                f"light_groups: {name!r} is not a name of at most {light_groups.LONGEST_NAME} "
+                "letters, digits, _ and -, with a letter or digit first"
+            )
+        if name.lower() in names:
+            raise ValueError(f"light_groups: the name {name} is taken; choose another")
+        names.add(name.lower())
+        for emitter in members:
+            if emitter in emitters:
+                raise ValueError(f"light_groups: {emitter} is in two groups; must be in one")
+            emitters.add(emitter)
+
+
 # A single word on the command line is a list of one name.
 Names = Annotated[
     list[Name],
@@ -127,6 +150,12 @@ Names = Annotated[
 PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]], AfterValidator(in_order)
 ]
+# A reprojection may have all passes of light groups, too.
+ReprojectedPassNames = Annotated[
+    list[Annotated[str, Field(json_schema_extra={"enum": [*PASSES, LIGHT_GROUPS]})]],
+    AfterValidator(lambda names: in_order(names, LIGHT_GROUPS)),
+]
+Emitters = Annotated[list[str], AfterValidator(_unique)]
 Auto = Literal["auto"]
 # The rules write this path into commands with {wildcards}.
 Folder = Annotated[
@@ -474,6 +503,32 @@ class Render(Settings):
     passes: PassNames | None = Field(
         None, description="Passes to write, each into a folder of its own."
     )
+    light_groups: Literal["each"] | Emitters | dict[str, Emitters] | None = Field(
+        None,
+        description="The light of each lamp, glowing object and world as a pass of its own. each: "
+        "all of them. A list: those of these names. A mapping: groups of them. All others are "
+        "the group rest.",
+    )
+
+    @model_validator(mode="after")
+    def _sum_of_groups(self) -> Self:
+        """Check that light groups add up to the colour, which the denoiser would change."""
+        if self.light_groups is None:
+            return self
+        if isinstance(self.light_groups, dict):
+            _check_groups(self.light_groups)
+        reason = "does not go with light_groups, which must add up to the colour"
+        if self.denoise:
+            raise ValueError(f"denoise: {reason}; leave it out, and take more samples")
+        target = self.target_error
+        if target is not None and not (
+            isinstance(target, TargetError) and target.denoise == "never"
+        ):
+            raise ValueError(
+                f"target_error: may choose to denoise, which {reason}; write "
+                "{value: …, denoise: never}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _samples_or_target(self) -> Self:
@@ -497,8 +552,14 @@ class Reprojection(ReprojectionOptions):
         description="Exposure. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
         json_schema_extra={"unit": "stops"},
     )
-    passes: PassNames | None = Field(
-        None, description="Passes of render.passes to reproject, too, as EXR."
+    passes: ReprojectedPassNames | None = Field(
+        None,
+        description="Passes of render.passes to reproject, too, as EXR. light_groups: those of "
+        "all light groups.",
+    )
+    relight: Name | Light | None = Field(
+        None,
+        description="Another light: the name of an entry of relight, or strengths as there.",
     )
 
     @model_validator(mode="after")
@@ -521,11 +582,13 @@ class Reprojection(ReprojectionOptions):
         # `Scene` has made a reprojection for each exposure.
         assert not isinstance(self.exposure, list)
         options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
-        return ReprojectionSettings(
+        return ReprojectionSettings.of(
             **options,
             formats=[self.format],
             exposure=self.exposure,
             passes=self.passes or [],
+            # `loading` has replaced a name by its strengths.
+            relight=self.relight,
         )
 
 
@@ -633,6 +696,12 @@ class Scene(Credits):
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
     )
+    relight: dict[Name, Light] = Field(
+        {},
+        description="The views under other lights, as EXR, by the names of their folders. A light "
+        "has strengths, or red, green and blue, by the names of light groups; others keep theirs. "
+        "each: every group alone, one after the other.",
+    )
     flow: Flow | None = Field(
         None, description="Optical flow from depth and poses, for a scene that stands still."
     )
@@ -656,6 +725,22 @@ class Scene(Credits):
                     raise ValueError(f"scene.dataset: {error}") from None
         return content
 
+    @model_validator(mode="before")
+    @classmethod
+    def _developed_lights(cls, content: Any) -> Any:
+        """Add a reprojection for each entry of relight, which develops the views in that light."""
+        match content:
+            case {"relight": dict(lights)}:
+                reprojections = content.get("reprojections", {})
+                if not isinstance(reprojections, dict):
+                    return content
+                for name in lights:
+                    if name in reprojections:
+                        raise ValueError(f"relight.{name}: is the name of a reprojection, too")
+                relit = {name: {"relight": name, "format": "exr"} for name in lights}
+                return {**content, "reprojections": {**reprojections, **relit}}
+        return content
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for key in ("render", "rigs"):
@@ -672,7 +757,11 @@ class Scene(Credits):
         if self.mesh:
             self._check_mesh(self.mesh)
         for name, reprojection in self.reprojections.items():
-            _check_name(f"reprojections.{name}", name, REPROJECTION_NEIGHBOURS)
+            block = "relight" if name in self.relight else "reprojections"
+            neighbours = REPROJECTION_NEIGHBOURS
+            if name.startswith(GROUP_PREFIX) or (block == "relight" and name == light_groups.EACH):
+                neighbours = {name}
+            _check_name(f"{block}.{name}", name, neighbours)
             self._check_reprojection(f"reprojections.{name}", reprojection)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
@@ -684,7 +773,13 @@ class Scene(Credits):
     def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
         """Check that a reprojection's rigs and passes exist."""
         self._check_rig_names(f"{key}.rigs", reprojection.rigs or ())
+        if reprojection.relight is not None:
+            self._check_light(key, reprojection)
         for pass_name in reprojection.passes or ():
+            if pass_name == LIGHT_GROUPS:
+                if self.render is None or self.render.light_groups is None:
+                    raise ValueError(f"{key}.passes: light_groups go with render.light_groups")
+                continue
             if self.render is None or pass_name not in (self.render.passes or ()):
                 raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
             if PASSES[pass_name].kind == "motion":
@@ -700,6 +795,33 @@ class Scene(Credits):
             if name not in self.rigs:
                 hint = suggestion(name, self.rigs)
                 raise ValueError(f"{key}: there is no rig {name!r}{hint}")
+
+    def light_of(self, reprojection: Reprojection) -> Any:
+        """Return the strengths of a reprojection's light, or `each`. None for the light as is."""
+        light = reprojection.relight
+        return self.relight[light] if isinstance(light, str) and light in self.relight else light
+
+    def _check_light(self, key: str, reprojection: Reprojection) -> None:
+        """Check that the groups of a light exist, as far as the scene YAML names them."""
+        light = self.light_of(reprojection)
+        at = f"{key}.relight"
+        if isinstance(reprojection.relight, str) and reprojection.relight in self.relight:
+            at = f"relight.{reprojection.relight}"
+        if self.render is None or self.render.light_groups is None:
+            raise ValueError(f"{at}: goes with render.light_groups, which it changes")
+        if light == light_groups.EACH:
+            if reprojection.passes:
+                raise ValueError(f"{key}.passes: does not go with the light each")
+            return
+        if isinstance(light, str):
+            hint = suggestion(light, self.relight)
+            raise ValueError(f"{at}: there is no relight.{light}{hint}")
+        names = light_groups.names_in(self.render.light_groups)
+        if names is not None:
+            try:
+                light_groups.weights(light, [*names, light_groups.REST])
+            except ValueError as error:
+                raise ValueError(f"{at}: {error}") from None
 
     def _check_split_rigs(self) -> None:
         """Check rigs of which one trains and others test: trainers see them as one dataset."""
@@ -733,6 +855,10 @@ class Scene(Credits):
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
             has_depth = self.render is None or self.render.depth != "none"
             reprojection = None if source == VIEWS else self.reprojections[source]
+            if reprojection and self.light_of(reprojection) == light_groups.EACH:
+                raise ValueError(
+                    f"{key}: {source} has each view once for each light, and an export once"
+                )
             if reprojection:
                 has_depth &= reprojection.format == "exr"
             self._check_passes_of(key, source, export)

@@ -1,6 +1,7 @@
 """The paths of a dataset's files."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from lightfield.dataset import passes
 from lightfield.dataset.config import FILE
@@ -8,6 +9,7 @@ from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
+from lightfield.dataset.reprojections import LIGHT_GROUPS
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
@@ -57,6 +59,11 @@ class DatasetPaths(Description):
         return self.inventory if self.source.blend else []
 
     @property
+    def lightfield_inventory(self) -> str | list[str]:
+        """The inventory on which lightfield.json depends: also for the names of light groups."""
+        return self.inventory if self.render.get("light_groups") else self.blend_inventory
+
+    @property
     def trials(self) -> str:
         """The folder of trial renders."""
         return f"{self.scene_work}/trials"
@@ -100,11 +107,20 @@ class DatasetPaths(Description):
     def image_folders(self) -> list[str]:
         """The folders in ``folder`` that hold views, their passes and reprojections."""
         folders = ["exr", *(view_pass.name for view_pass in passes.selected(self.render))]
+        if self.render.get("light_groups"):
+            # Only lightfield.json names all of them.
+            found = Path(self.folder).glob(f"{passes.GROUP_PREFIX}*")
+            folders = list(dict.fromkeys([*folders, *sorted(path.name for path in found)]))
         if self.flow:
             folders.append(passes.FLOW.name)
         folders += self.reprojections
         for name, reprojection in self.reprojections.items():
-            folders += [f"{name}/{pass_name}" for pass_name in reprojection.passes or ()]
+            for pass_name in reprojection.passes or ():
+                if pass_name == LIGHT_GROUPS:
+                    groups = [each for each in folders if each.startswith(passes.GROUP_PREFIX)]
+                    folders += [f"{name}/{group}" for group in groups]
+                else:
+                    folders.append(f"{name}/{pass_name}")
         return folders
 
     @property

@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import fmean
 
 from lightfield.core.files import DAMAGE
-from lightfield.dataset import memory, passes
+from lightfield.dataset import light_groups, memory, passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset_paths import DatasetPaths
 from lightfield.dataset.unit_costs import (
@@ -25,6 +25,8 @@ from lightfield.dataset.unit_costs import (
 
 # A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
+# The light groups of a scene whose emitters are not known yet.
+GUESSED_LIGHT_GROUPS = 16
 # Start-up takes at most this part of a shard's time.
 START_UP_PART = 0.05
 # More jobs would lengthen the plan, but not render faster. A cluster may get more.
@@ -56,7 +58,10 @@ class Estimate:
         if self._probe:
             return self._probe[1]
         render = self.dataset.render
-        pixel_bytes = 6 + sum(view_pass.bytes for view_pass in passes.selected(render))
+        pixel_bytes = 6 * (1 + self.light_group_count)
+        pixel_bytes += sum(
+            each.bytes for each in passes.selected(render) if not passes.is_group(each)
+        )
         if self.dataset.depth:
             pixel_bytes += {"float": 4, "rounded": 3, "half": 2}[render["depth_precision"]]
         return self.dataset.pixels * pixel_bytes * COMPRESSED
@@ -71,8 +76,24 @@ class Estimate:
         reprojected_size = 0.0
         for name, reprojection in self.dataset.reprojections.items():
             pixels = self._reprojected_pixels(name)
+            if reprojection.relight == light_groups.EACH:
+                pixels *= self.light_group_count
             reprojected_size += pixels * pixel_bytes[reprojection.format] * (reprojection.bits / 8)
         return size + reprojected_size
+
+    @cached_property
+    def light_group_count(self) -> int:
+        """The number of light groups, by the scene YAML or the inventory, or as a guess."""
+        setting = self.dataset.render.get("light_groups")
+        if setting is None:
+            return 0
+        names = light_groups.names_in(setting)
+        if names is not None:
+            return len(names) + 1
+        try:
+            return len(json.loads(Path(str(self.dataset.inventory)).read_bytes())["emitters"])
+        except (OSError, *DAMAGE):
+            return GUESSED_LIGHT_GROUPS
 
     def memory_bytes(self, pixels: int) -> int:
         """Return the memory in bytes of a process that renders views of this many pixels.
@@ -84,7 +105,8 @@ class Estimate:
         if inventory.is_file():
             scene = _scene_memory(inventory, inventory.stat().st_mtime_ns)
         # Before the calibration, assume that it will choose to denoise.
-        return memory.needed(scene, pixels, self.dataset.render.get("denoise", True))
+        denoise = self.dataset.render.get("denoise", True)
+        return memory.needed(scene, pixels, denoise, self.light_group_count)
 
     @property
     def view_memory_bytes(self) -> int:
@@ -100,7 +122,13 @@ class Estimate:
     def reprojection_seconds(self, name: str) -> float:
         """Return the seconds that one core takes to read and reproject a view."""
         read_pixels = self.dataset.pixels
-        return read_pixels * READ_SECONDS + self._reprojected_pixels(name) * REPROJECTION_SECONDS
+        made_pixels = self._reprojected_pixels(name)
+        light = self.dataset.reprojections[name].relight
+        if light is not None:
+            read_pixels *= 1 + self.light_group_count
+        if light == light_groups.EACH:
+            made_pixels *= self.light_group_count
+        return read_pixels * READ_SECONDS + made_pixels * REPROJECTION_SECONDS
 
     @property
     def import_seconds(self) -> float:

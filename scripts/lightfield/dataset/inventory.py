@@ -29,6 +29,7 @@ class _Inventory(TypedDict, total=False):
     __pydantic_config__ = ConfigDict(strict=True)  # type: ignore[misc]
 
     blend: dict[str, Any]
+    emitters: list[str]
     external_files: list[_ExternalFile]
     hidden: list[str]
     left_out: list[str]

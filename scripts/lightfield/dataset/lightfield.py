@@ -252,6 +252,17 @@ class LightField:
         return passes.selected(self.content if "passes" in self.content else self._render)
 
     @property
+    def light_groups(self) -> list[str]:
+        """The names of the light groups that the views have a pass of each."""
+        passes_of_groups = [each for each in self.passes if passes.is_group(each)]
+        return [each.name.removeprefix(passes.GROUP_PREFIX) for each in passes_of_groups]
+
+    @property
+    def is_relit(self) -> bool:
+        """Whether the views show the scene under another light than they were rendered in."""
+        return "relight" in self.content.get("reprojection", {})
+
+    @property
     def transparent(self) -> bool:
         """Whether the views' channel A is how much of a pixel the scene covers."""
         return bool(self._render.get("transparent"))

@@ -158,7 +158,9 @@ def _reprojections_of(
     for key, reprojection in written.reprojections.items():
         if name in (reprojection.rigs or written.rigs):
             camera = reprojection.camera and _limited(reprojection.camera, limits)
-            reprojections[key] = reprojection.model_copy(update={"camera": camera})
+            light = written.light_of(reprojection)
+            update = {"camera": camera, "relight": light}
+            reprojections[key] = reprojection.model_copy(update=update)
     return reprojections
 
 
@@ -261,7 +263,8 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
         content["samples"] = min(render.samples, limits.samples or render.samples)
     elif limits.samples:
         content["most_samples"] = limits.samples
-    if limits.denoise is not None:
+    # The light groups would no longer add up to the colour.
+    if limits.denoise is not None and render.light_groups is None:
         content["denoise"] = limits.denoise
     if limits.denoise_prefilter and content.get("denoise"):
         content.setdefault("denoise_prefilter", limits.denoise_prefilter)

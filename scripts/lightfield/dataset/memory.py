@@ -8,16 +8,27 @@ PIXEL_BYTES = 300
 DENOISED_PIXEL_BYTES = 1000
 # Bytes for each pixel of a temporary file with all passes in 32-bit floats, and a reserve.
 PASSES_PIXEL_BYTES = 200
+# More bytes for each light group: Cycles and its file took 36, and the view's arrays take 30.
+GROUP_PIXEL_BYTES = 70
+# More bytes of the temporary file for each light group.
+GROUP_PASS_PIXEL_BYTES = 12
 # Bytes for a scene that has not been measured yet.
 UNKNOWN_SCENE = 6_000_000_000
 
 
-def needed(scene: int, pixels: int, denoise: bool) -> int:
+def needed(scene: int, pixels: int, denoise: bool, groups: int = 0) -> int:
     """Return the bytes of a process that renders views of this many pixels.
 
-    ``scene`` is the inventory's ``memory_bytes``: the memory for a view of very few pixels.
+    ``scene`` is the inventory's ``memory_bytes``: the memory for a view of very few pixels. The
+    views have this many light ``groups``.
     """
-    return scene + pixels * (DENOISED_PIXEL_BYTES if denoise else PIXEL_BYTES)
+    pixel_bytes = DENOISED_PIXEL_BYTES if denoise else PIXEL_BYTES
+    return scene + pixels * (pixel_bytes + groups * GROUP_PIXEL_BYTES)
+
+
+def passes_pixel_bytes(groups: int) -> int:
+    """Return the bytes for each pixel of a temporary file with all passes and light groups."""
+    return PASSES_PIXEL_BYTES + groups * GROUP_PASS_PIXEL_BYTES
 
 
 def threads(cores: int, shards: int, need: int, available: int) -> int:

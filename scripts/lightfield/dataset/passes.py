@@ -6,9 +6,19 @@ validation and reprojection all use this table.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
+
+from lightfield.dataset import light_groups
+
+# The names of the passes of light groups begin so, here and in Cycles.
+GROUP_PREFIX = "Combined_"
+
+# The names of passes that materials write begin so in Cycles. In INEXACT a surface writes 1 if it
+# is not one opaque Principled BSDF.
+AOV_PREFIX = "plenoforge_"
+INEXACT = f"{AOV_PREFIX}inexact"
 
 # The JSON beside images of ids, which maps names to ids.
 NAMES = "names.json"
@@ -20,33 +30,37 @@ class Pass:
 
     ``kind`` says how reprojections resample it:
 
-    - "light": as colour;
+    - "light" and "value": as colour;
     - "normal": as colour, and scaled to a unit vector again;
     - "id" and "matte": the value of the source pixel that the ray falls in;
     - "motion" and "flow": not at all, because they are in pixels of their own lens.
 
     Its values are the sum of the Cycles passes ``cycles``, times the Cycles pass ``factor`` if it
-    has one. A matte has them side by side. Light and mattes are means over all samples. Other
-    passes describe the surface at the pixel's centre, as depth does.
+    has one, less the Cycles pass ``without`` if it has one. They are 0 where the Cycles pass
+    ``unless`` is not. A matte has them side by side. Light, values and mattes are means over all
+    samples. Other passes describe the surface at the pixel's centre, as depth does.
     """
 
     name: str
-    kind: Literal["light", "matte", "normal", "id", "motion", "flow"]
+    kind: Literal["light", "value", "matte", "normal", "id", "motion", "flow"]
     channels: tuple[str, ...]
     dtype: str
     meaning: str
     cycles: tuple[str, ...]
     factor: str | None = None
+    without: str | None = None
+    unless: str | None = None
 
     @property
     def of_colour(self) -> bool:
         """Whether it is a mean over all samples, and does not describe the pixel's centre."""
-        return self.kind in ("light", "matte")
+        return self.kind in ("light", "value", "matte")
 
     @property
     def needed(self) -> tuple[str, ...]:
         """All Cycles passes that it is computed from."""
-        return (*self.cycles, self.factor) if self.factor else self.cycles
+        others = [name for name in (self.factor, self.without, self.unless) if name]
+        return (*self.cycles, *others)
 
     @property
     def bytes(self) -> int:
@@ -60,6 +74,12 @@ class Pass:
 
 def _light(name: str, meaning: str, *cycles: str, factor: str | None = None) -> Pass:
     return Pass(name, "light", ("R", "G", "B"), "float16", meaning, cycles, factor)
+
+
+def of_group(group: str) -> Pass:
+    """Return the pass of the light of a light group. Their sum is the colour."""
+    name = group_pass(group)
+    return _light(name, f"light that comes from the light group {group}", name)
 
 
 def _id(name: str, cycles: str) -> Pass:
@@ -83,6 +103,18 @@ def _scattered(name: str) -> Pass:
         f"{kind} Direct",
         f"{kind} Indirect",
         factor=f"{kind} Color",
+    )
+
+
+def _surface(name: str, meaning: str, is_colour: bool = False) -> Pass:
+    return Pass(
+        name,
+        "light" if is_colour else "value",
+        ("R", "G", "B") if is_colour else ("Y",),
+        "float16",
+        meaning,
+        (f"{AOV_PREFIX}{name}",),
+        unless=INEXACT,
     )
 
 
@@ -115,6 +147,20 @@ _ALL_PASSES = (
     _light("volume_light", "light scattered by volumes", "Volume Direct", "Volume Indirect"),
     _light("emission", "light that the surface itself emits", "Emission"),
     _light("environment", "light of the world, seen directly", "Environment"),
+    _surface("base_colour", "base colour of surfaces of one Principled BSDF", is_colour=True),
+    _surface("roughness", "roughness of surfaces of one Principled BSDF"),
+    _surface("metallic", "how metallic surfaces of one Principled BSDF are"),
+    _surface("transmission", "transmission weight of surfaces of one Principled BSDF"),
+    _surface(
+        "surface_emission",
+        "emission colour times strength of surfaces of one Principled BSDF",
+        is_colour=True,
+    ),
+    _surface(
+        "surface_mask",
+        "the part of the pixel whose surface is one opaque Principled BSDF; 0 beside any other "
+        "surface",
+    ),
 )
 PASSES = {view_pass.name: view_pass for view_pass in _ALL_PASSES}
 
@@ -158,18 +204,48 @@ PARTS_OF_LIGHT = (
 
 
 def selected(settings: Mapping[str, Any]) -> list[Pass]:
-    """Return the passes that the key ``passes`` of ``settings`` selects. None without the key."""
-    return [PASSES[name] for name in settings.get("passes", ())]
+    """Return the passes that ``settings`` select by the keys ``passes`` and ``light_groups``.
+
+    A lightfield.json has all groups. A scene YAML may lack names: see `light_groups.names_in`.
+    """
+    groups = settings.get("light_groups")
+    chosen = [by_name(name) for name in settings.get("passes", ())]
+    for group in light_groups.names_in(groups) or ():
+        # A transparent view's colour leaves out the world, but Cycles' pass does not.
+        members = groups[group] if isinstance(groups, Mapping) else ()
+        shows_world = not settings.get("transparent") or light_groups.WORLD not in members
+        chosen.append(replace(of_group(group), without=None if shows_world else "Environment"))
+    return chosen
+
+
+def by_name(name: str) -> Pass:
+    """Return the pass of this name. Raises KeyError if there is none."""
+    if name.startswith(GROUP_PREFIX):
+        return of_group(name.removeprefix(GROUP_PREFIX))
+    return PASSES[name]
+
+
+def group_pass(group: str) -> str:
+    """Return the name of the pass of a light group."""
+    return f"{GROUP_PREFIX}{group}"
+
+
+def is_group(view_pass: Pass) -> bool:
+    """Return whether a pass is that of a light group."""
+    return view_pass.name.startswith(GROUP_PREFIX)
 
 
 def without(render: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block without passes."""
-    return {key: value for key, value in render.items() if key != "passes"}
+    """Return a ``render`` block without passes and light groups."""
+    return {key: value for key, value in render.items() if key not in ("passes", "light_groups")}
 
 
-def in_order(names: list[str]) -> list[str]:
-    """Return names of passes in the table's order. Raises ValueError for wrong or repeated ones."""
-    unknown = [name for name in names if name not in PASSES]
-    if unknown or not names or len(set(names)) < len(names):
-        raise ValueError(f"must be a list, each once, of {', '.join(PASSES)}")
-    return [name for name in PASSES if name in names]
+def in_order(names: list[str], *others: str) -> list[str]:
+    """Return names of passes in the table's order, and those of ``others`` after them.
+
+    Raises ValueError for wrong or repeated names.
+    """
+    allowed = [*PASSES, *others]
+    if not {*names} <= {*allowed} or not names or len(set(names)) < len(names):
+        raise ValueError(f"must be a list, each once, of {', '.join(allowed)}")
+    return [name for name in allowed if name in names]

@@ -7,16 +7,26 @@ settings file, which scripts/reproject.py and scripts/lens_map.py read with --se
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
+from typing_extensions import TypeAliasType
 
-from lightfield.core.settings import Settings, Vector
+from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 
 MOST_SAMPLES = 64
 """Samples along each side of a pixel."""
 
+LIGHT_GROUPS = "light_groups"
+"""Among the passes of a reprojection: those of all light groups."""
+
 LENS_MAP_KEYS = {"camera", "cube_map", "rotation", "filter", "samples"}
 """The settings on which a lens map depends."""
+
+# A group's factor, or its factors of red, green and blue.
+_Strength = Annotated[float, Field(ge=0, le=1e6)]
+_Colour = TypeAliasType("_Colour", Annotated[tuple[_Strength, _Strength, _Strength], as_list(3)])
+Light = Literal["each"] | dict[str, _Strength | _Colour]
+"""The strengths of light groups by name. each: every group alone."""
 
 Stops = Annotated[float, Field(ge=-100, le=100)]
 
@@ -88,6 +98,9 @@ class ReprojectionSettings(ReprojectionOptions):
     )
     mask: bool = Field(False, description="Also write masks of the pixels without a source.")
     passes: list[str] = Field([], description="Passes to reproject, too.")
+    relight: Light | None = Field(
+        None, description="Strengths of light groups, as in the scene YAML's relight."
+    )
 
     @property
     def lens_map_settings(self) -> dict[str, Any]:
@@ -101,6 +114,8 @@ class ReprojectionSettings(ReprojectionOptions):
         # 8 is left out, so that the keys of earlier versions stay valid.
         if self.bits != 8:
             settings["bits"] = self.bits
+        if self.relight is not None:
+            settings["relight"] = self.as_json({"relight"})["relight"]
         return settings
 
     @property

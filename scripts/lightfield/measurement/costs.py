@@ -16,7 +16,7 @@ from lightfield.core.settings import Settings
 from lightfield.dataset import journal
 from lightfield.dataset.config import AtLeastOne, Energy
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import FLOW, PASSES
+from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement.sampling import cost_in_samples, standard_error
@@ -27,7 +27,7 @@ LAST_STAGES = ("export", "validate", "report")
 # The files and folders of a stage. Without an entry, the folder has the stage's name.
 STAGE_PATHS = {
     "cameras": ("lightfield.json",),
-    "render": ("exr", *PASSES),
+    "render": ("exr", *PASSES, f"{GROUP_PREFIX}*"),
     "export": ("transforms.json",),
     "validate": ("validation.json",),
 }
@@ -168,8 +168,8 @@ def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
         return blend.stat().st_size if blend else 0
     size = 0
     for name in STAGE_PATHS.get(stage, (stage,)):
-        path = dataset / name
-        files = [path] if path.is_file() else path.rglob("*")
+        found = dataset.glob(name)
+        files = [file for path in found for file in ([path] if path.is_file() else path.rglob("*"))]
         for file in files:
             if file.is_file() and file.name not in NOT_COUNTED:
                 size += file.stat().st_size

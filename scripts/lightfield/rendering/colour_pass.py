@@ -52,8 +52,10 @@ def render_colour(
     colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
     needed: dict[str, str] = {}
     for view_pass in colour_passes:
-        channels = "rgba" if view_pass.kind == "matte" else "RGB"
+        channels = {"matte": "rgba", "value": "X"}.get(view_pass.kind, "RGB")
         needed |= dict.fromkeys(view_pass.needed, channels)
+        if view_pass.unless:
+            needed[view_pass.unless] = "X"
     needed["Combined"] = "RGBA" if alpha else "RGB"
     if counts_samples:
         needed[_COUNTS] = "X"
@@ -97,7 +99,14 @@ def _composed(view_pass: Pass, passes: Mapping[str, Array]) -> Array:
     if view_pass.kind == "matte":
         return np.concatenate(parts, axis=-1)
     total = np.sum(parts, axis=0)
-    return np.asarray(total * passes[view_pass.factor] if view_pass.factor else total)
+    if view_pass.factor:
+        total = total * passes[view_pass.factor]
+    if view_pass.without:
+        # Rounding may leave a little less than nothing.
+        total = np.maximum(total - passes[view_pass.without], 0)
+    if view_pass.unless:
+        total = np.where(passes[view_pass.unless] > 0, np.float32(0), total)
+    return np.asarray(total)
 
 
 def _manifest(attributes: Mapping[str, Attribute]) -> dict[str, str]:

@@ -10,9 +10,19 @@ from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
-from lightfield.dataset.passes import Pass
+from lightfield.dataset.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import animation, blend_file, drawings, ids, instances, pruning, volumes
+from lightfield.rendering import (
+    animation,
+    blend_file,
+    drawings,
+    ids,
+    instances,
+    light_groups,
+    pruning,
+    surfaces,
+    volumes,
+)
 
 # `auto` tries the kinds of GPU in this order.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -26,6 +36,10 @@ SAMPLING = {
     "light_tree": "use_light_tree",
     "guiding": "use_guiding",
 }
+
+# The names of passes that a scene has only once they are added to it begin so: those of light
+# groups, and what materials write.
+ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
 
 # The passes of Cycles that make up a view's geometry, and their channels.
 GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
@@ -66,9 +80,12 @@ def set_up(
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
+    surfaces.set_up(view_layer(scene), passes)
+    if groups := lightfield.render.get("light_groups"):
+        light_groups.set_up(view_layer(scene), groups)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
-    drawings.set_up(view_layer(scene), scene.camera.data.type)
+    drawings.set_up(view_layer(scene), scene.camera.data.type, bool(groups))
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:
@@ -134,7 +151,8 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
     needed = [name for each in passes for name in each.needed]
-    for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
+    own = [name for name in needed if not name.startswith(ADDED_PASSES)]
+    for name in ("Combined", *own, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # A cryptomatte pass holds two objects: 6 gives three passes.
     layer.pass_cryptomatte_depth = 6

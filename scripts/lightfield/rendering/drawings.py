@@ -5,16 +5,23 @@ from typing import Any
 
 import bpy
 
+from lightfield.core.errors import UserError
 
-def set_up(layer: Any, camera_type: str) -> None:
+
+def set_up(layer: Any, camera_type: str, has_light_groups: bool = False) -> None:
     """Show drawings only in perspective views, and hide them behind surfaces there.
 
     Blender draws them in perspective, whatever the lens. It hides them behind surfaces only if the
-    view layer has a depth pass.
+    view layer has a depth pass. Raises `UserError` for shown drawings with light groups.
     """
     if camera_type == "PANO":
         layer.use_grease_pencil = False
-    elif _drawings():
+    elif drawn := _drawings():
+        if has_light_groups:
+            raise UserError(
+                f"render.light_groups: {drawn[0].name_full} is Grease Pencil, which is drawn over "
+                "the colour and is in no light group; make it a mesh, or remove it"
+            )
         layer.use_pass_z = True
 
 

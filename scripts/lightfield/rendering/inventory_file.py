@@ -12,6 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, config
 from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.light_groups import resolved
 from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
@@ -55,6 +56,10 @@ def write(path: Path, scene: str | None, output: Path) -> None:
             f"{path}: has no light, so all views would be black: no lamp shines, no "
             "material emits, and the world is black; give it one of these, as a world with a colour"
         )
+    if written and written.render and written.render.light_groups:
+        contents["emitters"] = light.emitters()
+        # A wrong name is known before anything is rendered.
+        resolved(written.render.light_groups, contents["emitters"])
     if store := ViewStore.configured():
         external_files.put(path, contents["external_files"], store)
     warnings = list(simulations.warnings(frames))

@@ -1,12 +1,14 @@
-"""Tells whether a scene has any light. Without light every view is black."""
+"""Finds the light of a scene. Without light every view is black."""
 
 from typing import Any
 
 import bpy
 import numpy as np
 
+from lightfield.dataset.light_groups import WORLD
 from lightfield.rendering import animation
 from lightfield.rendering.inventory import contributing, rendered_materials
+from lightfield.rendering.render_graph import in_render
 
 # The inputs of shader nodes that emit light if none of them is 0: colour and strength.
 _EMISSIONS: dict[str, list[tuple[str, ...]]] = {
@@ -37,7 +39,38 @@ def may_be_lit() -> bool:
     return any(_emits(shader) for shader in shaders if shader)
 
 
+def emitters() -> list[str]:
+    """Return the names of what may emit light in the open scene, sorted, with the world first.
+
+    These are the full names of lamps and of objects with a glowing material, and `WORLD`.
+    """
+    glowing = {material for material in bpy.data.materials if _emits(material)}
+    objects = {obj for obj in bpy.data.objects if _is_shining_lamp(obj)}
+    for obj in bpy.data.objects:
+        if any(slot.material in glowing for slot in obj.material_slots):
+            objects.add(obj)
+    # Modifiers may give an object other materials.
+    names = in_render(lambda depsgraph: _with_materials(depsgraph, glowing))
+    names |= {str(obj.name_full) for obj in objects}
+    scene = bpy.context.scene
+    worlds = [scene.world, *(layer.world_override for layer in scene.view_layers)]
+    has_sky = any(_emits(world) for world in worlds if world)
+    # An object may have the world's name, and is then in its group.
+    return [WORLD] * (has_sky or WORLD in names) + sorted(names - {WORLD})
+
+
+def _with_materials(depsgraph: Any, materials: set[Any]) -> set[str]:
+    """Return the full names of objects that have any of the ``materials`` when rendered."""
+    names = set()
+    for instance in depsgraph.object_instances:
+        used = getattr(instance.object.data, "materials", None) or ()
+        if any(material and material.original in materials for material in used):
+            names.add(str(instance.object.original.name_full))
+    return names
+
+
 def _is_shining_lamp(obj: Any) -> bool:
+    """Return whether an object is a lamp that may shine at some frame."""
     if obj.type != "LIGHT":
         return False
     lamp = obj.data

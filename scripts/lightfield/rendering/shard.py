@@ -161,7 +161,9 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     """
     lens = lightfield.lens
     denoise = lightfield.render["denoise"]
-    needed = memory.needed(inventory.get("memory_bytes", 0), lens.width * lens.height, denoise)
+    scene = inventory.get("memory_bytes", 0)
+    groups = len(lightfield.light_groups)
+    needed = memory.needed(scene, lens.width * lens.height, denoise, groups)
     if needed > available():
         raise UserError(
             f"{blend}: a view of {lens.width} × {lens.height} pixels takes {needed / 1e9:.1f} GB "
@@ -348,7 +350,8 @@ def pass_channels(
         return named, passes.matte_header(colour.manifest)
     if view_pass.of_colour:
         channels, attributes = colour_channels(colour.passes[view_pass.name])
-        return {name: np.nan_to_num(plane, nan=0) for name, plane in channels.items()}, attributes
+        numbers = [np.nan_to_num(plane, nan=0) for plane in channels.values()]
+        return dict(zip(view_pass.channels, numbers, strict=True)), attributes
     assert geometry
     attributes = {}
     match view_pass.name:

@@ -14,7 +14,7 @@ from lightfield.core import disk_space
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_GPU_MEMORY, LESS_MEMORY
 from lightfield.core.leftovers import temporary_folder
-from lightfield.dataset.memory import PASSES_PIXEL_BYTES
+from lightfield.dataset.memory import passes_pixel_bytes
 from lightfield.imaging import images
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.quiet import quiet
@@ -44,13 +44,14 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
     scene = bpy.context.scene
     scene.camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
     scene.cycles.seed = seed
+    groups = len(view_layer(scene).lightgroups)
     layer = view_layer(scene).name
     names = {
         name: [f"{layer}.{name}.{channel}" for channel in channels]
         for name, channels in passes.items()
     }
-    pixels = scene.render.resolution_x * scene.render.resolution_y
-    with temporary_folder(disk_space.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
+    size = scene.render.resolution_x * scene.render.resolution_y * passes_pixel_bytes(groups)
+    with temporary_folder(disk_space.fast_folder(size)) as folder:
         scene.render.filepath = str(folder / "view.exr")
         try:
             with quiet():
@@ -71,7 +72,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             image = images.read_image(path, channels)
         except UserError as error:
             free = disk_space.gigabytes(shutil.disk_usage(folder).free)
-            needed = disk_space.gigabytes(pixels * PASSES_PIXEL_BYTES)
+            needed = disk_space.gigabytes(size)
             raise UserError(
                 f"{error}; {free} are free there: free some space, or set TMPDIR to a folder with "
                 f"{needed}"

@@ -11,7 +11,7 @@ import numpy as np
 from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import FLOW
+from lightfield.dataset.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
@@ -19,6 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
+from lightfield.report import lights as light_pictures
 from lightfield.report.packing import webp
 from lightfield.validation.files import IMAGES, REPORT, SUMS
 
@@ -61,6 +62,9 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     validation = tables.validation(folder / "validation.json")
     packed = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]
+    lights = light_pictures.collect(folder, lightfield, middle, packed.data["exposure"])
+    if lights:
+        packed.data["lights"] = lights
     report = folder / REPORT
     measurements = _measurements(origin, folder, lightfield)
     page.write(
@@ -75,6 +79,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(origin, lightfield),
         packed=packed,
+        lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
         passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
@@ -213,7 +218,8 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
         suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
         sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), SHEET_QUALITY)
-        yield path.parent.name, lens.description, count, len(shown), sheet
+        title = f"{lens.description}{', relit' if lightfield.is_relit else ''}"
+        yield path.parent.name, title, count, len(shown), sheet
 
 
 def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, str]]:
@@ -229,16 +235,19 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
-    passes = [*lightfield.passes]
+    passes = [each for each in lightfield.passes if not is_group(each)]
     if lightfield.views[0].flow:
         passes.append(FLOW)
     meanings += [(f"{view_pass.name}/", view_pass.meaning) for view_pass in passes]
+    if lightfield.light_groups:
+        meanings.append((f"{GROUP_PREFIX}*/", "the light of each light group; the sum is the view"))
     if (folder.parent / SPLITS).is_file():
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):
-        lens = LightField.read(reprojection).lens.description
-        name = f"{reprojection.parent.name}/"
-        meanings.append((name, f"the same views through another lens: {lens}"))
+        reprojected = LightField.read(reprojection)
+        change = "under other lights" if reprojected.is_relit else "through another lens"
+        meaning = f"the same views {change}: {reprojected.lens.description}"
+        meanings.append((f"{reprojection.parent.name}/", meaning))
     meanings.append(("validation.json", "the checks and their results"))
     if valid:
         meanings.append((SUMS, f"checksums of all files: sha256sum -c {SUMS}"))

@@ -21,7 +21,7 @@ from lightfield.dataset.config import Credits
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.names import SEQUENCE_EXPORTS
-from lightfield.dataset.passes import PASSES
+from lightfield.dataset.passes import PASSES, group_pass
 from lightfield.export import transforms
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
@@ -83,7 +83,11 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
         "lens": lightfield.lens.description,
         "resolution": [lightfield.lens.width, lightfield.lens.height],
         "depth": lightfield.depth,
-        "passes": [name for name in PASSES if (first / name).is_dir()],
+        "passes": [
+            name
+            for name in (*PASSES, *map(group_pass, lightfield.light_groups))
+            if (first / name).is_dir()
+        ],
         "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
         "software": f"Cycles in bpy {bpy}" if bpy else None,
         "cite": [SILVR, *([scene.credit] if scene.credit else [])],

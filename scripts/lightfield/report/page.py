@@ -34,13 +34,16 @@ def write(output: Path, template: str, **content: Any) -> None:
     # These are the project's own files: they need no escaping.
     page_modules = scripts.modules(TEMPLATES / "page/main.js")
     walk_modules = scripts.modules(TEMPLATES / "walk/main.js")
-    # A page has the modules that both share only once.
+    relight_modules = scripts.modules(TEMPLATES / "relight/main.js")
+    # A page has the modules that they share only once.
     only_of_walk = [module for module in walk_modules if module not in page_modules]
+    only_of_relight = [module for module in relight_modules if module not in page_modules]
     environment.globals |= {
         "index_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "index/main.js"))),
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
         "page_js": Markup(scripts.joined(page_modules)),
         "walk_js": Markup(scripts.joined(only_of_walk)),
+        "relight_js": Markup(scripts.joined(only_of_relight)),
     }
     write_text(output, environment.get_template(template).render(**content))
 

@@ -9,7 +9,7 @@ from matplotlib.colors import hsv_to_rgb
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import FLOW, Pass
+from lightfield.dataset.passes import FLOW, Pass, is_group
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.tonemap import to_8_bit
@@ -26,12 +26,12 @@ GOLDEN = (math.sqrt(5) - 1) / 2
 def collect(
     folder: Path, lightfield: LightField, view: View, exposure: float
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield name, meaning and picture of each readable pass of a view.
+    """Yield name, meaning and picture of each readable pass of a view. Leaves out light groups.
 
     ``exposure`` in stops applies to passes of light.
     """
     step = math.ceil(max(lightfield.lens.width, lightfield.lens.height) / SIDE)
-    passes = [(view_pass, view.name) for view_pass in lightfield.passes]
+    passes = [(each, view.name) for each in lightfield.passes if not is_group(each)]
     if view.flow:
         passes.append((FLOW, view.flow))
     for view_pass, name in passes:
@@ -47,11 +47,13 @@ def collect(
 def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
     """Return a pass's pixels (height, width, channels) as 8-bit sRGB (height, width, 3)."""
     match view_pass.kind:
-        case "light" if view_pass.name == "albedo":
-            # Albedo lies between 0 and 1, so it needs no exposure.
+        case "light" if view_pass.name in ("albedo", "base_colour"):
+            # These lie between 0 and 1, so they need no exposure.
             return to_8_bit(np.ascontiguousarray(pixels, np.float32))
         case "light":
             return pictures.develop(pixels.astype(np.float32), exposure)
+        case "value":
+            colours = np.repeat(pixels.astype(np.float32), 3, axis=-1)
         case "normal":
             colours = np.where(pixels.any(axis=-1, keepdims=True), pixels / 2 + 0.5, 0)
         case "id":

@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import itertools
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,11 +14,11 @@ import numpy as np
 
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.dataset import lightfield, shard_files
+from lightfield.dataset import light_groups, lightfield, passes, shard_files
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PASSES, Pass
+from lightfield.dataset.passes import Pass
 from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.reprojections import ReprojectionSettings
+from lightfield.dataset.reprojections import LIGHT_GROUPS, ReprojectionSettings
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
@@ -36,6 +37,19 @@ class SourceView:
 
     name: str
     paths: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class Light:
+    """The light of a view's images, whose names end with ``suffix``.
+
+    ``weights`` are the factors of red, green and blue of each light group. None leaves the view's
+    colour as it is. ``group`` is the only group that shines, if there is one by its name.
+    """
+
+    suffix: str = ""
+    weights: Mapping[str, Sequence[float]] | None = None
+    group: str | None = None
 
 
 class Job:
@@ -59,6 +73,7 @@ class Job:
         if not self.copies:
             self.lightfield.require_centre()
         self.passes = self._chosen_passes()
+        self.lights = self._chosen_lights()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
         # The SHA-256 of each image, by its path in the dataset.
         self.source_sums: dict[str, str] = {}
@@ -69,11 +84,33 @@ class Job:
     def _chosen_passes(self) -> list[Pass]:
         """Return the passes to reproject. Raises `UserError` for a pass that the views lack."""
         available = [each.name for each in self.lightfield.passes if each.kind != "motion"]
+        chosen: list[str] = []
         for name in self.settings.passes:
+            groups = self.lightfield.light_groups if name == LIGHT_GROUPS else []
+            chosen += map(passes.group_pass, groups) if groups else [name]
+        for name in chosen:
             if name not in available:
                 allowed = ", ".join(available) or "no passes to reproject"
                 raise UserError(f"passes: is {name}; {self.arguments.input_cfg} has {allowed}")
-        return [PASSES[name] for name in self.settings.passes]
+        return [passes.by_name(name) for name in chosen]
+
+    def _chosen_lights(self) -> list[Light]:
+        """Return the lights of the images. Raises `UserError` for a group that the views lack."""
+        light = self.settings.relight
+        groups = self.lightfield.light_groups
+        if light is None:
+            return [Light()]
+        if not groups:
+            raise UserError(
+                f"relight: {self.arguments.input_cfg} has no light groups; "
+                "render.light_groups makes them"
+            )
+        if isinstance(light, str):
+            return [Light(f"_{group}", {group: [1.0] * 3}, group) for group in groups]
+        try:
+            return [Light("", light_groups.weights(light, groups))]
+        except ValueError as error:
+            raise UserError(f"relight: {error}") from None
 
     @cached_property
     def copies(self) -> bool:
@@ -102,7 +139,9 @@ class Job:
 
     @property
     def needs_depth(self) -> bool:
-        """Whether an output holds depth."""
+        """Whether an output holds depth. The images of single light groups hold none."""
+        if self.lights[0].group:
+            return False
         return "exr" in self.settings.formats or self.settings.depth_png is not None
 
     @property
@@ -112,7 +151,7 @@ class Job:
         render = self.lightfield.content.get("render", {})
         return str(render.get("depth_precision", "float"))
 
-    def key(self, target: Target, identity: str) -> str:
+    def key(self, target: Target, light: Light, identity: str) -> str:
         """Return the SHA-256 of everything that an output's pixels depend on.
 
         ``identity`` stands for the source's content.
@@ -128,11 +167,13 @@ class Job:
         # False is left out, so that the keys of earlier versions stay valid.
         if self.lightfield.transparent:
             content["transparent"] = True
+        if light.weights is not None:
+            content["light"] = light.weights
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
-    def outputs(self, view: SourceView, target: Target) -> dict[str, Path]:
+    def outputs(self, view: SourceView, target: Target, light: Light) -> dict[str, Path]:
         """Return the files of a view's image, by kind."""
-        name = view.name + target.suffix
+        name = view.name + light.suffix + target.suffix
         files: dict[str, str] = {kind: f"{name}.{kind}" for kind in self.settings.formats}
         if self.settings.depth_png is not None:
             files["depth"] = f"{name}_depth.png"
@@ -146,23 +187,32 @@ class Job:
         folder: Path = self.arguments.output_dir
         return {each: each.path(folder, view.name + target.suffix) for each in self.passes}
 
-    def files(self, view: SourceView, target: Target) -> list[Path]:
-        """Return all files that a target makes of a view."""
-        return [*self.outputs(view, target).values(), *self.pass_outputs(view, target).values()]
+    def files(self, view: SourceView, target: Target, light: Light) -> list[Path]:
+        """Return all files that a target makes of a view in one of the lights."""
+        images = self.outputs(view, target, light)
+        return [*images.values(), *self.pass_outputs(view, target).values()]
 
     def sources(self, view: SourceView) -> list[Path]:
         """Return the files that a view is made of: its images, and those of its passes."""
         folder = self.lightfield.folder
-        return [*view.paths, *(each.path(folder, view.name) for each in self.passes)]
+        read = [each.path(folder, view.name) for each in self.passes]
+        for light in self.lights:
+            read += [self.group_path(view, group) for group in light.weights or ()]
+        return list(dict.fromkeys([*view.paths, *read]))
+
+    def group_path(self, view: SourceView, group: str) -> Path:
+        """Return the file of a light group of a view."""
+        return passes.of_group(group).path(self.lightfield.folder, view.name)
 
     def output_lightfield(self) -> LightField:
         """Return the input's lightfield.json with the lens, depth and poses of the new images."""
         lens = self.targets[0].lens
         depth = lens.usual_depth if self.needs_depth and self.lightfield.depth else None
         views = [
-            _turned(view, target)
+            _turned(view, target, light)
             for view in self.lightfield.views
             if self._passes(view.name, ".exr")
+            for light in self.lights
             for target in self.targets
         ]
         changes: dict[str, Any] = {"reprojection": self.settings.published}
@@ -231,11 +281,14 @@ def _find_image(folder: Path, name: str) -> Path:
     return next((path for path in candidates if path.is_file()), candidates[0])
 
 
-def _turned(view: lightfield.View, target: Target) -> lightfield.View:
-    """Return the view of a target's camera."""
-    name = view.name + target.suffix
+def _turned(view: lightfield.View, target: Target, light: Light) -> lightfield.View:
+    """Return the view of a target's camera in one of the lights."""
+    name = view.name + light.suffix + target.suffix
     # Flow is in pixels of the source's lens.
-    view = replace(view, others={k: v for k, v in view.others.items() if k != "flow"})
+    others = {k: v for k, v in view.others.items() if k != "flow"}
+    if light.group:
+        others["light"] = light.group
+    view = replace(view, others=others)
     if np.array_equal(target.rotation, np.eye(3)):
         return replace(view, name=name)
     matrix = view.matrix.copy()

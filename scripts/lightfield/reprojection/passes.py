@@ -48,6 +48,9 @@ def _resampled_channels(
         pixels = np.divide(pixels, length, out=np.zeros_like(pixels), where=length > 1e-6)
     elif view_pass.kind == "light":
         pixels = pixels.clip(-HALF_MAX, HALF_MAX)
+    elif view_pass.kind == "value":
+        # A filter may overshoot at edges.
+        pixels = pixels.clip(0, 1)
     resampled_planes = np.moveaxis(pixels.astype(view_pass.dtype), -1, 0)
     return dict(zip(view_pass.channels, resampled_planes, strict=True))
 

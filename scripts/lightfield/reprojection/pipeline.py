@@ -1,5 +1,6 @@
 """Runs a reprojection: makes the missing views, and writes a record of all views."""
 
+import itertools
 import os
 import sys
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Target
-from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.job import Job, Light, SourceView
 from lightfield.reprojection.passes import write_pass
 from lightfield.reprojection.pixels import SourcePixels, write
 
@@ -60,8 +61,8 @@ def _check_apart(job: Job, views: list[SourceView]) -> None:
     resolve_folder = cache(Path.resolve)
     for view in views:
         inputs = {(resolve_folder(path.parent), path.name) for path in job.sources(view)}
-        for target in job.targets:
-            for path in job.files(view, target):
+        for light, target in itertools.product(job.lights, job.targets):
+            for path in job.files(view, target, light):
                 if (resolve_folder(path.parent), path.name) in inputs:
                     raise UserError(
                         f"--output-dir {job.arguments.output_dir}: would replace the input {path}; "
@@ -84,22 +85,23 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
     """Make a view's missing or outdated files. Return all of its files."""
     arguments = job.arguments
     paths_of_view: list[Path] = []
-    todo: list[tuple[int, Target, str]] = []
+    todo: list[tuple[int, Target, Light, str]] = []
     identity = ""
-    for index, target in enumerate(job.targets):
-        paths = job.files(view, target)
+    for light, (index, target) in itertools.product(job.lights, enumerate(job.targets)):
+        paths = job.files(view, target, light)
         paths_of_view += paths
         if arguments.skip_if_exists and all(path.exists() for path in paths):
             continue
         identity = identity or _identity(view)
-        key = job.key(target, identity)
+        key = job.key(target, light, identity)
         if not all(job.record.is_finished(path, key) for path in paths):
-            todo.append((index, target, key))
+            todo.append((index, target, light, key))
     if todo:
         _check(job, view)
         source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
-        for index, target, key in todo:
-            write(job, target, job.maps[index], source, job.outputs(view, target), key)
+        for index, target, light, key in todo:
+            source.light_up(light)
+            write(job, target, job.maps[index], source, job.outputs(view, target, light), key)
             for view_pass, path in job.pass_outputs(view, target).items():
                 write_pass(job, view_pass, view, job.maps[index], path, key)
     return paths_of_view

@@ -8,13 +8,14 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.depth import with_precision
-from lightfield.geometry.lenses import Array
+from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
     Attribute,
+    Header,
     read_header,
     read_image,
     write_exr,
@@ -24,7 +25,7 @@ from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_ma
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.geometry import Target
-from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.job import Job, Light, SourceView
 from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
@@ -58,6 +59,8 @@ class SourcePixels:
         high = np.max(windows, axis=0)
         self.rows = (int(low[0]), int(high[1]))
         self.columns = (int(low[2]), int(high[3]))
+        self._job = job
+        self._view = view
         faces = [self._read(job, path) for path in view.paths]
         self.colour = _side_by_side([face.colour for face in faces])
         depths = [face.depth for face in faces if face.depth is not None]
@@ -67,14 +70,24 @@ class SourcePixels:
         meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
 
+    def light_up(self, light: Light) -> None:
+        """Replace the colour by the sum of the light groups with the weights of a light."""
+        if light.weights is None:
+            return
+        total = np.zeros((*self.colour.shape[:2], 3), np.float32)
+        for group, weights in light.weights.items():
+            if any(weights):
+                path = self._job.group_path(self._view, group)
+                _check_size(path, read_header(path), self._job.source)
+                pixels = read_image(path, "RGB", self.rows).colour[:, slice(*self.columns)]
+                total += pixels * np.array(weights, np.float32)
+        # Pixels without a source stay so.
+        self.colour[..., :3] = np.where(np.isnan(self.colour[..., :3]), np.nan, total)
+
     def _read(self, job: Job, path: Path) -> _Face:
         lens = job.source.face if isinstance(job.source, CubeMap) else job.source
         header = read_header(path)
-        if (header.width, header.height) != (lens.width, lens.height):
-            raise UserError(
-                f"{path}: has {header.width} × {header.height} pixels; "
-                f"the lens expects {lens.width} × {lens.height}"
-            )
+        _check_size(path, header, lens)
         names = header.channels
         colours = "RGB" if {"R", "G", "B"} <= set(names) else "YYY"
         if colours[0] not in names:
@@ -102,6 +115,15 @@ class SourcePixels:
         columns = slice(column - self.columns[0], end_column - self.columns[0])
         colour = np.ascontiguousarray(self.colour[rows, columns])
         return colour, None if self.depth is None else self.depth[rows, columns]
+
+
+def _check_size(path: Path, header: Header, lens: Lens) -> None:
+    """Raise `UserError` if an image has not the size of a lens."""
+    if (header.width, header.height) != (lens.width, lens.height):
+        raise UserError(
+            f"{path}: has {header.width} × {header.height} pixels; "
+            f"the lens expects {lens.width} × {lens.height}"
+        )
 
 
 def _side_by_side(faces: list[Array]) -> Array:

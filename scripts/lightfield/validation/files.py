@@ -148,8 +148,10 @@ def source_view(source: ImageSet | None, name: str) -> int | None:
     Return None if there is no such view.
     """
     numbers = source.numbers if source else {}
-    # The name of a cube map's face is its view's name and its own.
-    return numbers.get(name, numbers.get(name.rpartition("_")[0]))
+    # The names of a light and of a cube map's face follow the view's name.
+    while name not in numbers and "_" in name:
+        name = name.rpartition("_")[0]
+    return numbers.get(name)
 
 
 def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:

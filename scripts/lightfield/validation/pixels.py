@@ -17,7 +17,7 @@ from lightfield.dataset.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency, depth_questions
+from lightfield.validation import consistency, depth_questions, light_sums
 from lightfield.validation.consistency import Answer, Patches
 from lightfield.validation.depth_questions import Question
 from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
@@ -52,6 +52,8 @@ class Facts:
     - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
+    - ``sum_error``: by which part of the colour the sum of the light groups differs from it.
+    - ``not_summed``: why the light groups need not add up to the colour.
     - ``of_depth``: the answer to the question about its depth.
     """
 
@@ -65,6 +67,8 @@ class Facts:
     constant: bool = False
     missed: float = 0.0
     patches: Patches | None = None
+    sum_error: float | None = None
+    not_summed: str | None = None
     of_depth: depth_questions.Answer | None = None
 
     def fault(self, check: str, text: str, is_fault: bool | int = True) -> None:
@@ -142,6 +146,8 @@ class Examiner:
         is_rendered = not image_set.name
         in_circle, outside = self._of_lens(image_set.lightfield.lens)
         self._examine_colour(image_set, file, image, facts)
+        if image_set.lightfield.light_groups and file.path.endswith(".exr"):
+            self._add_up_light(image_set, file, image, facts)
         depth = image.channels.get("Z")
         if depth is not None:
             meaning = image_set.lightfield.depth
@@ -166,6 +172,25 @@ class Examiner:
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
+    def _add_up_light(
+        self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
+    ) -> None:
+        """Compare the sum of a view's light groups with its colour."""
+        rendered_set = rendered(self.sets) if image_set.name else None
+        source = rendered_set.lightfield if rendered_set else None
+        lightfield = image_set.lightfield
+        facts.not_summed = light_sums.reason_against(lightfield, source)
+        if facts.not_summed:
+            return
+        colour = np.stack([image.channels[name] for name in "RGB"])
+        folder = self.dataset / image_set.name
+        view = image_set.views[file.view]
+        facts.sum_error = light_sums.error(folder, view, lightfield.light_groups, colour)
+        if facts.sum_error is not None:
+            is_off = not facts.sum_error <= light_sums.most_off(lightfield, source)
+            text = f"the sum of the light groups is off by {facts.sum_error:.2g} of the colour"
+            facts.fault("light_groups", text, is_off)
+
     def _examine_colour(
         self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
     ) -> None:
@@ -182,11 +207,13 @@ class Examiner:
         infinite = int(np.isinf(colour).sum())
         facts.fault("colour", f"{infinite} values are infinite", infinite)
         shows_nothing = transparent and _shows_nothing(image, in_circle, is_rendered)
-        facts.fault("colour", "is black", not colour.any() and not shows_nothing)
+        # A light may be off, or reach nothing that the view shows.
+        may_be_black = shows_nothing or image_set.lightfield.is_relit
+        facts.fault("colour", "is black", not colour.any() and not may_be_black)
         if not shows_nothing and _has_one_colour(colour, in_circle):
             depth = image.channels.get("Z")
             is_empty = depth is not None and bool(np.isposinf(depth).all())
-            facts.constant = not is_rendered
+            facts.constant = not is_rendered and not image_set.lightfield.is_relit
             facts.fault("colour", "has one colour everywhere", is_rendered and not is_empty)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
@@ -206,6 +233,9 @@ class Examiner:
             lengths = np.linalg.norm(pixels, axis=0)
             wrong = int(((np.abs(lengths - 1) > NOT_UNIT) & (lengths != 0)).sum())
             facts.fault("passes", f"{wrong} normals are not unit vectors", wrong)
+        if view_pass.kind == "value":
+            wrong = int(((pixels < 0) | (pixels > 1)).sum())
+            facts.fault("passes", f"{wrong} values are not between 0 and 1", wrong)
         if view_pass.kind == "id":
             unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(view_pass))
             path = f"{view_pass.name}/{NAMES}"
@@ -326,6 +356,8 @@ def checks(
     ]
     with_depth = {file: fact for file, fact in readable.items() if fact.patches is not None}
     checks.append(_outcome(image_set, "depth", with_depth, "have positive depths, misses +inf"))
+    if image_set.lightfield.light_groups:
+        checks.append(_of_light_groups(image_set, readable))
     constant = sum(fact.constant for fact in readable.values())
     if constant:
         checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
@@ -347,6 +379,20 @@ def checks(
         check.warnings.append(text)
     check.figures["clamped"] = sum(clamped)
     return [*checks, check]
+
+
+def _of_light_groups(image_set: ImageSet, facts: Mapping[File, Facts]) -> Check:
+    """Return the check that the light groups of each view add up to its colour."""
+    reasons = {fact.not_summed for fact in facts.values() if fact.not_summed}
+    if reasons:
+        return Check(f"{image_set.prefix}light_groups", None, "; ".join(sorted(reasons)))
+    summed = {file: fact for file, fact in facts.items() if fact.sum_error is not None}
+    claim = "are the sum of their light groups, within the rounding of halves"
+    check = _outcome(image_set, "light_groups", summed, claim)
+    errors = [fact.sum_error for fact in summed.values() if fact.sum_error is not None]
+    if errors:
+        check.figures["largest_difference"] = float(f"{max(errors):.3g}")
+    return check
 
 
 def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim: str) -> Check:

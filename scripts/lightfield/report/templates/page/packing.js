@@ -6,7 +6,7 @@ import { clamp } from "./vectors.js";
 export const LIGHT = Float64Array.from({ length: 256 }, (_, code) =>
   code ? 2 ** (DATA.light[0] + ((code - 1) / 254) * (DATA.light[1] - DATA.light[0])) : 0);
 
-function encodeSrgb(linear) {
+export function encodeSrgb(linear) {
   const value = clamp(linear, 0, 1);
   return value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055;
 }
