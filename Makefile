@@ -34,7 +34,7 @@ check: .venv/complete-for-tests
 	ruff check .
 	ruff format --check .
 	mypy scripts/lightfield
-	snakefmt --check Snakefile rules
+	snakefmt --check Snakefile rules workflow
 	snakemake --lint
 
 consumers: .venv/complete .venv-consumers/complete

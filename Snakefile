@@ -2,6 +2,10 @@
 import sys
 from pathlib import Path
 
+from snakemake.utils import min_version
+
+min_version("9.0")
+
 # The folder of this workflow, which may be a module of another one.
 FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
