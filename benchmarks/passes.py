@@ -155,6 +155,20 @@ def _read(folder: Path, name: str, view: str) -> tuple[Array, int]:
     return np.stack(planes, axis=-1), int(image.attributes.get(images.NAN_ATTRIBUTE, 0))
 
 
+def _sum_error(parts: list[Array], colour: Array) -> Array:
+    """Return how far the sum of ``parts`` is from the colour, relative to it."""
+    relative: Array = np.abs(np.sum(parts, axis=0) - colour) / np.maximum(colour, 1e-3)
+    return relative
+
+
+def _ratios(values: Array, paint: Array, pixels: Array) -> list[float]:
+    """Return the median, 5 % and 95 % quantile of values over their paint. Empty without pixels."""
+    if not pixels.any():
+        return []
+    quantiles: list[float] = np.quantile(values[pixels] / paint[pixels], (0.5, 0.05, 0.95)).tolist()
+    return quantiles
+
+
 def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     view, beside = content.views[:2]
     read = {name: _read(folder, name, view.name) for name in PASSES}
@@ -163,14 +177,14 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     distance = source.depth(view, "distance")
     beside_distance = source.depth(beside, "distance")
     colour = images.read_image(source.path(view)).colour.astype(np.float64)
-    total = np.sum([passes[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
+    parts = [passes[name].astype(np.float64) for name in PARTS_OF_LIGHT]
+    sum_error = _sum_error(parts, colour)
+    group_paths = [of_group(name).path(folder, view.name) for name in content.light_groups]
+    groups = [images.read_image(path).colour.astype(np.float64) for path in group_paths]
+    group_error = _sum_error(groups, colour)
     rays = content.lens.pixel_rays()
     covered = np.isfinite(rays[..., 0])
     inside = binary_erosion(covered, np.ones((3, 3)), iterations=2, border_value=0)
-    sum_error = np.abs(total - colour) / np.maximum(colour, 1e-3)
-    group_paths = [of_group(name).path(folder, view.name) for name in content.light_groups]
-    group_sum = sum(images.read_image(path).colour.astype(np.float64) for path in group_paths)
-    group_error = np.abs(group_sum - colour) / np.maximum(colour, 1e-3)
     mask = passes["surface_mask"][..., 0]
     objects = passes["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
@@ -190,15 +204,6 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     beside_albedo = _read(folder, "albedo", beside.name)[0]
     paint = _paint(content)
     painted = ((paint > 0.01) & (paint < UNPAINTED / 2 / content.render["samples"])).all(axis=-1)
-    paint_ratio: list[float] = []
-    base_ratio: list[float] = []
-    exact = painted & (mask == 1)
-    if exact.any():
-        base = passes["base_colour"][exact] / paint[exact]
-        base_ratio = np.quantile(base, (0.5, 0.05, 0.95)).tolist()
-    if painted.any():
-        quantiles = np.quantile(albedo[painted] / paint[painted], (0.5, 0.05, 0.95))
-        paint_ratio = quantiles.tolist()
     row, column = np.nonzero(visible & hit)
     across, down = motion[row, column].T
     x = np.floor(column + 0.5 + across).astype(int) % content.lens.width
@@ -215,8 +220,8 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
         "motion": float(np.abs(passes["motion"]).max()),
         "nan": {name: count for name, (_, count) in read.items() if count},
         "lost inside": int((hit & inside & ~passes["normal"].any(axis=-1)).sum()),
-        "albedo of paint": paint_ratio,
-        "base colour of paint": base_ratio,
+        "albedo of paint": _ratios(albedo, paint, painted),
+        "base colour of paint": _ratios(passes["base_colour"], paint, painted & (mask == 1)),
         "surfaces": [float((mask == 1).sum() / covered.sum()), float((mask > 0).mean())],
         "painted": float(painted.sum() / covered.sum()),
         "visible": float((visible & hit).sum() / hit.sum()),
