@@ -267,7 +267,7 @@ class Sources:
         """
         wraps = _wraps(lens)
         pixels, offsets = self._projected(self.rays, surface.inverse, here, target, lens)
-        length = np.linalg.norm(offsets, axis=-1)
+        length = np.sqrt(_dot(offsets, offsets))
         worth = 1 / penalty(offsets, self.rays @ _turn(here)) ** 2
         values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
         values = values.astype(np.float32, copy=False)
@@ -393,15 +393,21 @@ def penalty(from_target: Array, from_view: Array) -> Array:
     The vectors (..., 3) lead from the target's and from the view's camera to the point, in the same
     unit.
     """
-    target_distance = np.linalg.norm(from_target, axis=-1)
-    view_distance = np.linalg.norm(from_view, axis=-1)
+    target_distance = np.sqrt(_dot(from_target, from_target))
+    view_distance = np.sqrt(_dot(from_view, from_view))
     with np.errstate(divide="ignore", invalid="ignore"):
-        target_direction = from_target / target_distance[..., None]
-        view_direction = from_view / view_distance[..., None]
-        angle = np.linalg.norm(target_direction - view_direction, axis=-1)
+        cosine = _dot(from_target, from_view) / (target_distance * view_distance)
+        # The chord between both directions.
+        angle = np.sqrt(np.maximum(2 - 2 * cosine, 0))
         farther: Array = np.maximum(view_distance / target_distance - 1, 0)
     sum_of_penalties: Array = angle + DISTANCE * farther + SHARP
     return sum_of_penalties
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """Return the scalar products (...) of vectors (..., 3)."""
+    product: Array = np.einsum("...i,...i->...", first, second)
+    return product
 
 
 def _wraps(lens: Lens) -> bool:
