@@ -9,7 +9,7 @@ import accessibility
 import numpy as np
 import pytest
 from PIL import Image
-from sphere import BALL, RED, look_at_ball, write_views
+from sphere import BALL, RADIUS, RED, look, look_at_ball, write_views
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import SourceDataset
@@ -75,6 +75,17 @@ def look_at_ball_alone(lens, matrix):
     return np.where(ball[..., None], colour, 0), np.where(ball, distance, np.inf)
 
 
+def look_at_mirror(lens, matrix):
+    """Return what a camera sees of a mirror all around, whose pattern is twice as far away."""
+    _, distance = look(lens, matrix)
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    along = (rays * matrix[:3, 3]).sum(axis=-1)
+    reach = -along + np.sqrt(along**2 + (2 * RADIUS) ** 2 - matrix[:3, 3] @ matrix[:3, 3])
+    points = matrix[:3, 3] + rays * reach[..., None]
+    waves = np.sin(points * [3.0, 2.5, 2.0]).prod(axis=-1, keepdims=True)
+    return np.nan_to_num(0.3 + waves * [0.25, -0.2, 0.15]), distance
+
+
 def look_from(tab, place, yaw, pitch):
     """Return the canvas from a place (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
     uri = tab.evaluate(
@@ -124,6 +135,26 @@ def test_the_canvas_equals_the_synthesis_and_the_truth(dataset, tab):
         )
         assert psnr(shown, expected) >= 35
         assert psnr(shown, truth) >= 28
+
+
+@pytest.mark.slow
+def test_the_canvas_shows_what_is_in_a_mirror(tmp_path, show):
+    folder = tmp_path / "dataset"
+    opened = show(written_page(folder, RIG["camera"], RIG, look_at_mirror))
+    wait(opened)
+    source, lens = SourceDataset(folder, "", ".exr"), lenses.from_camera(EYE)
+    field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
+    place, yaw, pitch = [0.1, 0.05, -0.1], 0.5, 0.1
+    shown = look_from(opened, place, yaw, pitch)
+    matrix = matrix_of(place, yaw, pitch)
+    true, _ = look_at_mirror(lens, matrix)
+    exposure = opened.evaluate("viewer.exposure")
+    expected, truth = (
+        pictures.develop(np.nan_to_num(c).astype(np.float32), exposure) / 255
+        for c in (field.synthesise(matrix, lens, VIEWS).colour, true)
+    )
+    assert psnr(shown, expected) >= 33
+    assert psnr(shown, truth) >= 26
 
 
 def test_the_eye_moves_by_keys_mouse_and_touch(tab):

@@ -59,11 +59,13 @@ def depth_range(depth: Array) -> tuple[float, float]:
     return float(low), float(max(high, low + 1.0))
 
 
-def pack_depth(depth: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
+def pack_depth(
+    depth: Array, limits: tuple[float, float], farther: Array | None = None
+) -> NDArray[np.uint8]:
     """Return depth (...) in metres as (..., 3): the high and the low byte of 16 times its code.
 
     Codes are `NO_DEPTH` for NaN, `MISS` for inf, and between them ``limits`` in equal steps of
-    log2.
+    log2. ``farther`` (...), 0 to 15, is added: `lightfield.synthesis.apparent.farther`.
     """
     low, high = limits
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -71,7 +73,7 @@ def pack_depth(depth: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     steps = np.nan_to_num(steps, nan=0.0, posinf=0.0, neginf=0.0)
     codes = np.clip(np.round(steps) + 1, 1, MISS - 1)
     codes = np.where(np.isposinf(depth), MISS, np.where(np.isnan(depth), NO_DEPTH, codes))
-    numbers = (codes * 16).astype(np.uint16)
+    numbers = (codes * 16 + (0 if farther is None else farther)).astype(np.uint16)
     packed = np.zeros((*numbers.shape, 3), np.uint8)
     packed[..., 0] = numbers >> 8
     packed[..., 1] = numbers & 255

@@ -28,6 +28,7 @@ from lightfield.report.packing import (
     packed_bytes,
     webp,
 )
+from lightfield.synthesis.view import seeming_farther
 
 Array = NDArray[Any]
 
@@ -170,10 +171,11 @@ def _pictures(
         return shown | {"points": None, "depth": None, "walk": None}
     rays = small.pixel_rays()
     reach = depth_range(depths)
-    for entry, depth in zip(packed, depths, strict=True):
-        entry["depth"] = webp(pack_depth(depth, reach))
     matrices = lightfield.matrices
     distances = stored_distance(depths, rays, lightfield.depth)
+    farther = seeming_farther(small, light, distances, matrices[embedded])
+    for entry, depth, steps in zip(packed, depths, farther, strict=True):
+        entry["depth"] = webp(pack_depth(depth, reach, steps))
     colours = pictures.develop(light, exposure)
     return shown | {
         "points": _points(distances, rays, matrices[embedded], colours),

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from lightfield.export.source import pixel_indices
 from lightfield.geometry.lenses import Lens
 from lightfield.report.packing import packed_bytes
-from lightfield.synthesis import kernels
+from lightfield.synthesis import apparent, kernels
 from lightfield.synthesis import view as synthesis
 from lightfield.synthesis.defaults import BEST
 
@@ -66,6 +66,7 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
         "hidden": float(kernels.HIDDEN),
         "certain": float(kernels.CERTAIN),
         "far": float(kernels.FAR),
+        "steps": apparent.STEPS,
         "fillsHoles": fills_holes,
     }
 

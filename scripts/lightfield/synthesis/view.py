@@ -21,7 +21,7 @@ from lightfield.geometry.depth import z_from_distance
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
-from lightfield.synthesis import kernels
+from lightfield.synthesis import apparent, kernels
 from lightfield.synthesis.defaults import BEST
 
 # Views are chosen by how well they see points in this many directions across and down the picture,
@@ -74,7 +74,7 @@ class Synthesised:
 class Surface:
     """A view as a surface with a vertex for each pixel.
 
-    - ``inverse`` (h, w): 1 / distance.
+    - ``inverse`` (h, w): 1 / distance. Reflections are as far away as they seem to be.
     - ``root`` (h, w, 3): the sharpened root of the colour.
     - ``certainty`` (h, w): how much each vertex counts.
     - ``right``, ``down`` (h, w): whether the right and the lower neighbour are on the same surface.
@@ -133,6 +133,7 @@ class Sources:
         self.most = most
         self.matrices: Array = np.array([view.matrix for view in views])
         self._held: OrderedDict[int, Surface] = OrderedDict()
+        self._pictures: OrderedDict[int, apparent.Picture] = OrderedDict()
 
     @cached_property
     def rays(self) -> Array:
@@ -143,25 +144,40 @@ class Sources:
     def distances(self) -> Array:
         """Two distances in metres that are typical of the scene, from some of the views."""
         sample = range(0, len(self.views), max(1, len(self.views) // 4))
-        return typical(np.concatenate([self.surface(index).inverse.ravel() for index in sample]))
+        return typical(np.concatenate([self._picture(index).inverse.ravel() for index in sample]))
 
     def surface(self, index: int) -> Surface:
         """Return a view as a surface. Keeps the latest views in memory."""
         if index not in self._held:
-            self._held[index] = self._surface(*self.read(self.views[index]))
+            self._held[index] = self._surface(index, *self.read(self.views[index]))
             if len(self._held) > self.most:
                 self._held.popitem(last=False)
         self._held.move_to_end(index)
         return self._held[index]
 
-    def _surface(self, colour: Array, distance: Array) -> Surface:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = np.where(distance > 0, 1 / distance, np.nan).astype(np.float32)
-        inverse[~np.isfinite(colour).all(axis=-1)] = np.nan
-        right = np.empty(inverse.shape, bool)
-        down = np.empty(inverse.shape, bool)
-        kernels.link(inverse, steepest(self.lens), right, down)
-        torn = np.isfinite(inverse) & ~_has_all_triangles(right, down)
+    def _picture(self, index: int) -> apparent.Picture:
+        """Return a view as a small picture. Keeps the latest ones in memory."""
+        if index not in self._pictures:
+            colour, distance = self.read(self.views[index])
+            self._pictures[index] = apparent.picture(colour, distance, self.matrices[index])
+            if len(self._pictures) > self.most * apparent.NEIGHBOURS:
+                self._pictures.popitem(last=False)
+        self._pictures.move_to_end(index)
+        return self._pictures[index]
+
+    def _steps(self, index: int) -> Array:
+        """Return how much farther away a view's pixels (h, w) seem, as `apparent.farther` does."""
+        others = [self._picture(other) for other in apparent.neighbours(self.matrices, index)]
+        return farther(self._picture(index), others, self.lens)
+
+    def _surface(self, index: int, colour: Array, distance: Array) -> Surface:
+        inverse = apparent.inverse_of(colour, distance)
+        right, down, torn = _links(inverse, self.lens)
+        steps = self._steps(index)
+        if steps.any():
+            part_surfaces(steps, right, down)
+            torn = _torn(inverse, right, down)
+            inverse *= apparent.factors(steps)
         certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
@@ -251,7 +267,7 @@ class Sources:
         """
         wraps = _wraps(lens)
         pixels, offsets = self._projected(self.rays, surface.inverse, here, target, lens)
-        length = np.linalg.norm(offsets, axis=-1)
+        length = np.sqrt(_dot(offsets, offsets))
         worth = 1 / penalty(offsets, self.rays @ _turn(here)) ** 2
         values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
         values = values.astype(np.float32, copy=False)
@@ -294,6 +310,50 @@ def fill(colour: Array, inverse: Array, coverage: Array, wraps: bool) -> None:
     kernels.enlarge(small, small_inverse, wraps, colour, inverse, coverage)
 
 
+def farther(here: apparent.Picture, others: Sequence[apparent.Picture], lens: Lens) -> Array:
+    """Return `apparent.farther` of a view's pixels (h, w). ``lens`` is that of the whole views."""
+    height, width = here.inverse.shape
+    small = lens if (lens.width, lens.height) == (width, height) else lens.resized(width, height)
+    steps = apparent.farther(here, others, small, _links(here.inverse, small)[2])
+    row = np.arange(lens.height) * height // lens.height
+    column = np.arange(lens.width) * width // lens.width
+    return steps[np.ix_(row, column)]
+
+
+def seeming_farther(lens: Lens, colours: Array, distances: Array, matrices: Array) -> Array:
+    """Return `apparent.farther` of the pixels (n, h, w) of all views of a ``lens``.
+
+    ``colours`` (n, h, w, 3) are linear, ``distances`` (n, h, w) in metres.
+    """
+    shown = [apparent.picture(*view) for view in zip(colours, distances, matrices, strict=True)]
+    return np.stack(
+        [
+            farther(picture, [shown[n] for n in apparent.neighbours(matrices, index)], lens)
+            for index, picture in enumerate(shown)
+        ]
+    )
+
+
+def part_surfaces(steps: Array, right: Array, down: Array) -> None:
+    """Tear surfaces (h, w) at the edges of reflections, in place. ``steps`` are `farther`'s."""
+    is_matte = steps == 0
+    right[:, :-1] &= is_matte[:, 1:] == is_matte[:, :-1]
+    down[:-1] &= is_matte[1:] == is_matte[:-1]
+
+
+def _links(inverse: Array, lens: Lens) -> tuple[Array, Array, Array]:
+    """Return which pixels (h, w) share a surface with their right and lower one, or are torn."""
+    right = np.empty(inverse.shape, bool)
+    down = np.empty(inverse.shape, bool)
+    kernels.link(inverse, steepest(lens), right, down)
+    return right, down, _torn(inverse, right, down)
+
+
+def _torn(inverse: Array, right: Array, down: Array) -> Array:
+    torn: Array = np.isfinite(inverse) & ~_has_all_triangles(right, down)
+    return torn
+
+
 def typical(inverse: Array) -> Array:
     """Return the two distances in metres at the upper and the lower quartile of ``inverse``."""
     distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
@@ -333,15 +393,21 @@ def penalty(from_target: Array, from_view: Array) -> Array:
     The vectors (..., 3) lead from the target's and from the view's camera to the point, in the same
     unit.
     """
-    target_distance = np.linalg.norm(from_target, axis=-1)
-    view_distance = np.linalg.norm(from_view, axis=-1)
+    target_distance = np.sqrt(_dot(from_target, from_target))
+    view_distance = np.sqrt(_dot(from_view, from_view))
     with np.errstate(divide="ignore", invalid="ignore"):
-        target_direction = from_target / target_distance[..., None]
-        view_direction = from_view / view_distance[..., None]
-        angle = np.linalg.norm(target_direction - view_direction, axis=-1)
+        cosine = _dot(from_target, from_view) / (target_distance * view_distance)
+        # The chord between both directions.
+        angle = np.sqrt(np.maximum(2 - 2 * cosine, 0))
         farther: Array = np.maximum(view_distance / target_distance - 1, 0)
     sum_of_penalties: Array = angle + DISTANCE * farther + SHARP
     return sum_of_penalties
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """Return the scalar products (...) of vectors (..., 3)."""
+    product: Array = np.einsum("...i,...i->...", first, second)
+    return product
 
 
 def _wraps(lens: Lens) -> bool:

@@ -25,6 +25,9 @@ export function unfolded(u, v) {
   return [x / length, y / length, z / length];
 }
 
+// Return by how many steps each pixel's inverse distance is too large for a reflection.
+const stepsFarther = (depth) => Uint8Array.from({ length: depth.length / 4 }, (_, pixel) => depth[4 * pixel + 1] & 15);
+
 // Return whether two neighbours a and b in a row of inverse distances are on one surface.
 function isOneSurface(before, a, b, after) {
   const step = b - a;
@@ -46,8 +49,9 @@ function inverseDistances(depth) {
   return inverses;
 }
 
-// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below.
-function joins(inverses) {
+// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below. Surfaces tear at
+// the edges of reflections.
+function joins(inverses, steps) {
   const [width, height] = DATA.size;
   const at = (i, j) => (i < 0 || j < 0 || i >= height || j >= width ? NaN : inverses[i * width + j]);
   const right = new Uint8Array(width * height);
@@ -55,8 +59,11 @@ function joins(inverses) {
   for (let i = 0; i < height; i++) {
     for (let j = 0; j < width; j++) {
       const pixel = i * width + j;
-      right[pixel] = isOneSurface(at(i, j - 1), at(i, j), at(i, j + 1), at(i, j + 2));
-      down[pixel] = isOneSurface(at(i - 1, j), at(i, j), at(i + 1, j), at(i + 2, j));
+      const isMatte = steps[pixel] === 0;
+      right[pixel] = isMatte === (steps[pixel + 1] === 0) &&
+        isOneSurface(at(i, j - 1), at(i, j), at(i, j + 1), at(i, j + 2));
+      down[pixel] = isMatte === (steps[pixel + width] === 0) &&
+        isOneSurface(at(i - 1, j), at(i, j), at(i + 1, j), at(i + 2, j));
     }
   }
   return { right, down };
@@ -193,8 +200,10 @@ function sharpRoots(light, { right, down }, torn) {
 // Bring a source onto the graphics card: colours, inverse distances and triangles.
 export function upload(source, light, depth) {
   const { gl } = walk;
-  const inverses = inverseDistances(depth);
-  const joined = joins(inverses);
+  const onSurface = inverseDistances(depth);
+  const steps = stepsFarther(depth);
+  const joined = joins(onSurface, steps);
+  const inverses = onSurface.map((value, pixel) => value * (1 - steps[pixel] / WALK.steps));
   const torn = tornPixels(inverses, joined);
   const marked = inverses.map((value) => (Number.isNaN(value) ? -1 : value));
   const image = (format, layout, values) =>
