@@ -34,13 +34,13 @@ rule export_sequence:
         views=exported_frames,
     output:
         f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
-    wildcard_constraints:
-        rig="[A-Za-z0-9_.-]+",
-        format="|".join(SEQUENCE_EXPORTS),
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:
         times_of("{scene}/{rig}/export/{source}{format}")
+    wildcard_constraints:
+        rig="[A-Za-z0-9_.-]+",
+        format="|".join(SEQUENCE_EXPORTS),
     resources:
         mem_mb=4000,
         runtime=240,
@@ -63,12 +63,12 @@ rule export:
         dataset=f"{DATASET}/lightfield.json",
     output:
         f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
-    wildcard_constraints:
-        format=f"(?!(?:{'|'.join(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:
         times_of("{scene}/{rig}/export/{source}{format}")
+    wildcard_constraints:
+        format=f"(?!(?:{'|'.join(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
     resources:
         mem_mb=4000,
         runtime=120,

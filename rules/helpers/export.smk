@@ -45,8 +45,7 @@ def frames_of(wildcards):
     frames = [
         dataset
         for dataset in DATASETS.values()
-        if f"{dataset.scene_folder}/{dataset.rig_name}" == name
-        and dataset.rig.sequence
+        if f"{dataset.scene_folder}/{dataset.rig_name}" == name and dataset.rig.sequence
     ]
     if not frames or wildcards.format not in frames[0].exports.selected:
         sys.exit(
@@ -79,7 +78,9 @@ def sequence_export_settings(wildcards):
         frames=[Path(dataset.folder).name for dataset in frames],
     )
     folder = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/exports"
-    return settings_file(f"{folder}/{source}/{wildcards.format}.json", settings.as_json())
+    return settings_file(
+        f"{folder}/{source}/{wildcards.format}.json", settings.as_json()
+    )
 
 
 def trained_by(wildcards):
