@@ -30,7 +30,13 @@ from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
+from lightfield.dataset.config import (
+    MODEL_KEYS,
+    accept_blend,
+    load_config,
+    load_scene,
+    scene_path,
+)
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
@@ -39,6 +45,7 @@ from lightfield.dataset.job_settings import (
     BuildSettings,
     FiguresSettings,
     FreePlacesSettings,
+    ImportSettings,
     Measurement,
     PackSettings,
     PageSettings,

@@ -46,6 +46,7 @@ BLENDER_RULES = (
     "check_blend",
     "check_cameras",
     "free_places",
+    "import_model",
     "inventory",
     "probe_cameras",
 )
