@@ -40,6 +40,7 @@ from lightfield.dataset.config import (
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
+from lightfield.dataset.keys import MODEL_VERSION
 from lightfield.dataset.names import VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,

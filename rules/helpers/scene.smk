@@ -24,7 +24,9 @@ def import_settings(dataset):
         )
     keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
     return ImportSettings(
-        **source.model_dump(include=keys, exclude_none=True)
+        **source.model_dump(include=keys, exclude_none=True),
+        version=MODEL_VERSION,
+        bpy=version("bpy"),
     ).as_json()
 
 

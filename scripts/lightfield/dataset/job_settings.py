@@ -59,6 +59,10 @@ class ImportSettings(ModelOptions):
     allow_missing: bool = Field(
         False, description="Import although files that the model names are missing."
     )
+    version: int | None = Field(
+        None, description="Changes with the importer, so that the model is imported again."
+    )
+    bpy: str | None = Field(None, description="The same for Blender's version.")
 
     @model_validator(mode="after")
     def _up_is_unknown(self) -> Self:
