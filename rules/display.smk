@@ -47,6 +47,7 @@ BLENDER_RULES = (
     "check_blend",
     "check_cameras",
     "free_places",
+    "import_model",
     "inventory",
     "mesh",
     "probe_cameras",

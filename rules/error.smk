@@ -9,6 +9,7 @@ rule probe_cameras:
     input:
         settings=probe_settings,
         inventory=of_first("lightfield_inventory"),
+        model=of_first("model_record"),
         places=of_first("places"),
     output:
         f"{WORK}/{{scene}}/probes.json",
@@ -18,11 +19,13 @@ rule probe_cameras:
     params:
         places=optional("places"),
         inventory=optional("inventory"),
+        model=optional("model"),
     message:
         "Placing the probe cameras of {wildcards.scene}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.places} {params.inventory} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.places} {params.inventory} {params.model}"
+        " --output {output} > {log} 2>&1"
 
 
 # Only scenes with a target error need this. Its output is reproducible, except for --seconds.

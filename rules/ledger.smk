@@ -149,6 +149,8 @@ def mark_stale_files(name):
     rerun(presence.outgrown_records(dataset))
     if presence.external_changed(dataset, ViewStore(STORE) if STORE else None):
         rerun([dataset.inventory])
+    if presence.model_changed(dataset):
+        rerun([dataset.blend])
     for path, problem in presence.broken_files(dataset):
         DAMAGED.setdefault(path, (problem, files))
 

@@ -8,6 +8,7 @@ rule panorama_lightfield:
     input:
         settings=settings_of("panorama", panorama_settings),
         inventory=of_dataset("blend_inventory"),
+        model=of_dataset("model_record"),
         calibration=of_dataset("calibration"),
     output:
         f"{PANORAMA}/lightfield.json",
@@ -19,11 +20,13 @@ rule panorama_lightfield:
     params:
         calibration=optional("calibration"),
         inventory=optional("inventory"),
+        model=optional("model"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.calibration} {params.inventory} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.calibration} {params.inventory} {params.model}"
+        " --output {output} > {log} 2>&1"
 
 
 rule render_panorama:

@@ -34,6 +34,7 @@ rule lightfield:
     input:
         settings=settings_of("lightfield", lightfield_settings),
         inventory=of_dataset("lightfield_inventory"),
+        model=of_dataset("model_record"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
     output:
@@ -47,12 +48,13 @@ rule lightfield:
         calibration=optional("calibration"),
         places=optional("places"),
         inventory=optional("inventory"),
+        model=optional("model"),
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
         " --settings {input.settings} {params.calibration} {params.places}"
-        " {params.inventory} --output {output} > {log} 2>&1"
+        " {params.inventory} {params.model} --output {output} > {log} 2>&1"
 
 
 rule check_cameras:

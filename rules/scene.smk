@@ -1,4 +1,4 @@
-# A .blend: built by a scene builder, or brought by the user and checked.
+# A .blend: built by a scene builder, made of a model file, or brought by the user and checked.
 
 
 include: "helpers/scene.smk"
@@ -21,6 +21,30 @@ rule build_scene:
     shell:
         f"python {SCRIPTS}/build_scene.py"
         " --settings {input.settings} --output {output} > {log} 2>&1"
+
+
+rule import_model:
+    input:
+        settings=scene_settings_of("import_model", import_settings),
+        model=lambda wildcards: local(scene_of(wildcards).source.model),
+    output:
+        blend=f"{WORK}/{{name}}/model.blend",
+        record=f"{WORK}/{{name}}/model.json",
+    log:
+        log_of("{name}/import_model"),
+    benchmark:
+        times_of("{name}/import_model")
+    # With a store a user's files lie where Snakemake runs.
+    localrule: bool(STORE)
+    resources:
+        mem_mb=8000,
+        runtime=30,
+    message:
+        "Importing {input.model}"
+    shell:
+        f"python {SCRIPTS}/import_model.py"
+        " --settings {input.settings} --output {output.blend} --record {output.record}"
+        " > {log} 2>&1"
 
 
 rule check_blend:
@@ -62,7 +86,7 @@ rule inventory:
     benchmark:
         times_of("{name}/inventory")
     # With a store a user's files lie where Snakemake runs.
-    localrule: bool(STORE) and any(d.source.blend for d in SCENES.values())
+    localrule: bool(STORE) and any(d.source.blend or d.source.model for d in SCENES.values())
     resources:
         mem_mb=8000,
         runtime=30,

@@ -70,6 +70,7 @@ def bring_settings():
     for dataset in CHOSEN:
         files = [
             dataset.blend_check,
+            dataset.model_record,
             dataset.inventory,
             dataset.calibration,
             dataset.places,

@@ -36,6 +36,10 @@ def main() -> None:
         capture = capture.resolved(arguments.inventory)
     elif capture.source.blend:
         raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
+    if arguments.model:
+        capture = capture.of_model(arguments.model)
+    elif capture.source.model:
+        raise UserError("--model: is missing; scripts/import_model.py writes it")
     render = capture.render
     if settings.panorama_width:
         capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
@@ -86,6 +90,7 @@ def parse() -> argparse.Namespace:
         type=Path,
         help="JSON of scripts/inventory.py, for a user's .blend, and for light_groups",
     )
+    parser.add_argument("--model", type=Path, help="JSON of scripts/import_model.py, for a model")
     parser.add_argument(
         "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"
     )

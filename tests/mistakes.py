@@ -494,7 +494,29 @@ EXPLAINED = [
     ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
     ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
     ("scene.builder", "nowhere", "'nowhere'; must be one of"),
-    ("scene.blend", "a.blend", "scene: must have one of builder, blend and dataset"),
+    ("scene.blend", "a.blend", "scene: must have one of builder, blend, model and dataset"),
+    ("scene", {"model": "a.fbx"}, 'scene.model: is "a.fbx"; must be a path that ends in .glb'),
+    ("scene", {"model": "a{b}.glb"}, 'scene.model: is "a{b}.glb"; must be a path that ends in'),
+    (
+        "scene",
+        {"model": "a.glb", "up": "z"},
+        "scene.up: goes with OBJ, PLY and STL; glTF and USD say it themselves",
+    ),
+    (
+        "scene",
+        {"model": "a.obj", "light": "sun"},
+        'scene.light: is "sun"; must be one of softboxes, city',
+    ),
+    ("scene", {"model": "a.obj", "unit": "mm"}, 'scene.unit: is "mm"; must be box or metres'),
+    ("scene", {"model": "a.obj", "ground": 1}, "scene.ground: is 1; must be true or false"),
+    ("scene", {"model": "a.obj", "url": "https://a.org/b"}, "scene.url: does not go with model"),
+    ("scene", {"model": "a.obj", "parameters": {}}, "scene.parameters: does not go with model"),
+    (
+        "scene",
+        {"model": "a.obj", "frame": "file"},
+        "scene.frame: file goes with blend, not with model",
+    ),
+    ("scene.light", "city", "scene.light: goes with model"),
     ("scene.url", "https://example.org/a.blend", "scene.url: goes with blend, not with builder"),
     ("scene.frame", "file", "scene.frame: file goes with blend, not with builder"),
     ("render.samples", "file", "render.samples: file goes with scene.blend"),
@@ -770,6 +792,16 @@ PROGRAMS = [
             ({"formats": ["obj"]}, "formats.[0]: is "),
             ({"frame": -1}, "frame: is -1; must be"),
             ({"format": ["glb"]}, "format: unknown key; did you mean formats?"),
+        )
+    ),
+    *(
+        ("import_model.json", {"model": "a.obj", **content}, said)
+        for content, said in (
+            ({"model": "a.txt"}, 'model: is "a.txt"; must be a path that ends in .glb'),
+            ({"model": "a.glb", "up": "y"}, "up: goes with OBJ, PLY and STL"),
+            ({"light": "day"}, 'light: is "day"; must be one of softboxes'),
+            ({"frame": "file"}, 'frame: is "file"; must be a whole number'),
+            ({"units": "box"}, "units: unknown key; did you mean unit?"),
         )
     ),
     *(

@@ -102,11 +102,17 @@ rigs:
 exports:
   dnerf: {sources: [views], points: 9}
 """
+MODELLED = f"""
+scene: {{model: model.obj}}
+render: {{samples: 4}}
+rigs:
+  LFPlane: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}}}
+"""
 TARGETS = [
     *("all", "package", "plan", "advise", "error_vs_time", "reprojection_benchmark", "stability"),
     *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
 ]
-CHOSEN = ["--config", "scenes=[built,brought,imported,moved]", "rigs=all", "preset=full"]
+CHOSEN = ["--config", "scenes=[built,brought,imported,modelled,moved]", "rigs=all", "preset=full"]
 # Rules without output: a target is read or always runs, or only asks for other targets.
 WITHOUT_OUTPUT = {
     *("all", "smoke", "report_html", "package", "error_vs_time", "gpu_check", "synthesis"),
@@ -137,7 +143,11 @@ class Build:
     """A checkout in which stand-ins built everything, and Snakemake's own metadata is lost."""
 
     def __init__(self, folder):
-        self.folder = checkout(folder, built=BUILT, brought=BROUGHT, imported=IMPORTED, moved=MOVED)
+        scenes = {"built": BUILT, "brought": BROUGHT, "imported": IMPORTED, "modelled": MODELLED}
+        scenes["moved"] = MOVED
+        self.folder = checkout(folder, **scenes)
+        for name in ("model.obj", "other.obj"):
+            (folder / name).write_text("# stands in for a model\n")
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
         write_views(folder / "published/LFPlane", camera, {"type": "plane", "cameras": [2, 1]})
         for program in [*ROOT.glob("scripts/*.py"), *ROOT.glob("benchmarks/*.py")]:
@@ -291,14 +301,14 @@ def assert_made_from_present_inputs(build, jobs):
         assert line["files"][first_output][0] == build.sha256(first_output)
 
 
-SCENES = {name: f"configs/scenes/{name}.yaml" for name in ("built", "brought", "imported", "moved")}
+NAMES = ("built", "brought", "imported", "modelled", "moved")
+SCENES = {name: f"configs/scenes/{name}.yaml" for name in NAMES}
 ROOM = "scripts/scenes/room/__init__.py"
 OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
 # The cameras of a light field, its panorama and its probes follow from the same settings.
 CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
-RENDERED_CAMERAS = {
-    f"{scene} {rule}" for scene in ("built", "brought", "moved") for rule in CAMERAS
-}
+RENDERED = ("built", "brought", "modelled", "moved")
+RENDERED_CAMERAS = {f"{scene} {rule}" for scene in RENDERED for rule in CAMERAS}
 BUILDING = {"build_scene"} | CAMERAS
 # The first rig has the probes.
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
@@ -459,6 +469,15 @@ ROUNDS = {
             {f"{scene} {rule}" for scene in ("built", "moved") for rule in BUILDING},
         ),
     },
+    "another model, and how it becomes a scene": {
+        "modelled": (
+            "model: model.obj",
+            "model: other.obj, unit: metres, up: z, ground: true, light: city, frame: 2, "
+            "allow_missing: true",
+            {"import_model", "inventory"} | CAMERAS,
+        ),
+    },
+    "another text of the model": {"model.obj": ("#", "# ", {"import_model"})},
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
     "a sequence": {
         "built": (

@@ -15,7 +15,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import read_settings
 from lightfield.dataset import config
 from lightfield.dataset.exports import ExportSettings, settings_of
-from lightfield.dataset.job_settings import MeshSettings
+from lightfield.dataset.job_settings import ImportSettings, MeshSettings
 from lightfield.dataset.loading import load_datasets
 from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.geometry.rigs import from_settings
@@ -28,6 +28,7 @@ SETTINGS = {
     "colmap.json": ExportSettings[settings_of("colmap")],
     "instant_ngp.json": ExportSettings[settings_of("instant_ngp")],
     "costs.json": CostSettings,
+    "import_model.json": ImportSettings,
 }
 
 

@@ -15,6 +15,21 @@ def build_settings(dataset):
     return settings.as_json()
 
 
+def import_settings(dataset):
+    """Return the settings of a model's import. Ends the run for a scene without a model."""
+    source = load_scene(dataset.scene_name).scene
+    if source.model is None:
+        sys.exit(
+            f"error: {dataset.scene_work}/model.blend: the scene YAML has no model that makes it"
+        )
+    keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
+    return ImportSettings(
+        **source.model_dump(include=keys, exclude_none=True),
+        version=MODEL_VERSION,
+        bpy=version("bpy"),
+    ).as_json()
+
+
 def inventory_settings(dataset):
     """Return the settings of a scene's inventory: what it depends on in the scene YAML."""
     written = load_scene(dataset.scene_name)

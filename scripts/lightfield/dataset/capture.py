@@ -7,7 +7,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PlainSerializer
 
-from lightfield.core.files import reading
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, reading
 from lightfield.core.settings import Settings
 from lightfield.dataset import blend, config
 from lightfield.dataset.config import FILE, AtLeastOne, SceneSource
@@ -19,8 +20,10 @@ from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
 SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
+# The same for a model.
+MODEL_SOURCE_KEYS = {"frame", *config.MODEL_KEYS}
 # The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
-CAPTURED_KEYS = SOURCE_KEYS | {"blend", "dataset", "sha256"}
+CAPTURED_KEYS = SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *config.MODEL_KEYS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +32,7 @@ class Capture:
 
     ``scene_name`` is the scene YAML's name. ``render`` is the block of lightfield.json.
     ``external_files`` are path and SHA-256 of each file that a .blend reads. `resolved` fills them
-    in.
+    in. ``model_fingerprint`` is the identity of a model. `of_model` fills it in.
     """
 
     scene_name: str
@@ -37,6 +40,12 @@ class Capture:
     render: dict[str, Any]
     rig: Rig
     external_files: Sequence[tuple[str, str | None]] = ()
+    model_fingerprint: str | None = None
+
+    def of_model(self, record: Path) -> Self:
+        """Return the capture with the identity of its model, from the ``record`` of its import."""
+        content = read_keys(record, "import_model.py", "fingerprint")
+        return replace(self, model_fingerprint=str(content["fingerprint"]))
 
     def resolved(self, inventory: Path) -> Self:
         """Return the capture with the values of a user's .blend, which its ``inventory`` lists.
@@ -90,7 +99,11 @@ class Capture:
 
     @property
     def fingerprint(self) -> str:
-        """The identity of the scene: see `scene_fingerprint`."""
+        """The identity of the scene: see `scene_fingerprint` and `model_fingerprint`."""
+        if self.source.model:
+            if self.model_fingerprint is None:
+                raise UserError(f"{self.source.model}: is not imported; import_model.py does it")
+            return self.model_fingerprint
         return scene_fingerprint(self.source, self.external_files)
 
     def origin(self, render: dict[str, Any]) -> dict[str, Any]:
@@ -104,7 +117,9 @@ class Capture:
         origin["frame"] = self.source.frame
         origin["scene"] = {
             "name": self.scene_name,
-            **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
+            **self.source.model_dump(
+                include=MODEL_SOURCE_KEYS if self.source.model else SOURCE_KEYS, exclude_none=True
+            ),
             "fingerprint": self.fingerprint,
         }
         origin["render"] = render
@@ -112,8 +127,8 @@ class Capture:
 
     @property
     def builder_fingerprint(self) -> str | None:
-        """A value that changes when the builder does. A user's .blend needs none."""
-        return None if self.source.blend else self.fingerprint
+        """A value that changes when the builder does. A user's .blend or model needs none."""
+        return None if self.source.blend or self.source.model else self.fingerprint
 
     @property
     def imported(self) -> str | None:

@@ -19,6 +19,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     TypeAdapter,
+    field_validator,
     model_validator,
 )
 
@@ -35,7 +36,7 @@ from lightfield.core.settings import (
 )
 from lightfield.dataset import light_groups, published
 from lightfield.dataset.exports import Export, Exports
-from lightfield.dataset.names import MESH, VIEWS, builders
+from lightfield.dataset.names import LIGHTS, MESH, MODELS, SOFTBOXES, UP, VIEWS, builders
 from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES, in_order
 from lightfield.dataset.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.dataset.reprojections import (
@@ -323,14 +324,67 @@ class Parameters(Settings):
     )
 
 
+_MODEL_SUFFIXES = "|".join(suffix[1:] for suffix in (*MODELS, *map(str.upper, MODELS)))
+
+
+class ModelOptions(Settings):
+    """How a model file becomes a scene."""
+
+    unit: Literal["box", "metres"] = Field(
+        "box",
+        description="Of a model. box: its largest side becomes 1 m, and its middle the origin. "
+        "metres: it keeps its size and place.",
+    )
+    up: Literal["auto", "y", "z"] = Field(
+        "auto",
+        description="The axis of an OBJ, PLY or STL model that points up. auto: y in OBJ, z in PLY "
+        "and STL. glTF and USD say it themselves.",
+    )
+    ground: bool = Field(
+        False,
+        description="Put a floor under a model, which catches its shadow.",
+    )
+    light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
+        SOFTBOXES,
+        description="Of a model. softboxes: three lamps and a grey world. Any other name: that "
+        "environment of Blender.",
+    )
+
+    @field_validator("light")
+    @classmethod
+    def _exists(cls, light: str) -> str:
+        if light not in LIGHTS:
+            raise ValueError(f"must be one of {', '.join(LIGHTS)}")
+        return light
+
+
+def check_model(model: str, up: str) -> None:
+    """Raise a ValueError if ``up`` is given for a model that says itself which axis points up."""
+    if up != "auto" and Path(model).suffix.lower() not in UP:
+        raise ValueError("up: goes with OBJ, PLY and STL; glTF and USD say it themselves")
+
+
+ModelPath = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            rf"^{QUOTED}\.({_MODEL_SUFFIXES})$",
+            f"a path that ends in {', '.join(MODELS)}, without {{ }} * ? [ ] and line breaks",
+        )
+    ),
+]
+
+
 # The word in a scene YAML that stands for the .blend's own value.
 FILE = "file"
 # Keys of `SceneSource` that only a .blend takes.
 BLEND_KEYS = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
+# Keys of `SceneSource` that only a model takes.
+MODEL_KEYS = tuple(ModelOptions.model_fields)
 
 
-class SceneSource(Settings):
-    """The source of a scene: a builder, a .blend file, or views that exist already."""
+class Origin(Settings):
+    """Where a scene is from: a builder, a .blend, a model file, or views that exist already."""
 
     builder: str | None = Field(
         None,
@@ -346,6 +400,11 @@ class SceneSource(Settings):
             rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
         ),
         description="The path of your own .blend file, from the folder that Snakemake runs in.",
+    )
+    model: ModelPath | None = Field(
+        None,
+        description="The path of a model file in glTF, USD, OBJ, PLY or STL, from the folder that "
+        "Snakemake runs in.",
     )
     dataset: str | None = Field(
         None,
@@ -365,12 +424,12 @@ class SceneSource(Settings):
     frame: Frame | Literal["file"] = Field(
         1,
         description="The frame of the animation to render. file: the frame at which the .blend was "
-        "saved.",
+        "saved. A model is measured at this frame.",
     )
     allow_missing: bool | None = Field(
         None,
         description="Render although textures, fonts, libraries, volumes or caches are missing or "
-        "cannot be read. Such a texture is magenta.",
+        "cannot be read. Such a texture is magenta. The same for the files of a model.",
     )
     sha256: str | None = Field(
         None,
@@ -385,10 +444,14 @@ class SceneSource(Settings):
         None, description="The page on which a person finds the .blend file."
     )
 
+
+class SceneSource(ModelOptions, Origin):
+    """Where a scene is from, and for a model, how it becomes a scene."""
+
     @model_validator(mode="after")
-    def _one_of_three(self) -> Self:
-        if [self.builder, self.blend, self.dataset].count(None) != 2:
-            raise ValueError("must have one of builder, blend and dataset")
+    def _one_of_four(self) -> Self:
+        if [self.builder, self.blend, self.model, self.dataset].count(None) != 3:
+            raise ValueError("must have one of builder, blend, model and dataset")
         if self.builder is not None:
             names = builders()
             if self.builder not in names:
@@ -401,8 +464,18 @@ class SceneSource(Settings):
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: does not go with dataset")
+        elif self.model is not None:
+            for name in (*BLEND_KEYS, "parameters"):
+                if name in self.model_fields_set and name != "allow_missing":
+                    raise ValueError(f"{name}: does not go with model")
+            if self.frame == FILE:
+                raise ValueError("frame: file goes with blend, not with model")
+            check_model(self.model, self.up)
         elif self.blend is not None and "parameters" in self.model_fields_set:
             raise ValueError("parameters: goes with builder, not with blend")
+        for name in MODEL_KEYS:
+            if self.model is None and name in self.model_fields_set:
+                raise ValueError(f"{name}: goes with model")
         return self
 
 
@@ -684,7 +757,7 @@ class Credits(Settings):
 class Scene(Credits):
     """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
-    scene: SceneSource = Field(description="The scene: a builder, a .blend, or a dataset.")
+    scene: SceneSource = Field(description="The scene: a builder, a .blend, a model, or a dataset.")
     render: Render | None = Field(
         None, description="How Cycles renders. Required, except with scene.dataset."
     )

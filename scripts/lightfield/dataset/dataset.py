@@ -71,8 +71,15 @@ class Dataset(DatasetPaths):
     @property
     def intermediates(self) -> list[str]:
         """The intermediate files, which a target rule names, too: a missing one is made again."""
-        scene = self.blend if self.source.builder else self.blend_check
-        files = _paths(scene, self.inventory, self.calibration, self.places, self.cameras)
+        scene = self.blend_check if self.source.blend else self.blend
+        files = _paths(
+            scene,
+            self.model_record,
+            self.inventory,
+            self.calibration,
+            self.places,
+            self.cameras,
+        )
         files.append(f"{self.work}/checksums.txt")
         if isinstance(self.panorama, str):
             files += [f"{self.work}/panorama/lightfield.json", self.panorama]

@@ -33,15 +33,22 @@ class DatasetPaths(Description):
 
     @property
     def blend(self) -> str | list[str]:
-        """The .blend of a builder or of the user. An import has none."""
+        """The .blend of a builder, of a model, or of the user. An import has none."""
         if self.imported:
             return []
+        if self.source.model:
+            return f"{self.scene_work}/model.blend"
         return self.source.blend or f"{self.scene_work}/scene.blend"
 
     @property
     def blend_check(self) -> str | list[str]:
         """The proof that the user's .blend has the recorded SHA-256. A built scene needs none."""
         return f"{self.scene_work}/blend.json" if self.source.blend else []
+
+    @property
+    def model_record(self) -> str | list[str]:
+        """The record of a model's import: its fingerprint, and the files that were read."""
+        return f"{self.scene_work}/model.json" if self.source.model else []
 
     @property
     def inventory(self) -> str | list[str]:

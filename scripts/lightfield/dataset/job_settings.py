@@ -5,12 +5,20 @@ file with --settings. The settings of light fields are in `lightfield.dataset.ca
 reprojections and exports have modules of their own.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, PlainSerializer
+from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 
 from lightfield.core.settings import Settings
-from lightfield.dataset.config import FILE, AtLeastOne, Credits, Parameters
+from lightfield.dataset.config import (
+    FILE,
+    AtLeastOne,
+    Credits,
+    ModelOptions,
+    ModelPath,
+    Parameters,
+    check_model,
+)
 from lightfield.dataset.names import builders
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
@@ -41,6 +49,25 @@ class BuildSettings(Settings):
     fingerprint: str | None = Field(
         None, description="Changes with the builder's text, so that the scene is built again."
     )
+
+
+class ImportSettings(ModelOptions):
+    """The settings of scripts/import_model.py."""
+
+    model: ModelPath = Field(description="The path of the model file.")
+    frame: Frame = Field(1, description="The frame at which the model is measured.")
+    allow_missing: bool = Field(
+        False, description="Import although files that the model names are missing."
+    )
+    version: int | None = Field(
+        None, description="Changes with the importer, so that the model is imported again."
+    )
+    bpy: str | None = Field(None, description="The same for Blender's version.")
+
+    @model_validator(mode="after")
+    def _up_is_unknown(self) -> Self:
+        check_model(self.model, self.up)
+        return self
 
 
 class FreePlacesSettings(Settings):

@@ -10,7 +10,7 @@ So each view names the machine that rendered it, and validation reports differen
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -24,6 +24,8 @@ from lightfield.dataset.names import BUILDERS
 # Raise these when rendering, or the computation of flow, writes other files for equal settings.
 RENDER_VERSION = 4
 FLOW_VERSION = 1
+# Raise this when the import of a model makes another scene of it.
+MODEL_VERSION = 1
 
 
 # Cached, because a look-up in a package's files takes a millisecond.
@@ -51,6 +53,15 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
         for file in sorted((BUILDERS / folder).rglob("*.py")):
             files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
     return _digest([files, source.parameters.model_dump(), version("bpy")])
+
+
+def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
+    """Return the identity of an imported model: 64 hexadecimal digits.
+
+    ``options`` say how it was imported. ``files`` are path and SHA-256 of each file that it was
+    read from. None stands for a missing file.
+    """
+    return _digest([MODEL_VERSION, version("bpy"), dict(options), files])
 
 
 def render_key(lightfield: LightField, view: View) -> str:

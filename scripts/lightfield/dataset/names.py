@@ -31,6 +31,24 @@ EXPORTS = (
 # Those of them that are made of a whole sequence.
 SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "scene_flow")
 
+# The formats of model files that scripts/import_model.py reads.
+MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")
+# Those of them that do not say which axis points up, with the usual axis.
+UP = {".obj": "y", ".ply": "z", ".stl": "z"}
+SOFTBOXES = "softboxes"
+# The lights of a model: lamps, or an environment that ships with bpy.
+LIGHTS = (
+    SOFTBOXES,
+    "city",
+    "courtyard",
+    "forest",
+    "interior",
+    "night",
+    "studio",
+    "sunrise",
+    "sunset",
+)
+
 BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
 
 

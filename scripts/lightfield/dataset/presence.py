@@ -2,8 +2,9 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, unreadable
@@ -65,7 +66,7 @@ def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
     try:
         inventory = json.loads(Path(str(dataset.inventory)).read_bytes())
         for file in inventory["external_files"]:
-            if _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"]):
+            if _has_changed(home, file):
                 return True
             if store and file["bytes"] and not store.has(file["sha256"], file["bytes"]):
                 return True
@@ -76,12 +77,38 @@ def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
     return False
 
 
+def model_changed(dataset: Dataset) -> bool:
+    """Return whether a file that a model was read from differs from the record of its import."""
+    if not dataset.source.model:
+        return False
+    home = Path(dataset.source.model).parent
+    try:
+        record = json.loads(Path(str(dataset.model_record)).read_bytes())
+        return any(_has_changed(home, file) for file in record["external_files"])
+    except FileNotFoundError:
+        return False
+    except (OSError, *DAMAGE):
+        return True
+
+
+def _has_changed(home: Path, file: Mapping[str, Any]) -> bool:
+    """Return whether a file, with its path from ``home``, has another size or time than listed."""
+    return _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
+
+
 def check_presence(dataset: Dataset) -> None:
-    """Check that the user's .blend exists, or can be downloaded. Raises `UserError`.
+    """Check that the user's .blend exists or can be downloaded, and that the model exists.
+
+    Raises `UserError`.
 
     On machines without a common folder, only the user's machine has the file.
     """
     source = dataset.source
+    if source.model and not Path(source.model).is_file():
+        raise UserError(
+            f"{config.OWN_SCENES}/{dataset.scene_name}.yaml: scene.model: "
+            f"there is no file {source.model}; put it there"
+        )
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
         raise UserError(

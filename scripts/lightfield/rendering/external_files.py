@@ -49,7 +49,7 @@ def external_files() -> list[dict[str, Any]]:
     files: set[Path] = set()
     for block, path in _blocks_and_absolute_paths():
         files.update(_files(block, path))
-    return [_entry(file, home) for file in sorted(files)]
+    return [listed(file, home) for file in sorted(files)]
 
 
 def problems(images: Collection[Any]) -> list[dict[str, str]]:
@@ -229,7 +229,8 @@ def _problem(block: Any, path: Path) -> str | None:
     return None if readable else "cannot be read"
 
 
-def _entry(path: Path, home: Path) -> dict[str, Any]:
+def listed(path: Path, home: Path) -> dict[str, Any]:
+    """Return the entry of a file in a list: its path from ``home``, size, time and SHA-256."""
     entry: dict[str, Any] = {"path": _from(home, path)}
     if not path.is_file():
         return entry | dict.fromkeys(("bytes", "mtime_ns", "sha256"))

@@ -91,13 +91,20 @@ KEY_PAGES: dict[str, Page] = {
         "it. Only `scene` is always required. The other blocks have pages of their own.",
         [
             Section("A scene YAML", config.Scene),
-            Section("scene", config.SceneSource),
+            Section("scene", config.SceneSource, config.ModelOptions),
+            Section("scene: of a model", config.ModelOptions),
             Section("scene: parameters", config.Parameters),
             Section("flow", config.Flow),
             Section("mesh", config.MeshFiles),
             Section("report", config.Report),
             Section("publish", publication.Publication),
             Section("publish: a creator", publication.Creator),
+            # The other programs' settings files fill a page of their own.
+            Section(
+                "The settings file of import_model.py",
+                job_settings.ImportSettings,
+                config.ModelOptions,
+            ),
         ],
     ),
     "render-keys.md": Page(
@@ -208,8 +215,8 @@ PROGRAM_PAGES = {
         "Programs that prepare a scene",
         "These programs build or check a scene, and place its cameras.",
         [
-            "build_scene", "fetch_blend", "check_blend", "inventory", "make_lightfield",
-            "free_places", "check_cameras", "import_views",
+            "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
+            "make_lightfield", "free_places", "check_cameras", "import_views",
         ],
     ),
     "programs-render.md": (

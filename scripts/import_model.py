@@ -1,0 +1,74 @@
+"""Make a scene of a model file in glTF, USD, OBJ, PLY or STL, and save it as a .blend.
+
+A settings file is JSON: {"model": "chair.glb", "unit": "box", "light": "softboxes"}.
+"""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import check_settings, run
+from lightfield.core.files import keep_apart
+from lightfield.dataset.names import LIGHTS, SOFTBOXES
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
+    parser.add_argument("--output", required=True, type=Path, help=".blend to write")
+    parser.add_argument(
+        "--record", required=True, type=Path, help="JSON to write: the files that were read"
+    )
+    add_settings_flags(parser)
+    arguments = parser.parse_args()
+    check_settings(arguments, add_settings_flags, "model")
+
+    # Only now, so that --help need not wait for these.
+    from pydantic import TypeAdapter
+
+    from lightfield.core.files import atomic_path, write_json
+    from lightfield.core.settings import checked, read_settings
+    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.rendering import blend_file, model
+
+    if arguments.settings:
+        settings = read_settings(ImportSettings, arguments.settings)
+    else:
+        names = ("model", "unit", "up", "ground", "light", "frame", "allow_missing")
+        content = {name: getattr(arguments, name) for name in names}
+        settings = checked(TypeAdapter(ImportSettings), content, "flags")
+    keep_apart("--record", arguments.record, Path(settings.model))
+    record = model.make_scene(settings, arguments.output.parent)
+    with atomic_path(arguments.output) as temporary:
+        blend_file.save_scene(temporary)
+    write_json(arguments.record, record)
+    print(f"{settings.model}: {model.summary(record)}")
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--model", help="model file to import")
+    flags.add_argument(
+        "--unit",
+        choices=("box", "metres"),
+        default="box",
+        help="box (default): the largest side becomes 1 m; metres: size and place stay",
+    )
+    flags.add_argument(
+        "--up",
+        choices=("auto", "y", "z"),
+        default="auto",
+        help="axis of an OBJ, PLY or STL that points up (default: y for OBJ, z for the others)",
+    )
+    flags.add_argument("--ground", action="store_true", help="put a floor under it")
+    flags.add_argument("--light", choices=LIGHTS, default=SOFTBOXES, help="light (default: lamps)")
+    flags.add_argument("--frame", type=int, default=1, help="frame to measure at (default: 1)")
+    flags.add_argument(
+        "--allow-missing", action="store_true", help="import although files are missing"
+    )
+
+
+if __name__ == "__main__":
+    run(main)

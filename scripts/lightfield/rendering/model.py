@@ -1,0 +1,305 @@
+"""Makes a scene of a model file in glTF, USD, OBJ, PLY or STL, with Blender's importers."""
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.settings import FARTHEST
+from lightfield.dataset.job_settings import ImportSettings
+from lightfield.dataset.keys import model_fingerprint
+from lightfield.dataset.names import UP
+from lightfield.rendering import blend_file, model_files, model_light
+from lightfield.rendering.external_files import listed
+from lightfield.rendering.quiet import quiet
+from lightfield.rendering.render_graph import in_render
+
+# Of each importer, what is not its default. Cameras and lamps are removed in any case.
+_OPTIONS: dict[str, dict[str, Any]] = {
+    # Without this, an armature brings a mesh for the shape of its bones.
+    "gltf": {"disable_bone_shape": True},
+    "usd": {"import_cameras": False, "import_lights": False, "create_world_material": False},
+}
+# How an importer turns each axis that may point up.
+_AXES = {
+    "y": {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"},
+    "z": {"forward_axis": "Y", "up_axis": "Z"},
+}
+
+# A largest side beyond these is a mistake, and not to be had in Blender's 32 bits.
+_SIDES = (1e-9, 1e12)
+
+# The least and the largest coordinates of all meshes, (2, 3).
+Box = NDArray[np.float64]
+
+
+def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
+    """Make a scene of a model in the open file. Return the record of the import.
+
+    ``folder`` is where the .blend will be. The record has the ``fingerprint``, the files that the
+    model was read from as ``external_files``, and its ``box`` in metres.
+
+    Raises `UserError` for a model that is broken, empty, or lacks files.
+    """
+    path = Path(settings.model)
+    model_files.check(path)
+    referred_files = model_files.referred(path)
+    if not settings.allow_missing:
+        _refuse_missing(path, referred_files)
+    blend_file.new_scene()
+    _import(path, settings.up)
+    _remove_cameras_and_lamps()
+    files = _read_files(path, referred_files)
+    if not settings.allow_missing:
+        _refuse_missing(path, files)
+    _pack(path)
+    _give_material()
+    bpy.context.scene.frame_set(settings.frame)
+    box = _box(path)
+    if settings.unit == "box":
+        _scale_to_box(path, box)
+        box = _box(path)
+    elif np.abs(box).max() > FARTHEST:
+        raise UserError(
+            f"{path}: reaches {np.abs(box).max():.3g} m from the origin, and Blender computes in "
+            "32 bits; scale it with unit: box"
+        )
+    model_light.add(settings.light, box)
+    if settings.ground:
+        model_light.add_ground(box)
+    _name_caches_from(folder)
+    entries = [listed(file, path.parent) for file in files]
+    options = settings.model_dump(include={"unit", "up", "ground", "light", "frame"})
+    names = [(entry["path"], entry["sha256"]) for entry in entries]
+    return {
+        "fingerprint": model_fingerprint(options, names),
+        "box": box.round(6).tolist(),
+        "external_files": entries,
+    }
+
+
+def _import(path: Path, up: str) -> None:
+    """Import a model with the importer of its suffix. Raises `UserError` if it refuses it."""
+    suffix = path.suffix.lower()
+    family = "gltf" if suffix in (".glb", ".gltf") else suffix[1:4]
+    options = dict(_OPTIONS.get(family, {}))
+    if suffix in UP:
+        options |= _AXES[UP[suffix] if up == "auto" else up]
+    operators: dict[str, Callable[..., set[str]]] = {
+        "gltf": bpy.ops.import_scene.gltf,
+        "obj": bpy.ops.wm.obj_import,
+        "ply": bpy.ops.wm.ply_import,
+        "stl": bpy.ops.wm.stl_import,
+        "usd": bpy.ops.wm.usd_import,
+    }
+    try:
+        with quiet():
+            # Blender would take a path with // before it for one from the .blend.
+            result = operators[family](filepath=str(path.absolute()), **options)
+    except RuntimeError as error:
+        raise UserError(_refusal(path, str(error))) from None
+    except UnicodeError:
+        raise UserError(_refusal(path, "it has a name that is not UTF-8")) from None
+    if "FINISHED" not in result:
+        raise UserError(_refusal(path, "it says nothing more"))
+    if suffix == ".ply":
+        _check_faces(path)
+
+
+def _refusal(path: Path, message: str) -> str:
+    """Return in one line that an importer refuses a model. It may report a Python traceback."""
+    lines = [line.strip() for line in message.splitlines() if line.strip()]
+    if "Traceback" in message:
+        # Blender adds the place of the operator's call.
+        lines = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)][-1:] or lines
+    reason = lines[0].removeprefix("Error: ").rstrip(".")
+    return (
+        f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; export the model "
+        "again"
+    )
+
+
+def _check_faces(path: Path) -> None:
+    """Raise `UserError` for a PLY with fewer faces than it promises. Blender drops the others."""
+    with path.open("rb") as file:
+        head = file.read(65536).partition(b"end_header")[0]
+    promised = re.search(rb"element\s+face\s+(\d+)", head)
+    count = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
+    if promised and count < int(promised[1]):
+        raise UserError(
+            f"{path}: has {int(promised[1])} faces, of which Blender reads {count}; it is cut "
+            "short, or faces lack corners"
+        )
+
+
+def _remove_cameras_and_lamps() -> None:
+    """Remove what would change the dataset's own cameras and light."""
+    kinds = {"CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER"}
+    for obj in [obj for obj in bpy.data.objects if obj.type in kinds]:
+        # The world places of its children depend on it.
+        if obj.children:
+            empty = bpy.data.objects.new(obj.name, None)
+            bpy.context.scene.collection.objects.link(empty)
+            obj.user_remap(empty)
+            empty.parent, empty.matrix_local = obj.parent, obj.matrix_local
+        bpy.data.objects.remove(obj)
+
+
+def _read_files(path: Path, referred_files: Sequence[Path]) -> list[Path]:
+    """Return all files that a model was read from, also missing ones, in order."""
+    files = {path, *referred_files}
+    for image in _images():
+        if not image.packed_files:
+            files.update(_image_files(image))
+    return sorted({Path(os.path.relpath(file)) for file in files})
+
+
+def _images() -> list[Any]:
+    """Return the images that the importer has loaded from files."""
+    return [image for image in bpy.data.images if image.source in ("FILE", "TILED", "SEQUENCE")]
+
+
+def _image_files(image: Any) -> list[Path]:
+    """Return the files of an image. One with tiles has several."""
+    path = bpy.path.abspath(image.filepath)
+    if image.source != "TILED":
+        return [Path(path)]
+    return [Path(path.replace("<UDIM>", str(tile.number))) for tile in image.tiles]
+
+
+def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
+    """Raise `UserError` if a model names files that do not exist."""
+    missing_files = [_shown(file) for file in files if not file.is_file()]
+    if missing_files:
+        more = f" and {len(missing_files) - 8} more" if missing_files[8:] else ""
+        raise UserError(
+            f"{path}: files that it names are missing: {', '.join(missing_files[:8])}{more}; put "
+            "them there, or render without them: scene: {allow_missing: true}"
+        )
+
+
+def _shown(path: Path) -> str:
+    """Return a path for a message, also if its bytes are not UTF-8."""
+    return os.fsencode(path).decode("utf-8", "replace")
+
+
+def _pack(path: Path) -> None:
+    """Pack all textures into the .blend, without this machine's paths."""
+    for image in _images():
+        is_packed = bool(image.packed_files)
+        if not is_packed and all(file.is_file() for file in _image_files(image)):
+            try:
+                image.pack()
+            except RuntimeError as error:
+                file = bpy.path.abspath(image.filepath)
+                raise UserError(f"{path}: the texture {file} cannot be read: {error}") from None
+        # Blender would read the file at another `filepath` again.
+        image.filepath_raw = f"//{Path(image.filepath).name or image.name}"
+
+
+def _name_caches_from(folder: Path) -> None:
+    """Name the USD files of animations, which are read again for each frame, from ``folder``."""
+    for cache in bpy.data.cache_files:
+        absolute = bpy.path.abspath(cache.filepath)
+        cache.filepath = bpy.path.relpath(absolute, start=str(folder.absolute()))
+
+
+def _give_material() -> None:
+    """Give meshes without a material one: of their own colours, or else grey."""
+    plain = None
+    coloured: dict[str, Any] = {}
+    for mesh in bpy.data.meshes:
+        if any(mesh.materials):
+            continue
+        mesh.materials.clear()
+        colours = mesh.color_attributes.active_color
+        if colours is None:
+            plain = plain or _material("plain", None)
+            mesh.materials.append(plain)
+        else:
+            if colours.name not in coloured:
+                coloured[colours.name] = _material("coloured", colours.name)
+            mesh.materials.append(coloured[colours.name])
+
+
+def _material(name: str, attribute: str | None) -> Any:
+    """Return a new matt material, grey or with the colours of an attribute."""
+    material = bpy.data.materials.new(name)
+    tree = material.node_tree
+    tree.nodes.clear()
+    shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    shader.inputs["Base Color"].default_value = (0.5, 0.5, 0.5, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    if attribute:
+        colours = tree.nodes.new("ShaderNodeAttribute")
+        colours.attribute_name = attribute
+        tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
+    return material
+
+
+def _box(path: Path) -> Box:
+    """Return the box of all meshes as a render of the current frame has them.
+
+    Raises `UserError` if there is no face, or a coordinate is not a number.
+    """
+    boxes = in_render(_boxes)
+    if not boxes:
+        raise UserError(f"{path}: has no faces to render; must have a mesh with faces")
+    corners = np.array(boxes)
+    if not np.isfinite(corners).all():
+        raise UserError(f"{path}: has vertices whose places are not numbers; export it again")
+    return np.array([corners[:, 0].min(0), corners[:, 1].max(0)])
+
+
+def _boxes(depsgraph: Any) -> list[Box]:
+    """Return the box of each mesh with faces. Vertices without a face are not visible."""
+    boxes: list[Box] = []
+    for instance in depsgraph.object_instances:
+        if instance.object.type != "MESH" or not instance.show_self:
+            continue
+        mesh = instance.object.data
+        if not mesh.polygons:
+            continue
+        places = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.vertices.foreach_get("co", places.ravel())
+        corners = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        is_used = np.zeros(len(places), bool)
+        is_used[corners] = True
+        matrix = np.array(instance.matrix_world, np.float64)
+        used_places = places[is_used] @ matrix[:3, :3].T + matrix[:3, 3]
+        boxes.append(np.array([used_places.min(0), used_places.max(0)]))
+    return boxes
+
+
+def _scale_to_box(path: Path, box: Box) -> None:
+    """Scale the scene, so that the largest side of ``box`` is 1 and its middle the origin."""
+    side = float((box[1] - box[0]).max())
+    if not side:
+        raise UserError(f"{path}: all its vertices are at one place; must have a size")
+    if not _SIDES[0] < side < _SIDES[1]:
+        raise UserError(
+            f"{path}: its largest side is {side:.3g}; must be from {_SIDES[0]:g} to {_SIDES[1]:g}"
+        )
+    model = bpy.data.objects.new("model", None)
+    bpy.context.scene.collection.objects.link(model)
+    for obj in bpy.data.objects:
+        if obj.parent is None and obj != model:
+            obj.parent = model
+    model.matrix_world = Matrix.Scale(1 / side, 4) @ Matrix.Translation(-box.mean(0))
+    bpy.context.view_layer.update()
+
+
+def summary(record: dict[str, Any]) -> str:
+    """Return what a record says of an imported model, in one line."""
+    size = np.subtract(*reversed(record["box"]))
+    sides = " × ".join(f"{side:.4g}" for side in size)
+    return f"read from {len(record['external_files'])} files; its box has {sides} m"
