@@ -390,6 +390,13 @@ ROUNDS = {
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    "another sensor": {
+        "built": (
+            "a: 0.01",
+            "a: 0.02",
+            {"sensor reproject", "sensor reprojected_lightfield"},
+        ),
+    },
     "another pass": {
         "built": (
             TO_CUBES,

@@ -42,6 +42,7 @@ from lightfield.dataset.reprojections import (
     Stops,
     face_problem,
 )
+from lightfield.dataset.sensors import Sensor, SensorSettings
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -521,6 +522,20 @@ class Reprojection(ReprojectionOptions):
         )
 
 
+# The keys of a reprojection that say how its views are resampled.
+OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
+
+
+class SensorReprojection(Reprojection):
+    """The same views as a sensor sees them. `Scene.developments` makes it from ``sensor``."""
+
+    sensor: SensorSettings
+
+    @property
+    def settings(self) -> ReprojectionSettings:
+        return super().settings.model_copy(update={"sensor": self.sensor})
+
+
 class Flow(Settings):
     """The optical flow between pairs of views."""
 
@@ -577,6 +592,9 @@ class Scene(Credits):
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
     )
+    sensor: Sensor | None = Field(
+        None, description="The views as a sensor sees them: noise, vignetting, brackets."
+    )
     flow: Flow | None = Field(
         None, description="Optical flow from depth and poses, for a scene that stands still."
     )
@@ -613,12 +631,64 @@ class Scene(Credits):
         for name, reprojection in self.reprojections.items():
             _check_name(f"reprojections.{name}", name, REPROJECTION_NEIGHBOURS)
             self._check_reprojection(f"reprojections.{name}", reprojection)
+        if self.sensor:
+            self._check_sensor(self.sensor)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
         if self.flow and self.render and self.render.depth == "none":
             raise ValueError("flow: follows from depth, but render.depth is none")
         self._check_split_rigs()
         return self
+
+    @property
+    def developments(self) -> dict[str, Reprojection]:
+        """The reprojections, and those that ``sensor`` adds, by the names of their folders."""
+        developments = dict(self.reprojections)
+        for source in self.sensor.sources if self.sensor else ():
+            developments |= self._sensor_reprojections(source)
+        return developments
+
+    def _sensor_reprojections(self, source: str) -> dict[str, Reprojection]:
+        """Return the reprojections that ``sensor`` adds for a source, by their folders' names."""
+        assert self.sensor
+        original = self.reprojections.get(source) or Reprojection()
+        optics = original.model_dump(include={*OPTICS}, exclude_unset=True)
+        return {
+            name: SensorReprojection.of(
+                **optics,
+                rigs=self.sensor.rigs or original.rigs,
+                bits=8 if sensor.bits <= 8 else 16,
+                sensor=sensor,
+            )
+            for name, sensor in self.sensor.folders(source).items()
+        }
+
+    def _check_sensor(self, sensor: Sensor) -> None:
+        """Check that the sensor's sources and rigs exist, and that it can develop them."""
+        allowed_sources = [VIEWS, *self.reprojections]
+        for source in sensor.sources:
+            if source not in allowed_sources:
+                raise ValueError(
+                    f"sensor.sources: is {source!r}; must be of {', '.join(allowed_sources)}"
+                )
+            if sensor.sources.count(source) > 1:
+                raise ValueError(f"sensor.sources: must name {source} once")
+            original = self.reprojections.get(source)
+            if original and original.cube_map and sensor.vignetting:
+                raise ValueError(f"sensor.vignetting: does not go with the faces of {source}")
+            for rig_name in sensor.rigs or ():
+                if original and rig_name not in (original.rigs or self.rigs):
+                    raise ValueError(f"sensor.rigs: {rig_name} is not of the reprojection {source}")
+            for name in sensor.folders(source):
+                if name in self.reprojections:
+                    raise ValueError(f"reprojections.{name}: the name is taken by sensor")
+        for rig_name in sensor.rigs or ():
+            if rig_name not in self.rigs:
+                raise ValueError(
+                    f"sensor.rigs: there is no rig {rig_name!r}{suggestion(rig_name, self.rigs)}"
+                )
+        if self.render and self.render.transparent:
+            raise ValueError("sensor: does not go with render.transparent")
 
     def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
         """Check that a reprojection's rigs and passes exist."""
@@ -647,23 +717,25 @@ class Scene(Credits):
             for key in ("camera", "frames"):
                 if getattr(rig, key) != getattr(split_rigs[training], key):
                     raise ValueError(f"rigs.{name}.{key}: must be that of {training}, which trains")
-        for name, reprojection in self.reprojections.items():
+        for name, reprojection in self.developments.items():
             missing_rigs = split_rigs.keys() - set(reprojection.rigs or self.rigs)
             if missing_rigs and missing_rigs != split_rigs.keys():
                 rigs = ", ".join(sorted(missing_rigs))
+                key = f"reprojections.{name}" if name in self.reprojections else "sensor"
                 raise ValueError(
-                    f"reprojections.{name}.rigs: lacks {rigs}; must have all rigs "
+                    f"{key}.rigs: lacks {rigs}; must have all rigs "
                     "of which one trains and others test, or none"
                 )
 
     def _check_export(self, key: str, export: Export) -> None:
         """Check that an export's sources exist, and that its consumer can take them."""
-        allowed_sources = [VIEWS, *self.reprojections]
+        developments = self.developments
+        allowed_sources = [VIEWS, *developments]
         for source in export.sources:
             if source not in allowed_sources:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
             has_depth = self.render is None or self.render.depth != "none"
-            reprojection = None if source == VIEWS else self.reprojections[source]
+            reprojection = None if source == VIEWS else developments[source]
             if reprojection:
                 has_depth &= reprojection.format == "exr"
             for name in (reprojection and reprojection.rigs) or self.rigs:

@@ -9,18 +9,22 @@ from statistics import fmean
 
 from lightfield.core.files import DAMAGE
 from lightfield.dataset import memory, passes
-from lightfield.dataset.config import FILE
+from lightfield.dataset.config import FILE, SensorReprojection
 from lightfield.dataset.dataset_paths import DatasetPaths
 from lightfield.dataset.unit_costs import (
+    BRACKET_SECONDS,
     CHECK_SECONDS,
     COMPRESSED,
     DENOISING_SAMPLES,
     MOST_SHOWN_VIEWS,
+    NOISY_BYTES,
     READ_SECONDS,
     REPORT_SECONDS,
     REPROJECTION_SECONDS,
     SECONDS_PER_SAMPLE,
+    SENSOR_SECONDS,
     START_UP_SECONDS,
+    WEIGHT_BYTES,
 )
 
 # A pixel's samples if a target error is given instead.
@@ -64,15 +68,26 @@ class Estimate:
     @property
     def all_view_bytes(self) -> float:
         """Bytes of a view, its flow, and its reprojections."""
-        pixel_bytes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
         size = self.view_bytes
         if self.dataset.flow:
             size += passes.FLOW.bytes * COMPRESSED * self.dataset.pixels
-        reprojected_size = 0.0
-        for name, reprojection in self.dataset.reprojections.items():
-            pixels = self._reprojected_pixels(name)
-            reprojected_size += pixels * pixel_bytes[reprojection.format] * (reprojection.bits / 8)
+        reprojected_size = sum(
+            self._reprojected_pixels(name) * self._reprojected_pixel_bytes(name)
+            for name in self.dataset.reprojections
+        )
         return size + reprojected_size
+
+    def _reprojected_pixel_bytes(self, name: str) -> float:
+        """Return the bytes of a pixel of a reprojection, with the files beside its views."""
+        reprojection = self.dataset.reprojections[name]
+        if reprojection.format == "exr":
+            return 10 * COMPRESSED
+        if not isinstance(reprojection, SensorReprojection):
+            return PNG_BYTES * reprojection.bits / 8
+        size = NOISY_BYTES * reprojection.bits / 8
+        if reprojection.sensor.bracket is not None:
+            size += WEIGHT_BYTES * COMPRESSED
+        return size
 
     def memory_bytes(self, pixels: int) -> int:
         """Return the memory in bytes of a process that renders views of this many pixels.
@@ -98,9 +113,14 @@ class Estimate:
         return START_UP_SECONDS + self.view_seconds * pixels / self.dataset.pixels
 
     def reprojection_seconds(self, name: str) -> float:
-        """Return the seconds that one core takes to read and reproject a view."""
-        read_pixels = self.dataset.pixels
-        return read_pixels * READ_SECONDS + self._reprojected_pixels(name) * REPROJECTION_SECONDS
+        """Return the seconds that one core takes to read a view, reproject and develop it."""
+        pixel_seconds = REPROJECTION_SECONDS
+        reprojection = self.dataset.reprojections[name]
+        if isinstance(reprojection, SensorReprojection):
+            is_bracket = reprojection.sensor.bracket is not None
+            pixel_seconds += BRACKET_SECONDS if is_bracket else SENSOR_SECONDS
+        read_seconds = self.dataset.pixels * READ_SECONDS
+        return read_seconds + self._reprojected_pixels(name) * pixel_seconds
 
     @property
     def import_seconds(self) -> float:

@@ -18,12 +18,15 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.reprojections import ReprojectionSettings
+from lightfield.dataset.sensors import sensor_files
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
+from lightfield.imaging.sensor import Parameters
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
+from lightfield.reprojection.sensor import parameters_of
 
 # The version of the files, which every key has. Raise it if equal settings give other files.
 VERSION = 3
@@ -58,6 +61,8 @@ class Job:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         if not self.copies:
             self.lightfield.require_centre()
+        if settings.sensor and lightfield.transparent:
+            raise UserError("sensor: does not go with transparent views")
         self.passes = self._chosen_passes()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
         # The SHA-256 of each image, by its path in the dataset.
@@ -112,8 +117,21 @@ class Job:
         render = self.lightfield.content.get("render", {})
         return str(render.get("depth_precision", "float"))
 
-    def key(self, target: Target, identity: str) -> str:
-        """Return the SHA-256 of everything that an output's pixels depend on.
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """The positions of the views in lightfield.json, by their names."""
+        return {view.name: number for number, view in enumerate(self.lightfield.views)}
+
+    def sensor_parameters(self, view: SourceView, target: Target) -> Parameters | None:
+        """Return the parameters of the sensor for a view's image. None without a sensor."""
+        if self.settings.sensor is None:
+            return None
+        number = self._numbers.get(view.name, 0)
+        frame = self.lightfield.content.get("frame", 0)
+        return parameters_of(self.settings.sensor, number, view.name, target.suffix, frame)
+
+    def key(self, view: SourceView, target: Target, identity: str) -> str:
+        """Return the SHA-256 of everything that the pixels of a view's image depend on.
 
         ``identity`` stands for the source's content.
         """
@@ -128,6 +146,8 @@ class Job:
         # False is left out, so that the keys of earlier versions stay valid.
         if self.lightfield.transparent:
             content["transparent"] = True
+        if parameters := self.sensor_parameters(view, target):
+            content["sensor"] = parameters.to_json()
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def outputs(self, view: SourceView, target: Target) -> dict[str, Path]:
@@ -138,6 +158,8 @@ class Job:
             files["depth"] = f"{name}_depth.png"
         if self.settings.mask:
             files["mask"] = f"dynamic_mask_{name}.png"
+        if self.settings.sensor:
+            files |= sensor_files(self.settings.sensor, name)
         folder: Path = self.arguments.output_dir
         return {kind: folder / file for kind, file in files.items()}
 
