@@ -330,6 +330,7 @@ REFUSED = [
         for value in ([], [0, 0], [101], "auto", -101, [0] * 33)
     ),
     *(("reprojections.perspective.passes", value) for value in (["albedo"], ["Normal"], "normal")),
+    *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
     *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
     *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
     *(("sensor.rigs", value) for value in ([], ["Nobody"], ["LFSphere", 7])),
@@ -515,6 +516,11 @@ EXPLAINED = [
         "exports.instant_ngp.sources",
         ["fisheye"],
         "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
+    ),
+    (
+        "reprojections.perspective.primaries",
+        "rec709",
+        "reprojections.perspective.primaries: goes with format exr; a PNG is sRGB",
     ),
     (
         "sensor",

@@ -49,6 +49,7 @@ reprojections:
 exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
+sensor: {{noise: {{a: 0.01}}}}
 """
 # Scenes for the rules that a built scene does not need: download, calibration, free places, flow.
 BROUGHT = f"""
@@ -372,7 +373,7 @@ ROUNDS = {
     "another format": {
         "built": (
             "format: png",
-            "format: exr",
+            "format: exr\n    primaries: acescg",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },

@@ -493,6 +493,11 @@ class Reprojection(ReprojectionOptions):
     passes: PassNames | None = Field(
         None, description="Passes of render.passes to reproject, too, as EXR."
     )
+    primaries: Literal["rec709", "acescg"] | None = Field(
+        None,
+        description="The colour space of an EXR. The file names it in its attribute "
+        "chromaticities. Without this key it is Rec. 709, and the file does not say so.",
+    )
 
     @model_validator(mode="after")
     def _has_use(self) -> Self:
@@ -501,6 +506,11 @@ class Reprojection(ReprojectionOptions):
                 raise ValueError(f"{name}: goes with camera; without one nothing is resampled")
         if self.format == "exr" and self.bits != 8:
             raise ValueError("bits: goes with format png; an EXR has halves")
+        if self.format == "png" and self.primaries:
+            raise ValueError("primaries: goes with format exr; a PNG is sRGB")
+        lights = [name for name in self.passes or () if PASSES[name].kind == "light"]
+        if self.primaries == "acescg" and lights:
+            raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")
         return self
 
     @property
@@ -514,11 +524,12 @@ class Reprojection(ReprojectionOptions):
         # `Scene` has made a reprojection for each exposure.
         assert not isinstance(self.exposure, list)
         options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
-        return ReprojectionSettings(
+        return ReprojectionSettings.of(
             **options,
             formats=[self.format],
             exposure=self.exposure,
             passes=self.passes or [],
+            primaries=self.primaries,
         )
 
 

@@ -89,6 +89,9 @@ class ReprojectionSettings(ReprojectionOptions):
     )
     mask: bool = Field(False, description="Also write masks of the pixels without a source.")
     passes: list[str] = Field([], description="Passes to reproject, too.")
+    primaries: Literal["rec709", "acescg"] | None = Field(
+        None, description="The colour space of an EXR, as its attribute chromaticities says."
+    )
     sensor: SensorSettings | None = Field(
         None, description="The sensor that develops the PNG, instead of exposure and reinhard."
     )
@@ -110,6 +113,8 @@ class ReprojectionSettings(ReprojectionOptions):
         settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
         if self.sensor:
             settings = {"sensor": self.sensor.as_json()}
+        if self.primaries:
+            settings["primaries"] = self.primaries
         # 8 is left out, so that the keys of earlier versions stay valid.
         if self.bits != 8:
             settings["bits"] = self.bits

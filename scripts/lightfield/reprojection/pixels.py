@@ -21,6 +21,7 @@ from lightfield.imaging.images import (
     write_exr,
     write_png,
 )
+from lightfield.imaging.primaries import PRIMARIES, are_rec_709, from_rec_709, to_rec_709
 from lightfield.imaging.sensor import Parameters, Sensed, sense
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
@@ -90,6 +91,8 @@ class SourcePixels:
         alpha = channels.get("A")
         depth = channels.get("Z")
         colour = _linear([channels[name] for name in colours], alpha)
+        if not are_rec_709(image.chromaticities):
+            colour[:, :, :3] = to_rec_709(colour[:, :, :3], image.chromaticities)
         if alpha is not None and not job.lightfield.transparent:
             # A fully transparent pixel has no colour to resample.
             colour[alpha == 0] = np.nan
@@ -146,7 +149,7 @@ def write(
     for kind, path in outputs.items():
         match kind:
             case "exr":
-                _write_exr(path, image, attributes)
+                _write_exr(path, image, attributes, job.settings.primaries)
             case "png":
                 _write_png(path, image, {**attributes, **PNG_OPTIONS})
             case "depth":
@@ -222,7 +225,8 @@ def _developed(
         if "png" in outputs:
             pixels[rows] = encode(colour)
         if "exr" in outputs:
-            half[:, rows] = narrow(colour * alpha if transparent else colour, 3)
+            stored = colour * alpha if transparent else colour
+            half[:, rows] = narrow(from_rec_709(stored, settings.primaries or "rec709"), 3)
     if empty.any():
         covered[empty] = 0
         half[:, empty] = 0
@@ -258,8 +262,11 @@ def _write_of_sensor(
             write_exr(path, dict(zip("RGB", planes, strict=True)), {KEY_ATTRIBUTE: key})
 
 
-def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
-    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels."""
+def _write_exr(path: Path, image: _Image, attributes: Attributes, primaries: str | None) -> None:
+    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels.
+
+    ``primaries`` name the colour space of R G B. None is Rec. 709 without an attribute.
+    """
     channels = dict(zip("RGB", image.half, strict=True))
     if image.depth is not None:
         channels["Z"] = image.depth
@@ -267,7 +274,8 @@ def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
         channels["A"] = image.alpha.astype(np.float16)
     elif image.depth is None and image.has_empty:
         channels["A"] = (~image.empty).astype(np.float16)
-    write_exr(path, channels, attributes)
+    chromaticities = PRIMARIES[primaries] if primaries else None
+    write_exr(path, channels, attributes, chromaticities=chromaticities)
 
 
 def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:
