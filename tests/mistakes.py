@@ -330,6 +330,9 @@ REFUSED = [
         for value in ([], [0, 0], [101], "auto", -101, [0] * 33)
     ),
     *(("reprojections.perspective.passes", value) for value in (["albedo"], ["Normal"], "normal")),
+    *(("render.camera_motion", value) for value in ({}, {"travel": [0, 0, 0]}, {"rolling": 0.5})),
+    *(("render.camera_motion", {"turn": value}) for value in ([0, 180, 0], [0, 1], 5)),
+    *(("render.camera_motion", {"travel": [1, 0, 0], "rolling": value}) for value in (0, 1.5)),
     *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
     *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
     *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
@@ -516,6 +519,12 @@ EXPLAINED = [
         "exports.instant_ngp.sources",
         ["fisheye"],
         "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
+    ),
+    ("render.camera_motion", {}, "render.camera_motion: must have travel, turn, or both"),
+    (
+        "render",
+        {"samples": 4, "passes": ["motion"], "camera_motion": {"travel": [1, 0, 0]}},
+        "render.passes: motion does not go with camera_motion",
     ),
     (
         "reprojections.perspective.primaries",

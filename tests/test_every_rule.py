@@ -407,6 +407,9 @@ ROUNDS = {
             CAMERAS | {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    "cameras that move": {
+        "built": ("samples: 4", "samples: 4, camera_motion: {travel: [1, 0, 0]}", CAMERAS),
+    },
     "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
     "another builder": {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)

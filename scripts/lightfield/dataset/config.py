@@ -28,6 +28,7 @@ from lightfield.core.settings import (
     AS_WRITTEN,
     Name,
     Settings,
+    Vector,
     checked,
     pattern,
     suggestion,
@@ -385,6 +386,37 @@ class TargetError(Settings):
     )
 
 
+class CameraMotion(Settings):
+    """How each camera moves while its shutter is open, at constant speed.
+
+    The view's pose is that in the middle of the exposure. Depth and passes are of that moment.
+    """
+
+    travel: Vector = Field(
+        (0.0, 0.0, 0.0),
+        description="How far the camera moves to its right, up and back.",
+        json_schema_extra={"unit": "m"},
+    )
+    turn: Vector = Field(
+        (0.0, 0.0, 0.0),
+        description="How far it turns: a rotation vector about its right, up and back.",
+        json_schema_extra={"unit": "degrees"},
+    )
+    rolling: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
+        None,
+        description="Rolling shutter from the top row to the bottom: the part of the exposure in "
+        "which a row sees light. Without it, all rows see light all the time.",
+    )
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if not any((*self.travel, *self.turn)):
+            raise ValueError("must have travel, turn, or both")
+        if max(map(abs, self.turn)) >= 180:
+            raise ValueError(f"turn: is {list(self.turn)}; must be below 180 degrees")
+        return self
+
+
 class Render(Settings):
     """The settings of Cycles.
 
@@ -439,6 +471,9 @@ class Render(Settings):
     motion_blur: bool | None = Field(
         None, description="Blur moving objects. Without it, as in the .blend."
     )
+    camera_motion: CameraMotion | None = Field(
+        None, description="Move the cameras while their shutters are open."
+    )
     depth_of_field: bool | None = Field(
         None,
         description="Use the focus and aperture of the .blend's own camera. Without it, everything "
@@ -475,6 +510,8 @@ class Render(Settings):
         for name in CHOSEN:
             if self.target_error is not None and name in self.model_fields_set:
                 raise ValueError(f"{name}: does not go with target_error, which chooses it")
+        if self.camera_motion and "motion" in (self.passes or ()):
+            raise ValueError("passes: motion does not go with camera_motion")
         return self
 
 
@@ -808,6 +845,8 @@ class Scene(Credits):
         if self.rigs[name].camera.lens != "equirectangular":
             raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
         refusal = f"does not go with {key}.stereo.omnidirectional, whose views have no centre"
+        if self.render and self.render.camera_motion:
+            raise ValueError(f"render.camera_motion: {refusal}")
         if self.flow:
             raise ValueError(f"flow: {refusal}")
         if self.render and "motion" in (self.render.passes or ()):

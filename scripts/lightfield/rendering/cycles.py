@@ -12,7 +12,16 @@ from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import animation, blend_file, drawings, ids, instances, pruning, volumes
+from lightfield.rendering import (
+    animation,
+    blend_file,
+    drawings,
+    ids,
+    instances,
+    moving_camera,
+    pruning,
+    volumes,
+)
 
 # `auto` tries the kinds of GPU in this order.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -81,6 +90,7 @@ def set_up(
     if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
+    moving_camera.set_up(lightfield.render.get("camera_motion"))
     return str(scene.cycles.device)
 
 

@@ -96,6 +96,7 @@ KEY_PAGES: dict[str, Page] = {
         [
             Section("render", config.Render),
             Section("render: target_error", config.TargetError),
+            Section("render: camera_motion", config.CameraMotion),
         ],
     ),
     "rig-keys.md": Page(

@@ -19,7 +19,7 @@ from lightfield.dataset.passes import PASSES, Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.dataset.sensors import sensor_files
-from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging.sensor import Parameters
@@ -260,6 +260,16 @@ def _turned(view: lightfield.View, target: Target) -> lightfield.View:
     view = replace(view, others={k: v for k, v in view.others.items() if k != "flow"})
     if np.array_equal(target.rotation, np.eye(3)):
         return replace(view, name=name)
-    matrix = view.matrix.copy()
-    matrix[:3, :3] = matrix[:3, :3] @ target.rotation
+    matrix = _turned_matrix(view.matrix, target)
+    if view.exposure:
+        start, end = (_turned_matrix(pose, target).tolist() for pose in view.exposure)
+        exposure = {lightfield.EXPOSURE: {"start": start, "end": end}}
+        view = replace(view, others={**view.others, **exposure})
     return replace(view, name=name, matrix=matrix, rotation=matrix_to_euler(matrix[:3, :3]))
+
+
+def _turned_matrix(matrix: Array, target: Target) -> Array:
+    """Return the camera-to-world matrix (4, 4) of a target's camera."""
+    turned = matrix.copy()
+    turned[:3, :3] = turned[:3, :3] @ target.rotation
+    return turned
