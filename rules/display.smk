@@ -4,8 +4,14 @@ import resource
 
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
+from lightfield.dataset.config import SensorReprojection
 from lightfield.dataset.unit_costs import JOB_SECONDS, START_UP_SECONDS
-from lightfield.measurement.forecast import Work, calibration_seconds, forecast
+from lightfield.measurement.forecast import (
+    SENSOR_PHASE,
+    Work,
+    calibration_seconds,
+    forecast,
+)
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -33,6 +39,7 @@ PHASE_ORDER = {
             "views",
             "flow",
             "reprojections",
+            SENSOR_PHASE,
             "exports",
             "validation",
             "report",
@@ -67,8 +74,17 @@ def rendered_views(job):
     return views_of(job) if job.rule.name == RENDER else 0
 
 
+def is_of_sensor(job):
+    """Return whether a job makes views as a sensor sees them."""
+    if "reprojection" not in job.wildcards.keys():
+        return False
+    return isinstance(reprojection_of(job.wildcards), SensorReprojection)
+
+
 def phase_of(job):
     """Return the phase of a job."""
+    if is_of_sensor(job):
+        return SENSOR_PHASE
     stem = Path(job.rule.snakefile).stem
     return PHASES.get(job.rule.name, PHASES.get(stem, stem))
 

@@ -59,6 +59,8 @@ def main() -> None:
     lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
     if settings.flow:
         lightfield = lightfield.with_flow()
+    if "camera_motion" in lightfield.render:
+        lightfield = lightfield.with_exposure()
     lightfield.write(arguments.output)
 
 

@@ -48,6 +48,10 @@ KINDS = {
         f"results/{CUBOID}/perspective/view_r0000f.png",
     ),
     "reprojected EXR": (f"{HDR}/view_u0000f.exr", f"{HDR}/view_d0000f.exr"),
+    "parameters of a sensor": (
+        f"results/{PLANE}/sensor/view_0000f.json",
+        f"results/{PLANE}/sensor/view_0001f.json",
+    ),
     "panorama's light field": (
         f"work/{CUBOID}/panorama/lightfield.json",
         f"work/{LATTICE}/panorama/lightfield.json",

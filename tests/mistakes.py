@@ -371,6 +371,21 @@ REFUSED = [
         for value in ([], [0, 0], [101], "auto", -101, [0] * 33)
     ),
     *(("reprojections.perspective.passes", value) for value in (["albedo"], ["Normal"], "normal")),
+    *(("render.camera_motion", value) for value in ({}, {"travel": [0, 0, 0]}, {"rolling": 0.5})),
+    *(("render.camera_motion", {"turn": value}) for value in ([0, 180, 0], [0, 1], 5)),
+    *(("render.camera_motion", {"travel": [1, 0, 0], "rolling": value}) for value in (0, 1.5)),
+    *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
+    *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
+    *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
+    *(("sensor.rigs", value) for value in ([], ["Nobody"], ["LFSphere", 7])),
+    *(("sensor.bits", value) for value in (0, 17, 8.0, "8")),
+    *(("sensor.noise", value) for value in ({}, {"a": 0}, {"a": 1e-12}, {"a": -1}, {"b": 2}, 0.1)),
+    *(("sensor.brackets", value) for value in ([], [0], [2, 0], [0, 0], [-99, 0], 1)),
+    *(("sensor.vignetting", value) for value in ({}, {"alpha": [1]}, {"alpha": [[0, 0, 0]]})),
+    *(("sensor.response", {key: value}) for key, value in (("toe", 0.3), ("center", 1))),
+    *(("sensor.colour", value) for value in (0, [0, 0], [9, 0, 0, 0, 0, 0, 0, 0])),
+    *(("sensor.exposure", {"range": value}) for value in ([1, 0], [0], [-99, 0], 1)),
+    *(("sensor.exposure", {"step": value}) for value in (0, -1, "x")),
     *(("exports", value) for value in ([], "colmap")),
     ("exports.nerf", {}),
     *(("exports.colmap", value) for value in (None, [])),
@@ -628,6 +643,41 @@ EXPLAINED = [
         ["fisheye"],
         "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
     ),
+    ("render.camera_motion", {}, "render.camera_motion: must have travel, turn, or both"),
+    (
+        "render",
+        {"samples": 4, "passes": ["motion"], "camera_motion": {"travel": [1, 0, 0]}},
+        "render.passes: motion does not go with camera_motion",
+    ),
+    (
+        "reprojections.perspective.primaries",
+        "rec709",
+        "reprojections.perspective.primaries: goes with format exr; a PNG is sRGB",
+    ),
+    (
+        "sensor",
+        {"sources": ["fisheye"]},
+        "sensor.sources: is 'fisheye'; must be of views, perspective",
+    ),
+    ("sensor", {"rigs": ["LFSpher"]}, "sensor.rigs: there is no rig 'LFSpher'; did you mean"),
+    (
+        "sensor",
+        {"sources": ["perspective"], "rigs": ["LFCuboid"]},
+        "sensor.rigs: LFCuboid is not of the reprojection perspective",
+    ),
+    ("sensor", {"noise": {"a": 0}}, "sensor.noise: must have a, b, or both above 0"),
+    (
+        "sensor",
+        {"exposure": {"range": [0, 1], "step": 1}},
+        "must be a number or have one of range and step",
+    ),
+    (
+        "sensor",
+        {"colour": {"range": [0, 6]}},
+        "sensor.colour: must be from -5 to 5",
+    ),
+    ("sensor", {"brackets": [2, 0]}, "sensor.brackets: is [2, 0]; must be a list of stops"),
+    ("sensor", {"exposure": "auto"}, 'sensor.exposure: is "auto"; must be a number'),
 ]
 
 # Wrong settings of config.yaml. The message begins with the first key.

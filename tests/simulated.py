@@ -105,7 +105,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     )
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
-        lens = reprojection.camera.make()
+        lens = (reprojection.camera or dataset.rig.camera).make()
         made = lightfield.changed(lens, reprojection=reprojection.settings.published)
         made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:

@@ -50,6 +50,7 @@ mesh: {{formats: [glb]}}
 exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
+sensor: {{noise: {{a: 0.01}}}}
 """
 # Scenes for the rules that a built scene does not need: download, calibration, free places, flow.
 BROUGHT = f"""
@@ -414,7 +415,7 @@ ROUNDS = {
     "another format": {
         "built": (
             "format: png",
-            "format: exr",
+            "format: exr\n    primaries: acescg",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
@@ -436,6 +437,13 @@ ROUNDS = {
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    "another sensor": {
+        "built": (
+            "a: 0.01",
+            "a: 0.02",
+            {"sensor reproject", "sensor reprojected_lightfield"},
+        ),
+    },
     "another pass": {
         "built": (
             TO_CUBES,
@@ -454,6 +462,9 @@ ROUNDS = {
             ),
             {"inventory", "perspective reproject", "perspective reprojected_lightfield"} | CAMERAS,
         ),
+    },
+    "cameras that move": {
+        "built": ("samples: 4", "samples: 4, camera_motion: {travel: [1, 0, 0]}", CAMERAS),
     },
     "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
     "another builder": {

@@ -327,6 +327,10 @@ def test_settings_without_light_groups_are_as_before():
             {"reprojections": {"olat": {"relight": "each", "passes": ["light_groups"]}}},
             "reprojections.olat.passes: does not go with the light each",
         ),
+        (
+            {"relight": {"night": {}}, "sensor": {"sources": ["night"]}},
+            "sensor.sources: night has relight; name one without",
+        ),
         ({"reprojections": {"Combined_lamp": {}}}, "the name Combined_lamp is taken"),
     ],
 )

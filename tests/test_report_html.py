@@ -211,6 +211,31 @@ def test_the_viewer_steps_exposes_and_shows_depth(sphere, show):
     assert (pixels(tab, "viewer")[lit] != darker[lit]).any()
 
 
+def test_the_viewer_shows_a_view_clean_and_as_the_sensor_sees_it(tmp_path, show):
+    rig = {**LINE, "cameras": [2, 1]}
+    lightfield = write_dataset(tmp_path, rig)
+    page_without = make_page(tmp_path, rig).read_text()
+    # A picture that no light of the views is like: stripes.
+    codes = np.zeros((48, 64, 3), np.uint8)
+    codes[:, ::16] = codes[:, 1::16] = codes[:, 2::16] = codes[:, 3::16] = (250, 120, 20)
+    for stops, pixels_of_bracket in ((-2, 255 - codes), (0, codes), (2, 255 - codes)):
+        folder = tmp_path / f"sensor_ev{stops}"
+        content = {"reprojection": {"sensor": {"noise": {"a": 0.1}, "bracket": stops}}}
+        lightfield.changed(**content).write(folder / "lightfield.json")
+        for view in lightfield.views:
+            images.write_png(folder / f"{view.name}.png", pixels_of_bracket)
+    tab = show(make_page(tmp_path, rig))
+    clean = pixels(tab, "viewer")
+    tab.click("#show-sensor")
+    sensed = pixels(tab, "viewer")[..., :3].astype(int)
+    # The packing is lossy.
+    assert np.abs(sensed - codes).mean() < 12
+    assert "sensor_ev0/" in tab.inner_text("#explore")
+    tab.click("#show-sensor")
+    assert (pixels(tab, "viewer") == clean).all()
+    assert "show-sensor" not in page_without.replace('element("show-sensor")', "")
+
+
 def test_the_readout_shows_the_files_values(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")

@@ -30,6 +30,7 @@ from lightfield.core.settings import (
     Address,
     Name,
     Settings,
+    Vector,
     checked,
     pattern,
     suggestion,
@@ -47,6 +48,7 @@ from lightfield.dataset.reprojections import (
     Stops,
     face_problem,
 )
+from lightfield.dataset.sensors import Sensor, SensorSettings
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -494,6 +496,37 @@ class TargetError(Settings):
     )
 
 
+class CameraMotion(Settings):
+    """How each camera moves while its shutter is open, at constant speed.
+
+    The view's pose is that in the middle of the exposure. Depth and passes are of that moment.
+    """
+
+    travel: Vector = Field(
+        (0.0, 0.0, 0.0),
+        description="How far the camera moves to its right, up and back.",
+        json_schema_extra={"unit": "m"},
+    )
+    turn: Vector = Field(
+        (0.0, 0.0, 0.0),
+        description="How far it turns: a rotation vector about its right, up and back.",
+        json_schema_extra={"unit": "degrees"},
+    )
+    rolling: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
+        None,
+        description="Rolling shutter from the top row to the bottom: the part of the exposure in "
+        "which a row sees light. Without it, all rows see light all the time.",
+    )
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if not any((*self.travel, *self.turn)):
+            raise ValueError("must have travel, turn, or both")
+        if max(map(abs, self.turn)) >= 180:
+            raise ValueError(f"turn: is {list(self.turn)}; must be below 180 degrees")
+        return self
+
+
 class Render(Settings):
     """The settings of Cycles.
 
@@ -547,6 +580,9 @@ class Render(Settings):
     )
     motion_blur: bool | None = Field(
         None, description="Blur moving objects. Without it, as in the .blend."
+    )
+    camera_motion: CameraMotion | None = Field(
+        None, description="Move the cameras while their shutters are open."
     )
     depth_of_field: bool | None = Field(
         None,
@@ -610,6 +646,8 @@ class Render(Settings):
         for name in CHOSEN:
             if self.target_error is not None and name in self.model_fields_set:
                 raise ValueError(f"{name}: does not go with target_error, which chooses it")
+        if self.camera_motion and "motion" in (self.passes or ()):
+            raise ValueError("passes: motion does not go with camera_motion")
         return self
 
 
@@ -634,6 +672,11 @@ class Reprojection(ReprojectionOptions):
         None,
         description="Another light: the name of an entry of relight, or strengths as there.",
     )
+    primaries: Literal["rec709", "acescg"] | None = Field(
+        None,
+        description="The colour space of an EXR. The file names it in its attribute "
+        "chromaticities. Without this key it is Rec. 709, and the file does not say so.",
+    )
 
     @model_validator(mode="after")
     def _has_use(self) -> Self:
@@ -642,6 +685,15 @@ class Reprojection(ReprojectionOptions):
                 raise ValueError(f"{name}: goes with camera; without one nothing is resampled")
         if self.format == "exr" and self.bits != 8:
             raise ValueError("bits: goes with format png; an EXR has halves")
+        if self.format == "png" and self.primaries:
+            raise ValueError("primaries: goes with format exr; a PNG is sRGB")
+        lights = [
+            name
+            for name in self.passes or ()
+            if name == LIGHT_GROUPS or PASSES[name].kind == "light"
+        ]
+        if self.primaries == "acescg" and lights:
+            raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")
         return self
 
     @property
@@ -662,7 +714,22 @@ class Reprojection(ReprojectionOptions):
             passes=self.passes or [],
             # `loading` has replaced a name by its strengths.
             relight=self.relight,
+            primaries=self.primaries,
         )
+
+
+# The keys of a reprojection that say how its views are resampled.
+OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
+
+
+class SensorReprojection(Reprojection):
+    """The same views as a sensor sees them. `Scene.developments` makes it from ``sensor``."""
+
+    sensor: SensorSettings
+
+    @property
+    def settings(self) -> ReprojectionSettings:
+        return super().settings.model_copy(update={"sensor": self.sensor})
 
 
 class Flow(Settings):
@@ -775,6 +842,9 @@ class Scene(Credits):
         "has strengths, or red, green and blue, by the names of light groups; others keep theirs. "
         "each: every group alone, one after the other.",
     )
+    sensor: Sensor | None = Field(
+        None, description="The views as a sensor sees them: noise, vignetting, brackets."
+    )
     flow: Flow | None = Field(
         None, description="Optical flow from depth and poses, for a scene that stands still."
     )
@@ -836,12 +906,66 @@ class Scene(Credits):
                 neighbours = {name}
             _check_name(f"{block}.{name}", name, neighbours)
             self._check_reprojection(f"reprojections.{name}", reprojection)
+        if self.sensor:
+            self._check_sensor(self.sensor)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
         if self.flow and self.render and self.render.depth == "none":
             raise ValueError("flow: follows from depth, but render.depth is none")
         self._check_split_rigs()
         return self
+
+    @property
+    def developments(self) -> dict[str, Reprojection]:
+        """The reprojections, and those that ``sensor`` adds, by the names of their folders."""
+        developments = dict(self.reprojections)
+        for source in self.sensor.sources if self.sensor else ():
+            developments |= self._sensor_reprojections(source)
+        return developments
+
+    def _sensor_reprojections(self, source: str) -> dict[str, Reprojection]:
+        """Return the reprojections that ``sensor`` adds for a source, by their folders' names."""
+        assert self.sensor
+        original = self.reprojections.get(source) or Reprojection()
+        optics = original.model_dump(include={*OPTICS}, exclude_unset=True)
+        return {
+            name: SensorReprojection.of(
+                **optics,
+                rigs=self.sensor.rigs or original.rigs,
+                bits=8 if sensor.bits <= 8 else 16,
+                sensor=sensor,
+            )
+            for name, sensor in self.sensor.folders(source).items()
+        }
+
+    def _check_sensor(self, sensor: Sensor) -> None:
+        """Check that the sensor's sources and rigs exist, and that it can develop them."""
+        allowed_sources = [VIEWS, *self.reprojections]
+        for source in sensor.sources:
+            if source not in allowed_sources:
+                raise ValueError(
+                    f"sensor.sources: is {source!r}; must be of {', '.join(allowed_sources)}"
+                )
+            if sensor.sources.count(source) > 1:
+                raise ValueError(f"sensor.sources: must name {source} once")
+            original = self.reprojections.get(source)
+            if original and original.relight is not None:
+                raise ValueError(f"sensor.sources: {source} has relight; name one without")
+            if original and original.cube_map and sensor.vignetting:
+                raise ValueError(f"sensor.vignetting: does not go with the faces of {source}")
+            for rig_name in sensor.rigs or ():
+                if original and rig_name not in (original.rigs or self.rigs):
+                    raise ValueError(f"sensor.rigs: {rig_name} is not of the reprojection {source}")
+            for name in sensor.folders(source):
+                if name in self.reprojections:
+                    raise ValueError(f"reprojections.{name}: the name is taken by sensor")
+        for rig_name in sensor.rigs or ():
+            if rig_name not in self.rigs:
+                raise ValueError(
+                    f"sensor.rigs: there is no rig {rig_name!r}{suggestion(rig_name, self.rigs)}"
+                )
+        if self.render and self.render.transparent:
+            raise ValueError("sensor: does not go with render.transparent")
 
     def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
         """Check that a reprojection's rigs and passes exist."""
@@ -911,23 +1035,25 @@ class Scene(Credits):
             for key in ("camera", "frames"):
                 if getattr(rig, key) != getattr(split_rigs[training], key):
                     raise ValueError(f"rigs.{name}.{key}: must be that of {training}, which trains")
-        for name, reprojection in self.reprojections.items():
+        for name, reprojection in self.developments.items():
             missing_rigs = split_rigs.keys() - set(reprojection.rigs or self.rigs)
             if missing_rigs and missing_rigs != split_rigs.keys():
                 rigs = ", ".join(sorted(missing_rigs))
+                key = f"reprojections.{name}" if name in self.reprojections else "sensor"
                 raise ValueError(
-                    f"reprojections.{name}.rigs: lacks {rigs}; must have all rigs "
+                    f"{key}.rigs: lacks {rigs}; must have all rigs "
                     "of which one trains and others test, or none"
                 )
 
     def _check_export(self, key: str, export: Export) -> None:
         """Check that an export's sources exist, and that its consumer can take them."""
-        allowed_sources = [VIEWS, *self.reprojections]
+        developments = self.developments
+        allowed_sources = [VIEWS, *developments]
         for source in export.sources:
             if source not in allowed_sources:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
             has_depth = self.render is None or self.render.depth != "none"
-            reprojection = None if source == VIEWS else self.reprojections[source]
+            reprojection = None if source == VIEWS else developments[source]
             if reprojection and self.light_of(reprojection) == light_groups.EACH:
                 raise ValueError(
                     f"{key}: {source} has each view once for each light, and an export once"
@@ -1005,6 +1131,8 @@ class Scene(Credits):
         if self.rigs[name].camera.lens != "equirectangular":
             raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
         refusal = f"does not go with {key}.stereo.omnidirectional, whose views have no centre"
+        if self.render and self.render.camera_motion:
+            raise ValueError(f"render.camera_motion: {refusal}")
         if self.flow:
             raise ValueError(f"flow: {refusal}")
         if self.render and "motion" in (self.render.passes or ()):

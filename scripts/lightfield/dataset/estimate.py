@@ -9,18 +9,22 @@ from statistics import fmean
 
 from lightfield.core.files import DAMAGE
 from lightfield.dataset import light_groups, memory, passes
-from lightfield.dataset.config import FILE
+from lightfield.dataset.config import FILE, Reprojection, SensorReprojection
 from lightfield.dataset.dataset_paths import DatasetPaths
 from lightfield.dataset.unit_costs import (
+    BRACKET_SECONDS,
     CHECK_SECONDS,
     COMPRESSED,
     DENOISING_SAMPLES,
     MOST_SHOWN_VIEWS,
+    NOISY_BYTES,
     READ_SECONDS,
     REPORT_SECONDS,
     REPROJECTION_SECONDS,
     SECONDS_PER_SAMPLE,
+    SENSOR_SECONDS,
     START_UP_SECONDS,
+    WEIGHT_BYTES,
 )
 
 # A pixel's samples if a target error is given instead.
@@ -69,17 +73,22 @@ class Estimate:
     @property
     def all_view_bytes(self) -> float:
         """Bytes of a view, its flow, and its reprojections."""
-        pixel_bytes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
         size = self.view_bytes
         if self.dataset.flow:
             size += passes.FLOW.bytes * COMPRESSED * self.dataset.pixels
         reprojected_size = 0.0
         for name, reprojection in self.dataset.reprojections.items():
-            pixels = self._reprojected_pixels(name)
-            if reprojection.relight == light_groups.EACH:
-                pixels *= self.light_group_count
-            reprojected_size += pixels * pixel_bytes[reprojection.format] * (reprojection.bits / 8)
+            reprojected_size += self._made_pixels(name) * self._reprojected_pixel_bytes(
+                reprojection
+            )
         return size + reprojected_size
+
+    def _made_pixels(self, name: str) -> float:
+        """Return the pixels that a reprojection makes of a view, in all lights."""
+        pixels = self._reprojected_pixels(name)
+        if self.dataset.reprojections[name].relight == light_groups.EACH:
+            pixels *= self.light_group_count
+        return pixels
 
     @cached_property
     def light_group_count(self) -> int:
@@ -94,6 +103,17 @@ class Estimate:
             return len(json.loads(Path(str(self.dataset.inventory)).read_bytes())["emitters"])
         except (OSError, *DAMAGE):
             return GUESSED_LIGHT_GROUPS
+
+    def _reprojected_pixel_bytes(self, reprojection: Reprojection) -> float:
+        """Return the bytes of a pixel of a reprojection, with the files beside its views."""
+        if reprojection.format == "exr":
+            return 10 * COMPRESSED
+        if not isinstance(reprojection, SensorReprojection):
+            return PNG_BYTES * reprojection.bits / 8
+        size = NOISY_BYTES * reprojection.bits / 8
+        if reprojection.sensor.bracket is not None:
+            size += WEIGHT_BYTES * COMPRESSED
+        return size
 
     def memory_bytes(self, pixels: int) -> int:
         """Return the memory in bytes of a process that renders views of this many pixels.
@@ -120,15 +140,16 @@ class Estimate:
         return START_UP_SECONDS + self.view_seconds * pixels / self.dataset.pixels
 
     def reprojection_seconds(self, name: str) -> float:
-        """Return the seconds that one core takes to read and reproject a view."""
+        """Return the seconds that one core takes to read a view, reproject and develop it."""
+        reprojection = self.dataset.reprojections[name]
         read_pixels = self.dataset.pixels
-        made_pixels = self._reprojected_pixels(name)
-        light = self.dataset.reprojections[name].relight
-        if light is not None:
+        if reprojection.relight is not None:
             read_pixels *= 1 + self.light_group_count
-        if light == light_groups.EACH:
-            made_pixels *= self.light_group_count
-        return read_pixels * READ_SECONDS + made_pixels * REPROJECTION_SECONDS
+        pixel_seconds = REPROJECTION_SECONDS
+        if isinstance(reprojection, SensorReprojection):
+            is_bracket = reprojection.sensor.bracket is not None
+            pixel_seconds += BRACKET_SECONDS if is_bracket else SENSOR_SECONDS
+        return read_pixels * READ_SECONDS + self._made_pixels(name) * pixel_seconds
 
     @property
     def import_seconds(self) -> float:

@@ -10,6 +10,8 @@ SILVR's tools wrote have these alone, and are read, too. Ours are:
 - ``passes``: the passes that a reprojection has, of those in ``render``.
 - ``split`` of a frame: what the view is for.
 - ``flow`` of a frame: the view to which its flow leads.
+- ``exposure`` of a frame: the camera-to-world matrices at the ``start`` and the ``end`` of the
+  exposure of a moving camera. ``world_matrix`` is that in its middle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,6 +28,7 @@ from lightfield.core.files import read_json, write_json
 from lightfield.dataset import passes
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
+from lightfield.geometry.exposure import pose_at
 from lightfield.geometry.flow import neighbours
 from lightfield.geometry.frames import Frame, read_frames
 from lightfield.geometry.lenses import Lens
@@ -38,6 +41,8 @@ Floats = NDArray[np.float64]
 NAME = "lightfield.json"
 # Metres between the eyes of a pair. Views of a file with this key have no centre.
 OMNIDIRECTIONAL = "omnidirectional_stereo"
+# The poses of a moving camera, of a frame.
+EXPOSURE = "exposure"
 # What of the machine changes bytes, where the file was made. Each view names its own machine.
 MACHINE = "machine"
 
@@ -81,6 +86,15 @@ class View:
     def split(self) -> str | None:
         """What the view is for: ``train``, ``validate`` or ``test``; None if the file is silent."""
         return self.others.get("split")
+
+    @property
+    def exposure(self) -> tuple[Floats, Floats] | None:
+        """The camera-to-world matrices (4, 4) at the start and the end of the exposure.
+
+        None if the camera stands still.
+        """
+        poses = self.others.get(EXPOSURE)
+        return (np.array(poses["start"]), np.array(poses["end"])) if poses else None
 
     @property
     def flow(self) -> str | None:
@@ -217,6 +231,18 @@ class LightField:
                 for view, target in zip(self.views, targets, strict=True)
             ]
         )
+
+    def with_exposure(self) -> "LightField":
+        """Return a copy whose views have the poses at the start and the end of their exposures."""
+        motion = self.render["camera_motion"]
+        views = []
+        for view in self.views:
+            matrices = {}
+            for name, time in (("start", -0.5), ("end", 0.5)):
+                pose = pose_at(view.matrix, motion["travel"], motion["turn"], time)
+                matrices[name] = (np.round(pose, 12) + 0.0).tolist()
+            views.append(replace(view, others={**view.others, EXPOSURE: matrices}))
+        return self.changed(views=views)
 
     @property
     def folder(self) -> Path:

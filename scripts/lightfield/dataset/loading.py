@@ -155,7 +155,7 @@ def _reprojections_of(
 ) -> dict[str, config.Reprojection]:
     """Return the reprojections of a rig's views."""
     reprojections = {}
-    for key, reprojection in written.reprojections.items():
+    for key, reprojection in written.developments.items():
         if name in (reprojection.rigs or written.rigs):
             camera = reprojection.camera and _limited(reprojection.camera, limits)
             light = written.light_of(reprojection)

@@ -17,7 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import append_json_line, read_json_lines, sha256, write_json
+from lightfield.core.files import (
+    append_json_line,
+    read_json,
+    read_json_lines,
+    sha256,
+    write_json,
+)
 from lightfield.dataset.shard_files import LOG_SUFFIX
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
@@ -27,7 +33,7 @@ class ShardRecord:
     """The record at ``path`` of a shard's files, in ``folder`` of a dataset or beside it.
 
     With ``path`` None nothing is recorded. A file then counts as finished if it is complete, and
-    its header has the key.
+    its header has the key. A JSON has it under ``key``.
     """
 
     def __init__(self, path: Path | None, folder: Path) -> None:
@@ -40,7 +46,8 @@ class ShardRecord:
     def is_finished(self, file: Path, key: str) -> bool:
         """Return whether a file still has the bytes that the settings of ``key`` made."""
         if self._path is None:
-            return images.is_finished(file, key)
+            is_finished = _names_key if file.suffix == ".json" else images.is_finished
+            return is_finished(file, key)
         if self._store:
             self._take(file, key)
         if not file.is_file():
@@ -132,6 +139,14 @@ class ShardRecord:
     def _logged_elsewhere(self) -> set[tuple[Any, Any, Any]]:
         assert self._path
         return _entries(self._path.parent.glob(f"*{LOG_SUFFIX}"))
+
+
+def _names_key(file: Path, key: str) -> bool:
+    """Return whether a JSON file exists, is complete, and was made with the settings of ``key``."""
+    try:
+        return bool(read_json(file)["key"] == key)
+    except (UserError, LookupError, TypeError):
+        return False
 
 
 def _log(record: Path) -> Path:

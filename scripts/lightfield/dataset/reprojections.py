@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from typing_extensions import TypeAliasType
 
 from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.dataset.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 
@@ -101,6 +102,18 @@ class ReprojectionSettings(ReprojectionOptions):
     relight: Light | None = Field(
         None, description="Strengths of light groups, as in the scene YAML's relight."
     )
+    primaries: Literal["rec709", "acescg"] | None = Field(
+        None, description="The colour space of an EXR, as its attribute chromaticities says."
+    )
+    sensor: SensorSettings | None = Field(
+        None, description="The sensor that develops the PNG, instead of exposure and reinhard."
+    )
+
+    @model_validator(mode="after")
+    def _sensor_writes_png(self) -> Self:
+        if self.sensor and self.formats != ["png"]:
+            raise ValueError("formats: must be [png] with sensor, which writes no other")
+        return self
 
     @property
     def lens_map_settings(self) -> dict[str, Any]:
@@ -111,6 +124,10 @@ class ReprojectionSettings(ReprojectionOptions):
     def development(self) -> dict[str, Any]:
         """The settings that turn light into pixels."""
         settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
+        if self.sensor:
+            settings = {"sensor": self.sensor.as_json()}
+        if self.primaries:
+            settings["primaries"] = self.primaries
         # 8 is left out, so that the keys of earlier versions stay valid.
         if self.bits != 8:
             settings["bits"] = self.bits
@@ -123,7 +140,8 @@ class ReprojectionSettings(ReprojectionOptions):
         """The settings in lightfield.json and the images' headers, beside the lens.
 
         ``rotation`` is pan, pitch and roll in degrees. `lightfield.imaging.tonemap` defines
-        ``exposure`` and ``reinhard``, with which a reader can turn a PNG back into light.
+        ``exposure`` and ``reinhard``, with which a reader can turn a PNG back into light. For a
+        sensor, the file of each view's parameters does that.
         """
         return {
             "rotation": list(self.rotation),

@@ -15,6 +15,10 @@ JOB_SECONDS = 1.0
 READ_SECONDS = 4e-8
 # Computing a pixel of a reprojected view, measured in the same way.
 REPROJECTION_SECONDS = 1.5e-7
+# A sensor's noise and response for a pixel, with and without the weights of a bracket. It was
+# measured on one core of a 2-core x86-64 machine that also did other work, in an image of 512².
+SENSOR_SECONDS = 4e-7
+BRACKET_SECONDS = 7e-7
 # For each pixel of the views and their reprojections: each export, and the validation.
 CHECK_SECONDS = 1e-7
 # The same for the figures, and for the page. They show at most so many views.
@@ -24,5 +28,9 @@ MOST_SHOWN_VIEWS = 120
 # one core of an EPYC, in views of the garden of 256² and more. In small windows it costs up to
 # twice as much.
 DENOISING_SAMPLES = 3
+# Bytes of a pixel's codes of 8 bits with noise, which a PNG cannot compress. Weights take 12 more,
+# before compression.
+NOISY_BYTES = 3
+WEIGHT_BYTES = 12
 # An EXR's size as a part of its uncompressed size, measured in the three scenes.
 COMPRESSED = 0.75

@@ -233,14 +233,19 @@ class _Writer:
 
         Transparent views keep their channel A. Their colour stays premultiplied by it.
         """
-        channels = images.read_image(source).channels
+        image = images.read_image(source)
+        channels = image.channels
         missing = [name for name in "RGB" if name not in channels]
         if missing:
             raise UserError(f"{source}: has no channel {missing[0]}")
         check_size(source, self.lightfield, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
         target = self.exr_dir / source.name
-        copied = {name: np.where(hidden, -1, channels[name]).astype(np.float16) for name in "RGB"}
+        planes = np.moveaxis(image.colour, -1, 0)
+        copied = {
+            name: np.where(hidden, -1, plane).astype(np.float16)
+            for name, plane in zip("RGB", planes, strict=True)
+        }
         if self.lightfield.transparent:
             copied["A"] = channels["A"]
         images.write_exr(target, copied)

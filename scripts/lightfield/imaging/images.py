@@ -18,6 +18,7 @@ import OpenEXR
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, check_readable
+from lightfield.imaging.primaries import Chromaticities, to_rec_709
 
 Attribute = str | int | float
 
@@ -46,6 +47,7 @@ CODECS = {
     "zstd": "ZSTD_COMPRESSION",
 }
 
+_CHROMATICITIES = "chromaticities"
 # The number with which an EXR begins.
 _EXR_MAGIC = 20000630
 # The bits of an EXR's version that mark tiles, deep pixels and several parts.
@@ -55,15 +57,21 @@ _EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 
 @dataclass(frozen=True)
 class Image:
-    """An image in memory: ``channels`` maps names to (height, width) arrays of the file's dtype."""
+    """An image in memory: ``channels`` maps names to (height, width) arrays of the file's dtype.
+
+    ``chromaticities`` are those of an EXR's header. None for a file without them.
+    """
 
     channels: dict[str, np.ndarray[Any, Any]]
     attributes: dict[str, Attribute]
+    chromaticities: Chromaticities | None = None
 
     @property
     def colour(self) -> np.ndarray[Any, Any]:
-        """The channels R, G and B as (height, width, 3) float32."""
-        return np.stack([self.channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
+        """The channels R, G and B as (height, width, 3) float32, in Rec. 709."""
+        planes = [self.channels[name] for name in "RGB"]
+        colour = np.stack(planes, axis=-1, dtype=np.float32)
+        return to_rec_709(colour, self.chromaticities)
 
     @property
     def srgb(self) -> np.ndarray[Any, Any]:
@@ -80,6 +88,7 @@ class Header:
     height: int
     channels: list[str]
     attributes: dict[str, Attribute]
+    chromaticities: Chromaticities | None = None
 
 
 # Warnings of libjpeg about complete pictures.
@@ -111,7 +120,8 @@ def read_header(path: Path | str) -> Header:
     file = _open(path)
     spec = file.spec()
     file.close()
-    return Header(spec.width, spec.height, _channel_names(path, spec), _attributes(spec))
+    names = _channel_names(path, spec)
+    return Header(spec.width, spec.height, names, _attributes(spec), _chromaticities(spec))
 
 
 def read_image(
@@ -173,13 +183,18 @@ def write_exr(
     channels: Mapping[str, np.ndarray[Any, Any]],
     attributes: Mapping[str, Attribute] | None = None,
     compression: str = "zip",
+    chromaticities: Chromaticities | None = None,
 ) -> None:
     """Write (height, width) arrays as one EXR part: float16 as half, float32 as float.
+
+    ``chromaticities`` name the colour space. Without them, readers take it for Rec. 709.
 
     Lossless (one of `CODECS`), atomic, and without time stamp or host name, so that equal input
     gives equal bytes. Raises `UserError` if the file cannot be written.
     """
     header = {"compression": getattr(OpenEXR, CODECS[compression]), "type": OpenEXR.scanlineimage}
+    if chromaticities:
+        header[_CHROMATICITIES] = chromaticities
     # OpenEXR writes strided arrays as if they were contiguous.
     planes = {name: np.ascontiguousarray(array) for name, array in channels.items()}
     with atomic_path(path) as temporary:
@@ -285,7 +300,9 @@ def _plain_exr_header(path: Path | str) -> Header | None:
         raise UserError(f"{path}: is not an image that can be read: {error}") from None
     (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
     attributes = {k: v for k, v in header.items() if isinstance(v, str | int | float)}
-    return Header(right - left + 1, bottom - top + 1, _colour_first(names), attributes)
+    chromaticities = header.get(_CHROMATICITIES)
+    size = (right - left + 1, bottom - top + 1)
+    return Header(*size, _colour_first(names), attributes, chromaticities)
 
 
 def _colour_first(names: Iterable[str]) -> list[str]:
@@ -314,7 +331,8 @@ def _read_plain_exr(
     for name, plane in zip(names, planes, strict=True):
         dtype = np.dtype(_EXR_TYPES[str(raw_header["channels"][name].type)])
         plane_by_name[name] = np.frombuffer(plane, dtype).reshape(end - first, header.width)
-    return Image(plane_by_name, header.attributes), header.channels
+    image = Image(plane_by_name, header.attributes, header.chromaticities)
+    return image, header.channels
 
 
 def _read_other(
@@ -325,6 +343,7 @@ def _read_other(
     plane_by_name: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}
     names: list[str] = []
+    chromaticities = _chromaticities(file.spec())
     subimage = 0
     while file.seek_subimage(subimage, 0):
         spec = file.spec()
@@ -347,7 +366,7 @@ def _read_other(
         names += channel_names
         subimage += 1
     file.close()
-    return Image(plane_by_name, attributes), names
+    return Image(plane_by_name, attributes, chromaticities), names
 
 
 def _channel_names(path: Path | str, spec: Any) -> list[str]:
@@ -367,6 +386,12 @@ def _runs(spec: Any, indices: Sequence[int]) -> list[tuple[int, int, str]]:
         else:
             runs.append((index, index + 1, kind))
     return runs
+
+
+def _chromaticities(spec: Any) -> Chromaticities | None:
+    """Return the chromaticities of an EXR's header. None for a file without them."""
+    value = spec.getattribute(_CHROMATICITIES)
+    return tuple(map(float, value)) if isinstance(value, tuple) else None
 
 
 def _attributes(spec: Any) -> dict[str, Attribute]:

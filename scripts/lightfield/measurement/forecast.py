@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lightfield.dataset.unit_costs import (
+    BRACKET_SECONDS,
     CHECK_SECONDS,
     COMPRESSED,
     DENOISING_SAMPLES,
@@ -14,6 +15,7 @@ from lightfield.dataset.unit_costs import (
     REPORT_SECONDS,
     REPROJECTION_SECONDS,
     SECONDS_PER_SAMPLE,
+    SENSOR_SECONDS,
     START_UP_SECONDS,
 )
 from lightfield.measurement.sampling import (
@@ -42,6 +44,12 @@ CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
 + jobs × {JOB_SECONDS:g} s, with Blender {START_UP_SECONDS:g} s.
 Size = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
 After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
+
+# The phase of the jobs that develop views as a sensor sees them, and their part of the formulas.
+SENSOR_PHASE = "sensor"
+SENSOR_FORMULA = f"""\
+A sensor adds {1e6 * SENSOR_SECONDS:g} µs a pixel, or {1e6 * BRACKET_SECONDS:g} µs for a bracket \
+with its mask and weights."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,8 @@ def forecast(works: Sequence[Work]) -> str:
     tables = [_table("phase", {**phases, "all": works})]
     if len(datasets) > 1:
         tables.append(_table("dataset", dict(sorted(datasets.items()))))
-    return "\n\n".join([*tables, FORMULAS])
+    formulas = f"{FORMULAS}\n{SENSOR_FORMULA}" if SENSOR_PHASE in phases else FORMULAS
+    return "\n\n".join([*tables, formulas])
 
 
 def _table(title: str, groups: Mapping[str, Sequence[Work]]) -> str:

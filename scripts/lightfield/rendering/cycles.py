@@ -19,6 +19,7 @@ from lightfield.rendering import (
     ids,
     instances,
     light_groups,
+    moving_camera,
     pruning,
     surfaces,
     volumes,
@@ -98,6 +99,7 @@ def set_up(
     if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
+    moving_camera.set_up(lightfield.render.get("camera_motion"))
     return str(scene.cycles.device)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import bpy
-import mathutils
 import numpy as np
 
 from lightfield.core import disk_space
@@ -17,6 +16,7 @@ from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.memory import passes_pixel_bytes
 from lightfield.imaging import images
 from lightfield.rendering.cycles import view_layer
+from lightfield.rendering.moving_camera import place_camera
 from lightfield.rendering.quiet import quiet
 
 Array = np.ndarray[Any, Any]
@@ -42,7 +42,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
     ``passes`` are names and channels, as in {"Combined": "RGB"}.
     """
     scene = bpy.context.scene
-    scene.camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
+    place_camera(world_matrix)
     scene.cycles.seed = seed
     groups = len(view_layer(scene).lightgroups)
     layer = view_layer(scene).name

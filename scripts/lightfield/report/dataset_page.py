@@ -12,6 +12,7 @@ from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, GROUP_PREFIX, is_group
+from lightfield.dataset.sensors import settings_in
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
@@ -60,7 +61,13 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     rig = origin.rig
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
-    packed = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
+    packed = views.collect(
+        folder / IMAGES,
+        lightfield,
+        rig,
+        _unreadable(validation),
+        _sensor_folder(folder, lightfield),
+    )
     middle = lightfield.views[middle_view(rig)]
     lights = light_pictures.collect(folder, lightfield, middle, packed.data["exposure"])
     if lights:
@@ -97,6 +104,22 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         yaml=origin.yaml,
         command=origin.command,
     )
+
+
+def _sensor_folder(folder: Path, lightfield: LightField) -> Path | None:
+    """Return the folder of the rendered views as a sensor sees them. None if there is none.
+
+    Of several brackets, the page shows the one nearest to the exposure itself.
+    """
+    stops_of_folder = {}
+    for path in sorted(folder.glob(f"*/{NAME}")):
+        sensed = LightField.read(path)
+        settings = settings_in(sensed.content)
+        poses = sensed.matrices
+        is_resampled = sensed.lens != lightfield.lens or len(poses) != len(lightfield.matrices)
+        if settings and not is_resampled and np.allclose(poses, lightfield.matrices):
+            stops_of_folder[path.parent] = abs(settings.bracket or 0.0)
+    return min(stops_of_folder, key=stops_of_folder.__getitem__, default=None)
 
 
 def _measurements(

@@ -14,7 +14,14 @@ from typing import Any
 from pydantic import BaseModel, TypeAdapter
 
 from lightfield.core.settings import MEANINGS
-from lightfield.dataset import config, exports, job_settings, publication, reprojections
+from lightfield.dataset import (
+    config,
+    exports,
+    job_settings,
+    publication,
+    reprojections,
+    sensors,
+)
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.json_schema import Generator
 from lightfield.dataset.names import SEQUENCE_EXPORTS
@@ -114,6 +121,7 @@ KEY_PAGES: dict[str, Page] = {
         [
             Section("render", config.Render),
             Section("render: target_error", config.TargetError),
+            Section("render: camera_motion", config.CameraMotion),
         ],
     ),
     "rig-keys.md": Page(
@@ -150,6 +158,20 @@ KEY_PAGES: dict[str, Page] = {
         "An entry of `reprojections` in a scene YAML makes the same views again: through "
         "another lens, or as other files.",
         [Section("A reprojection", config.Reprojection)],
+    ),
+    "sensor-keys.md": Page(
+        "The keys of `sensor`",
+        "`sensor` in a scene YAML develops views as a camera would: with noise, vignetting and a "
+        "response. The clean views stay. [Simulate a sensor](../how-to/simulate-a-sensor.md) shows "
+        "how.",
+        [
+            Section("sensor", sensors.Sensor),
+            Section("A value that varies", sensors.Varied),
+            Section("vignetting", sensors.Vignetting),
+            Section("response", sensors.Response),
+            Section("noise", sensors.Noise),
+            Section("In a settings file", sensors.SensorSettings, sensors.SensorOptions),
+        ],
     ),
     "export-keys.md": Page(
         "The keys of exports",

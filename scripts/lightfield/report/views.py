@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.points import evenly
 from lightfield.geometry.depth import stored_distance
@@ -65,6 +66,7 @@ class PackedViews:
     - ``parts``: the parts of the split that the dataset has, such as train and test.
     - ``noise``: that of the best, the median and the worst view.
     - ``missed``: the part of depths that are inf.
+    - ``sensor``: the name of the folder with the views as a sensor sees them. None without one.
     - ``row``, ``row_shown``: the row of the epipolar-plane image, and the number of its views.
     """
 
@@ -76,15 +78,21 @@ class PackedViews:
     missed: float | None
     row: epipolar.Row | None
     row_shown: int
+    sensor: str | None = None
 
 
 def collect(
-    folder: Path, lightfield: LightField, rig: Rig, unreadable: Collection[str] = ()
+    folder: Path,
+    lightfield: LightField,
+    rig: Rig,
+    unreadable: Collection[str] = (),
+    sensor: Path | None = None,
 ) -> PackedViews:
     """Read the views that the page shows, and pack them.
 
     ``folder`` holds the views of ``lightfield``, whose cameras are those of ``rig``. The
-    ``unreadable`` views are black. Raises `UserError` for any other view that cannot be read.
+    ``unreadable`` views are black. ``sensor`` holds the views as a sensor sees them, if there are
+    such. Raises `UserError` for any other view that cannot be read.
     """
     names = [view.name for view in lightfield.views]
     lens = lightfield.lens
@@ -100,6 +108,9 @@ def collect(
     views = [load(number, small) for number in embedded]
     depths = _depths(views, small)
     shown = _pictures(views, depths, embedded, lightfield, small)
+    if sensor:
+        for entry in shown["embedded"]:
+            entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
     row = epipolar.find_row(rig, lightfield.matrices)
     row_views = epipolar.thinned(row.views, MOST_ROWS) if row else []
     middle = lightfield.matrices[middle_view(rig)]
@@ -125,7 +136,28 @@ def collect(
         missed=None if depths is None else _missed(depths),
         row=row,
         row_shown=len(row_views),
+        sensor=sensor.name if sensor else None,
     )
+
+
+def _sensed(path: Path, small: Lens) -> str:
+    """Return a sensor's picture at the resolution of ``small``, packed. Black if it is damaged.
+
+    Takes single pixels: a mean of several would have less noise.
+    """
+    try:
+        pixels = images.read_image(path, "RGB").srgb
+    except UserError:
+        pixels = np.zeros((small.height, small.width, 3), np.uint8)
+    height, width = pixels.shape[:2]
+    return webp(pixels[_picked(height, width, small)], LIGHT_QUALITY)
+
+
+def _picked(height: int, width: int, small: Lens) -> tuple[Array, ...]:
+    """Return the rows and columns of one pixel of an image for each pixel of ``small``."""
+    rows = (np.arange(small.height) + 0.5) * height / small.height
+    columns = (np.arange(small.width) + 0.5) * width / small.width
+    return np.ix_(rows.astype(int), columns.astype(int))
 
 
 def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
@@ -204,11 +236,7 @@ def read(path: Path, small: Lens, meaning: str | None) -> View:
         colour = pictures.shrunk(colour, small.width, small.height)
     depth = None
     if meaning:
-        rows = (np.arange(small.height) + 0.5) * height / small.height
-        columns = (np.arange(small.width) + 0.5) * width / small.width
-        depth = image.channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(
-            np.float32
-        )
+        depth = image.channels["Z"][_picked(height, width, small)].astype(np.float32)
     return View(colour, depth, float(np.median(noise)) if noise.size else math.nan)
 
 

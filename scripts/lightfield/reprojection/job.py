@@ -19,12 +19,15 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.reprojections import LIGHT_GROUPS, ReprojectionSettings
-from lightfield.geometry.lenses import Lens
+from lightfield.dataset.sensors import sensor_files
+from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
+from lightfield.imaging.sensor import Parameters
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
+from lightfield.reprojection.sensor import parameters_of
 
 # The version of the files, which every key has. Raise it if equal settings give other files.
 VERSION = 3
@@ -72,6 +75,8 @@ class Job:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         if not self.copies:
             self.lightfield.require_centre()
+        if settings.sensor and lightfield.transparent:
+            raise UserError("sensor: does not go with transparent views")
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
@@ -151,8 +156,21 @@ class Job:
         render = self.lightfield.content.get("render", {})
         return str(render.get("depth_precision", "float"))
 
-    def key(self, target: Target, light: Light, identity: str) -> str:
-        """Return the SHA-256 of everything that an output's pixels depend on.
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """The positions of the views in lightfield.json, by their names."""
+        return {view.name: number for number, view in enumerate(self.lightfield.views)}
+
+    def sensor_parameters(self, view: SourceView, target: Target) -> Parameters | None:
+        """Return the parameters of the sensor for a view's image. None without a sensor."""
+        if self.settings.sensor is None:
+            return None
+        number = self._numbers.get(view.name, 0)
+        frame = self.lightfield.content.get("frame", 0)
+        return parameters_of(self.settings.sensor, number, view.name, target.suffix, frame)
+
+    def key(self, view: SourceView, target: Target, light: Light, identity: str) -> str:
+        """Return the SHA-256 of everything that the pixels of a view's image depend on.
 
         ``identity`` stands for the source's content.
         """
@@ -169,6 +187,8 @@ class Job:
             content["transparent"] = True
         if light.weights is not None:
             content["light"] = light.weights
+        if parameters := self.sensor_parameters(view, target):
+            content["sensor"] = parameters.to_json()
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def outputs(self, view: SourceView, target: Target, light: Light) -> dict[str, Path]:
@@ -179,6 +199,8 @@ class Job:
             files["depth"] = f"{name}_depth.png"
         if self.settings.mask:
             files["mask"] = f"dynamic_mask_{name}.png"
+        if self.settings.sensor:
+            files |= sensor_files(self.settings.sensor, name)
         folder: Path = self.arguments.output_dir
         return {kind: folder / file for kind, file in files.items()}
 
@@ -291,6 +313,16 @@ def _turned(view: lightfield.View, target: Target, light: Light) -> lightfield.V
     view = replace(view, others=others)
     if np.array_equal(target.rotation, np.eye(3)):
         return replace(view, name=name)
-    matrix = view.matrix.copy()
-    matrix[:3, :3] = matrix[:3, :3] @ target.rotation
+    matrix = _turned_matrix(view.matrix, target)
+    if view.exposure:
+        start, end = (_turned_matrix(pose, target).tolist() for pose in view.exposure)
+        exposure = {lightfield.EXPOSURE: {"start": start, "end": end}}
+        view = replace(view, others={**view.others, **exposure})
     return replace(view, name=name, matrix=matrix, rotation=matrix_to_euler(matrix[:3, :3]))
+
+
+def _turned_matrix(matrix: Array, target: Target) -> Array:
+    """Return the camera-to-world matrix (4, 4) of a target's camera."""
+    turned = matrix.copy()
+    turned[:3, :3] = turned[:3, :3] @ target.rotation
+    return turned

@@ -93,7 +93,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
         if arguments.skip_if_exists and all(path.exists() for path in paths):
             continue
         identity = identity or _identity(view)
-        key = job.key(target, light, identity)
+        key = job.key(view, target, light, identity)
         if not all(job.record.is_finished(path, key) for path in paths):
             todo.append((index, target, light, key))
     if todo:
@@ -101,7 +101,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
         source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, light, key in todo:
             source.light_up(light)
-            write(job, target, job.maps[index], source, job.outputs(view, target, light), key)
+            write(job, view, target, light, job.maps[index], source, key)
             for view_pass, path in job.pass_outputs(view, target).items():
                 write_pass(job, view_pass, view, job.maps[index], path, key)
     return paths_of_view

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
@@ -21,6 +22,8 @@ from lightfield.imaging.images import (
     write_exr,
     write_png,
 )
+from lightfield.imaging.primaries import PRIMARIES, are_rec_709, from_rec_709, to_rec_709
+from lightfield.imaging.sensor import Parameters, Sensed, sense
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
@@ -101,6 +104,8 @@ class SourcePixels:
         alpha = channels.get("A")
         depth = channels.get("Z")
         colour = _linear([channels[name] for name in colours], alpha)
+        if not are_rec_709(image.chromaticities):
+            colour[:, :, :3] = to_rec_709(colour[:, :, :3], image.chromaticities)
         if alpha is not None and not job.lightfield.transparent:
             # A fully transparent pixel has no colour to resample.
             colour[alpha == 0] = np.nan
@@ -146,16 +151,19 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
 
 def write(
     job: Job,
+    view: SourceView,
     target: Target,
+    light: Light,
     lens_map: LensMap,
     source: SourcePixels,
-    outputs: Mapping[str, Path],
     key: str,
 ) -> None:
-    """Resample a view through one lens map and write its files."""
+    """Resample a view in one of the lights through one lens map, and write its files."""
+    outputs = job.outputs(view, target, light)
+    parameters = job.sensor_parameters(view, target)
     if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
-    image = _developed(job, target, lens_map, source, outputs)
+    image = _developed(job, target, lens_map, source, outputs, parameters)
     attributes = {KEY_ATTRIBUTE: key} | {
         f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
     }
@@ -164,7 +172,7 @@ def write(
     for kind, path in outputs.items():
         match kind:
             case "exr":
-                _write_exr(path, image, attributes)
+                _write_exr(path, image, attributes, job.settings.primaries)
             case "png":
                 _write_png(path, image, {**attributes, **PNG_OPTIONS})
             case "depth":
@@ -173,6 +181,9 @@ def write(
             case "mask":
                 mask = np.where(image.empty, 255, 0).astype(np.uint8)
                 write_png(path, mask, {KEY_ATTRIBUTE: key})
+            case _:
+                assert parameters and image.sensed
+                _write_of_sensor(kind, path, image.sensed, parameters, key)
         job.record.add(path, key)
 
 
@@ -182,7 +193,7 @@ class _Image:
 
     ``half`` (3, h, w) is float16 R G B for an EXR. ``pixels`` (h, w, 3) is sRGB for a PNG.
     ``alpha`` (h, w) is float32, and ``depth`` (h, w) is in metres. ``empty`` (h, w) marks pixels
-    without a source.
+    without a source. ``sensed`` is what the sensor sees, if there is one.
     """
 
     half: Array
@@ -191,6 +202,7 @@ class _Image:
     depth: Array | None
     empty: Array
     transparent: bool
+    sensed: Sensed | None = None
 
     @property
     def has_empty(self) -> bool:
@@ -198,9 +210,17 @@ class _Image:
 
 
 def _developed(
-    job: Job, target: Target, lens_map: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
+    job: Job,
+    target: Target,
+    lens_map: LensMap,
+    source: SourcePixels,
+    outputs: Mapping[str, Path],
+    parameters: Parameters | None,
 ) -> _Image:
-    """Resample a view, and develop its colour for those ``outputs`` that hold colour."""
+    """Resample a view, and develop its colour for those ``outputs`` that hold colour.
+
+    ``parameters`` are those of the sensor, if there is one.
+    """
     settings = job.settings
     transparent = job.lightfield.transparent
     encode = to_8_bit if settings.bits == 8 else to_16_bit
@@ -210,6 +230,7 @@ def _developed(
     half = np.empty((3, *size), np.float16)
     pixels = np.empty((*size, 3), f"uint{settings.bits}")
     covered = np.empty(size, np.float32)
+    light = np.empty((*size, 3) if parameters else (0,), np.float32)
     for rows, strip in strips:
         empty[rows] = np.isnan(strip[:, :, 0])
         alpha = strip[:, :, 3:]
@@ -220,21 +241,55 @@ def _developed(
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha
+        if parameters:
+            light[rows] = strip[:, :, :3]
+            continue
         colour = tone_map(strip[:, :, :3], settings.exposure, settings.reinhard)
         if "png" in outputs:
             pixels[rows] = encode(colour)
         if "exr" in outputs:
-            half[:, rows] = narrow(colour * alpha if transparent else colour, 3)
+            stored = colour * alpha if transparent else colour
+            half[:, rows] = narrow(from_rec_709(stored, settings.primaries or "rec709"), 3)
     if empty.any():
         covered[empty] = 0
         half[:, empty] = 0
         if depth is not None:
             depth[empty] = np.nan
+    if parameters:
+        sensed = _sensed(light, empty, parameters, "weights" in outputs)
+        return _Image(half, sensed.pixels, covered, depth, empty, transparent, sensed)
     return _Image(half, pixels, covered, depth, empty, transparent)
 
 
-def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
-    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels."""
+def _sensed(light: Array, empty: Array, parameters: Parameters, with_weights: bool) -> Sensed:
+    """Return light as a sensor sees it. Pixels without a source are 0."""
+    sensed = sense(light, parameters, with_weights)
+    for pixels in (sensed.pixels, sensed.clipped, sensed.weights):
+        if pixels is not None:
+            pixels[empty] = 0
+    return sensed
+
+
+def _write_of_sensor(
+    kind: str, path: Path, sensed: Sensed, parameters: Parameters, key: str
+) -> None:
+    """Write a file that lies beside the PNG of a sensor."""
+    match kind:
+        case "parameters":
+            write_json(path, {"key": key, **parameters.to_json()})
+        case "clipped":
+            write_png(path, sensed.clipped, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})
+        case "weights":
+            assert sensed.weights is not None
+            planes = np.moveaxis(sensed.weights, -1, 0)
+            write_exr(path, dict(zip("RGB", planes, strict=True)), {KEY_ATTRIBUTE: key})
+
+
+def _write_exr(path: Path, image: _Image, attributes: Attributes, primaries: str | None) -> None:
+    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels.
+
+    ``primaries`` name the colour space of R G B. None is Rec. 709 without an attribute.
+    """
     channels = dict(zip("RGB", image.half, strict=True))
     if image.depth is not None:
         channels["Z"] = image.depth
@@ -242,7 +297,8 @@ def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
         channels["A"] = image.alpha.astype(np.float16)
     elif image.depth is None and image.has_empty:
         channels["A"] = (~image.empty).astype(np.float16)
-    write_exr(path, channels, attributes)
+    chromaticities = PRIMARIES[primaries] if primaries else None
+    write_exr(path, channels, attributes, chromaticities=chromaticities)
 
 
 def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:

@@ -17,6 +17,12 @@ from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset_paths import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
+from lightfield.dataset.sensors import (
+    BRACKET_FILES,
+    SensorSettings,
+    parameter_file,
+    settings_in,
+)
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
@@ -83,6 +89,11 @@ class ImageSet:
         return f"{self.name}/" if self.name else ""
 
     @cached_property
+    def sensor(self) -> SensorSettings | None:
+        """The settings of the sensor that developed the views. None if there is none."""
+        return settings_in(self.lightfield.content)
+
+    @cached_property
     def views(self) -> list[str]:
         return [view.name for view in self.lightfield.views]
 
@@ -124,6 +135,7 @@ def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSe
         path = dataset / name / NAME
         try:
             lightfield = LightField.read(path)
+            settings_in(lightfield.content)
         except UserError as error:
             problem = str(error).replace(f"{dataset}/", "")
             check = f"{name}/lightfield".removeprefix("/")
@@ -253,11 +265,15 @@ def _pass_files(sets: Sequence[ImageSet]) -> list[File]:
     return files
 
 
-def name_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the JSON files that give the numbers in id passes their names."""
+def json_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the JSON files beside images: names of ids, and sensors' parameters."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
-    return [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    for image_set in sets:
+        if image_set.sensor:
+            paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]
+    return paths
 
 
 def lists_of(
@@ -289,6 +305,8 @@ def of_exports(
     for number, image_set in enumerate(sets):
         folders = {image_set.folder}
         patterns = [DEPTH_PICTURE]
+        if image_set.sensor and image_set.sensor.bracket is not None:
+            patterns += BRACKET_FILES.values()
         for manifest in manifests:
             set_lists = lists_of(dataset, image_set, manifest, export_lists)
             if set_lists or export_lists is None:
@@ -394,7 +412,7 @@ def remove_strays(
     extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, export_lists)
     if exports.passed is False:
         return 0
-    owned = {*lists, *name_files(sets), *(file.path for file in [*views, *extras])}
+    owned = {*lists, *json_files(sets), *(file.path for file in [*views, *extras])}
     _, strays = _sorted_out(dataset, sets, owned)
     # Leave hidden files: another process is writing them now.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}

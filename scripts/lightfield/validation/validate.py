@@ -36,6 +36,7 @@ from lightfield.validation import (
     geometry,
     machines,
     pixels,
+    sensor_check,
     splits_check,
 )
 from lightfield.validation.consistency import Answer
@@ -102,7 +103,7 @@ def validate(
     )
     if len(sets) <= len(reprojections):
         files_checks[0] = UNLISTED
-    checks += [*files_checks, cameras_check, *splits_checks]
+    checks += [*sensor_check.checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
     rendered = files.rendered(sets)
     view_count = len(rendered.views) if rendered else 0
     return Result(f"{dataset.parent.name}/{dataset.name}", view_count, checks, digests)
@@ -199,7 +200,7 @@ def _check_files(
 ) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
     sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
-    sums |= _sums_of_name_files(dataset, sets)
+    sums |= _sums_of_json_files(dataset, sets)
     published, files_check = files.listing(dataset, sets, {*export_files, *sums})
     digests = {
         path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
@@ -208,9 +209,9 @@ def _check_files(
     return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
 
 
-def _sums_of_name_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
-    """Return the sums of the files that name the objects, materials and instances of passes."""
-    paths = {name: dataset / name for name in files.name_files(sets)}
+def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
+    """Return the sums of the JSON files beside images."""
+    paths = {name: dataset / name for name in files.json_files(sets)}
     return {
         name: (path.stat().st_size, sha256(path)) for name, path in paths.items() if path.is_file()
     }

@@ -8,6 +8,7 @@ export const viewer = {
   current: 0,
   exposure: DATA.exposure,
   depth: false,
+  sensor: false,
   cache: new Map(),
   pixels: null,
   pointed: null,

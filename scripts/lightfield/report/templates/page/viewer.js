@@ -8,10 +8,14 @@ import { drawRig } from "./rig_drawing.js";
 import { rig, viewer } from "./state.js";
 import { clamp, dot, minus } from "./vectors.js";
 
+// A sensor's codes are shown as they are.
+const CODES = Uint8ClampedArray.from({ length: 256 }, (_, code) => code);
+
 async function pixelsOf(number) {
   if (!viewer.cache.has(number)) {
     const entry = DATA.embedded[number];
-    viewer.cache.set(number, Promise.all([decoded(entry.light), entry.depth ? decoded(entry.depth) : null]));
+    const pictures = [entry.light, entry.depth, entry.sensor];
+    viewer.cache.set(number, Promise.all(pictures.map((picture) => (picture ? decoded(picture) : null))));
     // Keep 32 views, so that stepping back and forth is quick.
     if (viewer.cache.size > 32) viewer.cache.delete(viewer.cache.keys().next().value);
   }
@@ -36,11 +40,15 @@ async function open(number) {
 const drawView = onceAFrame(() => {
   if (!viewer.pixels) return;
   const [width, height] = DATA.size;
-  const [light, depth] = viewer.pixels;
+  const [light, depth, sensor] = viewer.pixels;
   const context = viewer.canvas.getContext("2d");
   const image = context.createImageData(width, height);
-  const colours = viewer.depth ? viewer.colours : null;
-  paint(image.data, light, depth, 0, developed(viewer.exposure), colours);
+  if (viewer.sensor && !viewer.depth) {
+    paint(image.data, sensor, depth, 0, CODES, null);
+  } else {
+    const colours = viewer.depth ? viewer.colours : null;
+    paint(image.data, light, depth, 0, developed(viewer.exposure), colours);
+  }
   context.putImageData(image, 0, 0);
   readOut();
 });
@@ -50,13 +58,16 @@ function readOut() {
   const [width, height] = DATA.size;
   const [x, y] = viewer.pointed;
   const at = 4 * (y * width + x);
-  const [light, depth] = viewer.pixels;
+  const [light, depth, sensor] = viewer.pixels;
   const place = [
     Math.floor(((x + 0.5) * DATA.resolution[0]) / width),
     Math.floor(((y + 0.5) * DATA.resolution[1]) / height),
   ];
   const radiance = [0, 1, 2].map((channel) => LIGHT[light[at + channel]].toPrecision(2));
   const parts = [["pixel", place.join(", ")], ["radiance R G B", radiance.join("  ")]];
+  if (viewer.sensor) {
+    parts.push(["sensor R G B", [0, 1, 2].map((channel) => sensor[at + channel]).join("  ")]);
+  }
   if (depth) {
     const value = depthOf(depthCode(depth, at), DATA.depth.range);
     const name = DATA.depth.meaning === "z" ? "Z-depth" : "distance";
@@ -156,6 +167,16 @@ function startDepthButton() {
   });
 }
 
+function startSensorButton() {
+  const button = element("show-sensor");
+  if (!button) return;
+  button.addEventListener("click", () => {
+    viewer.sensor = !viewer.sensor;
+    button.setAttribute("aria-pressed", String(viewer.sensor));
+    drawView();
+  });
+}
+
 function startSteps() {
   for (const button of document.querySelectorAll("[data-step]")) {
     button.addEventListener("click", () => step(button.dataset.step));
@@ -201,6 +222,7 @@ export function startViewer() {
   slider.addEventListener("input", () => open(Number(slider.value)));
   startExposure();
   startDepthButton();
+  startSensorButton();
   startSteps();
   open(DATA.first);
 }

@@ -1,0 +1,226 @@
+"""The settings of a simulated sensor, in a scene YAML and in the settings files of reprojections.
+
+`lightfield.imaging.sensor` has the formulas, and `lightfield.reprojection.sensor` draws each view's
+parameters.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, Field, TypeAdapter, model_validator
+
+from lightfield.core.settings import Settings, as_list, checked
+from lightfield.dataset.names import VIEWS
+
+# The files beside a view of a bracket, by their kinds.
+BRACKET_FILES = {"clipped": "{view}_clipped.png", "weights": "{view}_weights.exr"}
+# The views' exposures, in stops.
+MOST_STOPS = 30.0
+# PPISP's latent numbers of colour. Larger ones turn its matrix over.
+MOST_COLOUR = 5.0
+CHANNELS = 3
+COLOURS = 8
+
+Stops = Annotated[float, Field(ge=-MOST_STOPS, le=MOST_STOPS)]
+Colour = Annotated[float, Field(ge=-MOST_COLOUR, le=MOST_COLOUR)]
+Alpha = Annotated[float, Field(ge=-100, le=100)]
+Place = Annotated[float, Field(ge=-1, le=1)]
+Alphas = Annotated[tuple[Alpha, Alpha, Alpha], as_list(3)]
+
+
+def _increasing(brackets: list[float]) -> list[float]:
+    if sorted(set(brackets)) != brackets:
+        raise ValueError("must be a list of stops from the lowest to the highest, each once")
+    return brackets
+
+
+class Varied(Settings):
+    """A number that differs from view to view: at random in a range, or by a random walk."""
+
+    range: Annotated[tuple[float, float], as_list(2)] | None = Field(
+        None, description="The least and the largest value. Each view's is drawn by itself."
+    )
+    start: float | None = Field(
+        None, description="The first view's value, with step. Without it, 0."
+    )
+    step: Annotated[float, Field(gt=0, le=100)] | None = Field(
+        None,
+        description="The standard deviation of the change from each view to the next. The views "
+        "have the order of lightfield.json.",
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.range is None) == (self.step is None):
+            raise ValueError("must have one of range and step")
+        if self.range and self.range[0] > self.range[1]:
+            raise ValueError("range: must have the least value first")
+        if self.range and self.start is not None:
+            raise ValueError("start: goes with step, not with range")
+        return self
+
+    def reaches_beyond(self, limit: float) -> bool:
+        """Return whether a value that is given exceeds a ``limit`` on either side."""
+        return max(map(abs, self.range or (self.start or 0.0,))) > limit
+
+
+class Vignetting(Settings):
+    """The fall of light to the corners: 1 + α₁r² + α₂r⁴ + α₃r⁶, at least 0 and at most 1."""
+
+    alpha: Alphas | Annotated[tuple[Alphas, Alphas, Alphas], as_list(CHANNELS)] = Field(
+        description="α₁, α₂ and α₃, or three such lists for red, green and blue. r is the distance "
+        "from the centre, in parts of the image's longer side.",
+    )
+    center: Annotated[tuple[Place, Place], as_list(2)] = Field(
+        (0.0, 0.0),
+        description="The centre, to the right and down from the image's middle.",
+        json_schema_extra={"unit": "longer sides"},
+    )
+
+    @property
+    def channels(self) -> tuple[tuple[float, ...], ...]:
+        """Centre and alphas of each channel."""
+        first = self.alpha[0]
+        alphas: Any = self.alpha if isinstance(first, tuple) else [self.alpha] * CHANNELS
+        return tuple((*self.center, *alpha) for alpha in alphas)
+
+
+class Response(Settings):
+    """The curve from linear values to codes: a toe, a shoulder, and a gamma."""
+
+    toe: float = Field(1.0, gt=0.3, le=20, description="The power below the center.")
+    shoulder: float = Field(1.0, gt=0.3, le=20, description="The power above the center.")
+    gamma: float = Field(
+        1.0, gt=0.1, le=20, description="The power of the result. 0.4545 brightens it as sRGB does."
+    )
+    center: float = Field(0.5, gt=0, lt=1, description="The value where both powers meet.")
+
+    @property
+    def channels(self) -> tuple[tuple[float, ...], ...]:
+        return ((self.toe, self.shoulder, self.gamma, self.center),) * CHANNELS
+
+
+class Noise(Settings):
+    """Noise of variance a · y + b, where the raw value y is 1 at saturation (Foi et al. 2008)."""
+
+    a: float = Field(0.0, ge=0, le=1, description="Variance of light: 1 / electrons at saturation.")
+    b: float = Field(0.0, ge=0, le=1, description="Variance without light.")
+
+    @model_validator(mode="after")
+    def _has_noise(self) -> Self:
+        if not (self.a or self.b):
+            raise ValueError("must have a, b, or both above 0")
+        if 0 < self.a < 1e-9:
+            raise ValueError(f"a: is {self.a:g}; must be 0 or at least 1e-09")
+        return self
+
+
+class SensorOptions(Settings):
+    """The options that a scene YAML shares with the programs' settings files."""
+
+    exposure: Stops | Varied = Field(
+        0.0, description="Exposure, or how it varies.", json_schema_extra={"unit": "stops"}
+    )
+    vignetting: Vignetting | None = Field(
+        None, description="The fall of light to the corners. The same in all views."
+    )
+    colour: (
+        Annotated[
+            tuple[Colour, Colour, Colour, Colour, Colour, Colour, Colour, Colour], as_list(COLOURS)
+        ]
+        | Varied
+        | None
+    ) = Field(
+        None,
+        description="PPISP's eight numbers of colour, or how each of them varies. They move blue, "
+        "red, green and grey.",
+    )
+    noise: Noise | None = Field(None, description="Noise. Without it, there is none.")
+    response: Response | None = Field(
+        None, description="The response, the same in all views. Without it, sRGB."
+    )
+    bits: int = Field(
+        8,
+        ge=1,
+        le=16,
+        description="Bits of a code. A PNG holds the codes scaled to 8 bits, or to 16 for more.",
+        json_schema_extra={"unit": "bits"},
+    )
+    seed: int = Field(
+        0, ge=0, le=2**63 - 1, description="Parameters and noise of all views follow from it."
+    )
+
+    @model_validator(mode="after")
+    def _within_limits(self) -> Self:
+        limits = {"exposure": MOST_STOPS, "colour": MOST_COLOUR}
+        for key, limit in limits.items():
+            value = getattr(self, key)
+            if isinstance(value, Varied) and value.reaches_beyond(limit):
+                raise ValueError(f"{key}: must be from {-limit:g} to {limit:g}")
+        return self
+
+
+class SensorSettings(SensorOptions):
+    """The settings of a reprojection that a sensor develops."""
+
+    bracket: Stops | None = Field(
+        None,
+        description="Stops beside the exposure, for one bracket. With it, write clipping masks and "
+        "weights, too.",
+        json_schema_extra={"unit": "stops"},
+    )
+
+
+class Sensor(SensorOptions):
+    """The views as a sensor would see them, beside the clean ones."""
+
+    sources: list[str] = Field(
+        [VIEWS],
+        min_length=1,
+        description=f"Names of reprojections; `{VIEWS}` stands for the rendered views. The new "
+        "folders are sensor, and perspective_sensor for perspective.",
+    )
+    rigs: list[str] | None = Field(
+        None, min_length=1, description="The rigs whose views are developed. Without it, all."
+    )
+    brackets: (
+        Annotated[list[Stops], AfterValidator(_increasing), Field(min_length=2, max_length=32)]
+        | None
+    ) = Field(
+        None,
+        description="An exposure bracket for each value, with clipping masks and weights. Their "
+        "folders are sensor_ev-2 and so on.",
+        json_schema_extra={"unit": "stops"},
+    )
+
+    def folders(self, source: str) -> dict[str, SensorSettings]:
+        """Return the settings of a source's folders, by their names."""
+        name = "sensor" if source == VIEWS else f"{source}_sensor"
+        options = self.model_dump(include={*SensorOptions.model_fields}, exclude_none=True)
+        if self.brackets is None:
+            return {name: SensorSettings(**options)}
+        return {
+            f"{name}_ev{stops:g}": SensorSettings(**options, bracket=stops)
+            for stops in self.brackets
+        }
+
+
+def settings_in(lightfield: Mapping[str, Any]) -> SensorSettings | None:
+    """Return the settings in a reprojection's lightfield.json. None if it is not of a sensor."""
+    match lightfield:
+        case {"reprojection": {"sensor": content}}:
+            return checked(TypeAdapter(SensorSettings), content, "reprojection.sensor")
+    return None
+
+
+def parameter_file(view: str) -> str:
+    """Return the name of the file with a view's parameters."""
+    return f"{view}.json"
+
+
+def sensor_files(settings: SensorSettings, view: str) -> dict[str, str]:
+    """Return the names of the files beside a view's PNG, by their kinds."""
+    files = {"parameters": parameter_file(view)}
+    if settings.bracket is not None:
+        files |= {kind: name.format(view=view) for kind, name in BRACKET_FILES.items()}
+    return files

@@ -1,0 +1,40 @@
+"""The poses of a camera that moves while the shutter is open."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def pose_at(matrix: Floats, travel: Sequence[float], turn: Sequence[float], time: float) -> Floats:
+    """Return the camera-to-world matrix (4, 4) at a ``time`` from −½, the start, to ½, the end.
+
+    ``matrix`` is the pose at time 0. ``travel`` (3,) are the metres of a whole exposure along the
+    camera's right, up and back. ``turn`` (3,) is a rotation vector in degrees about the same axes.
+    Both have constant speed.
+    """
+    pose = matrix.copy()
+    pose[:3, 3] += matrix[:3, :3] @ np.asarray(travel, np.float64) * time
+    pose[:3, :3] = matrix[:3, :3] @ _rotation(np.radians(turn) * time)
+    return pose
+
+
+def row_times(height: int, rolling: float) -> Floats:
+    """Return the time, −½ to ½, in the middle of the exposure of each row (height,), top first.
+
+    ``rolling`` is the part of the exposure in which one row sees light, as in Cycles.
+    """
+    rows = np.arange(1, height + 1) / height
+    return np.asarray((rows - 0.5) * (1 - rolling))
+
+
+def _rotation(vector: Floats) -> Floats:
+    """Return the matrix (3, 3) of a rotation vector (3,) in radians. Source: Rodrigues' formula."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

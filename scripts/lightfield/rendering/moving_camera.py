@@ -1,0 +1,62 @@
+"""Places the camera for the next view: still, or moving while the shutter is open."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+
+from lightfield.geometry.exposure import pose_at
+
+Array = np.ndarray[Any, Any]
+
+# The motion of the current light field's camera. Empty if it stands still.
+_motion: dict[str, Any] = {}
+
+
+def set_up(motion: Mapping[str, Any] | None) -> None:
+    """Blur the following views by the camera's ``motion``, the block of a scene YAML.
+
+    Objects are blurred only if they were before. Cycles must be set up for all else.
+    """
+    _motion.clear()
+    if motion is None:
+        return
+    _motion.update(motion)
+    scene = bpy.context.scene
+    if not scene.render.use_motion_blur:
+        for obj in bpy.data.objects:
+            obj.cycles.use_motion_blur = obj == scene.camera
+    scene.render.use_motion_blur = True
+    scene.render.motion_blur_position = "CENTER"
+    if "rolling" in motion:
+        scene.cycles.rolling_shutter_type = "TOP"
+        scene.cycles.rolling_shutter_duration = motion["rolling"]
+    scene.camera.rotation_mode = "QUATERNION"
+
+
+def place_camera(world_matrix: Array) -> None:
+    """Place the scene's camera at ``world_matrix``, (4, 4) camera-to-world.
+
+    A moving camera is there in the middle of the exposure.
+    """
+    scene = bpy.context.scene
+    camera = scene.camera
+    if not _motion:
+        camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
+        return
+    middle = np.asarray(world_matrix, np.float64)
+    travel, turn = _motion["travel"], _motion["turn"]
+    # The keys have the same frames for each view, so they replace those of the view before.
+    for time in (-0.5, 0.0, 0.5):
+        pose = mathutils.Matrix(pose_at(middle, travel, turn, time).tolist())
+        rotation = pose.to_quaternion()
+        if time > -0.5:
+            rotation.make_compatible(camera.rotation_quaternion)
+        camera.location = pose.translation
+        camera.rotation_quaternion = rotation
+        frame = scene.frame_current + time * scene.render.motion_blur_shutter
+        camera.keyframe_insert("location", frame=frame)
+        camera.keyframe_insert("rotation_quaternion", frame=frame)
+    scene.frame_set(scene.frame_current)

@@ -1,0 +1,83 @@
+"""Renders a bright wall's edge with a camera that moves while its shutter is open.
+
+Run by test_camera_motion.py in a process of its own, because bpy has one scene at a time:
+motion_renders.py FOLDER writes FOLDER/results.npz.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.geometry.exposure import pose_at
+from lightfield.rendering import cycles
+from lightfield.rendering.colour_pass import render_colour
+from lightfield.rendering.geometry_pass import render_geometry
+
+FOLDER = Path(sys.argv[1])
+SIZE = 64
+CAMERA = {"lens": "rectilinear", "fov": 60, "resolution": [SIZE, SIZE]}
+RIG = {"type": "lattice", "cameras": [1, 1, 1], "size": 0}
+RENDER = {"samples": 64, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+TRAVEL = {"travel": [0.3, 0, 0], "turn": [0, 0, 0]}
+TURN = {"travel": [0, 0, 0], "turn": [0, 8, 0]}
+SUB_FRAMES = 16
+
+
+def build():
+    """Save a glowing wall 2 m ahead, whose left edge is at x = 0. All else is black."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_plane_add(size=20, location=(10, 0, -2))
+    material = bpy.data.materials.new("glow")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    glow = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(glow.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs[0])
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "wall.blend"))
+
+
+def set_up(**motion):
+    render = RENDER | ({"camera_motion": motion} if motion else {})
+    content = LightField.from_rig(
+        RIG, lenses.from_camera(CAMERA), depth="z", frame=1, render=render, scene={}
+    )
+    cycles.set_up(FOLDER / "wall.blend", None, content, "cpu", 1)
+    # The mean of a pixel's square.
+    bpy.context.scene.cycles.pixel_filter_type = "BOX"
+    bpy.context.scene.cycles.filter_width = 1.0
+
+
+def red(matrix, seed=0):
+    return render_colour(matrix, seed).pixels[..., 0]
+
+
+def sub_frames(motion):
+    """Return the mean of still pictures at equal steps of the exposure."""
+    times = (np.arange(SUB_FRAMES) + 0.5) / SUB_FRAMES - 0.5
+    poses = [pose_at(np.eye(4), motion["travel"], motion["turn"], time) for time in times]
+    return np.mean([red(pose, seed) for seed, pose in enumerate(poses)], axis=0)
+
+
+build()
+pictures = {}
+set_up()
+pictures["still"] = red(np.eye(4))
+for name, motion in (("travel", TRAVEL), ("turn", TURN)):
+    pictures[f"{name}_sub_frames"] = sub_frames(motion)
+pictures["depth_still"] = render_geometry(np.eye(4)).depth
+for name, motion in (("travel", TRAVEL), ("turn", TURN)):
+    set_up(**motion)
+    pictures[name] = red(np.eye(4))
+pictures["depth"] = render_geometry(np.eye(4)).depth
+# Another pose, and back: the keys of one view must not stay in the next.
+red(pose_at(np.eye(4), (1, 0, 0), (0, 30, 0), 1))
+pictures["turn_again"] = red(np.eye(4))
+for rolling in (0.01, 0.5):
+    set_up(**TRAVEL, rolling=rolling)
+    pictures[f"rolling_{rolling}"] = red(np.eye(4))
+np.savez(FOLDER / "results.npz", **pictures)
