@@ -44,13 +44,41 @@ exports:
   instant_ngp: {sources: [views]}
   nerfstudio: {sources: [views], depth: true}
 """
-IMPORTED = "scene: {dataset: published}"
+IMPORTED = """
+description: Views of others
+scene: {dataset: published}
+publish:
+  creators: [{name: Ada Lovelace}]
+  licence: CC-BY-4.0
+  url: https://example.org/dataset
+  publisher: Zenodo
+  date: 2026-11-30
+  limitations: Few pixels.
+  biases: One room.
+  personal_information: None.
+  use_cases: Tests.
+  social_impact: None.
+"""
+# A sequence of a model, whose frames share an export.
+MODELLED = """
+scene: {model: model.obj}
+render: {samples: 4}
+rigs:
+  LFMoving:
+    type: plane
+    cameras: [2, 1]
+    size: 1
+    frames: {first: 1, last: 2}
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+exports:
+  dnerf: {sources: [views], points: 9}
+"""
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "extremes", "render_overhead"),
     *("advise", "gpu_check", "synthesis", "learn", "verify"),
 ]
-CHOSEN = ["--config", "scenes=[brought,imported]", "rigs=all", "preset=full"]
+CHOSEN = ["--config", "scenes=[brought,imported,modelled]", "rigs=all", "preset=full"]
 RULES = [
     *("fetch_brought",),
     *(
@@ -80,7 +108,8 @@ class Failing:
     """A checkout whose programs fail. All files that jobs read or write exist."""
 
     def __init__(self, folder):
-        self.folder = checkout(folder, brought=BROUGHT, imported=IMPORTED)
+        self.folder = checkout(folder, brought=BROUGHT, imported=IMPORTED, modelled=MODELLED)
+        (self.folder / "model.obj").write_text("# stands in for a model\n")
         plane = {"type": "plane", "cameras": [2, 1]}
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
         write_views(self.folder / "published/LFPlane", camera, plane)
