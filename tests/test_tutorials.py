@@ -113,7 +113,8 @@ def test_ones_own_blend_is_rendered_refused_after_a_change_and_accepted(folder):
 def test_a_splat_gets_views_points_and_a_measure_that_finds_no_error_in_the_truth(folder):
     output = run(folder, "train-a-splat.md")
     assert "10 views train, 2 test" in output
-    assert "2 views: PSNR inf dB, SSIM 1.0000, FLIP 0.0000" in output
+    assert "2 views: PSNR inf dB, " in output
+    assert "SSIM 1.0000, FLIP 0.0000" in output
     images = folder / "work/nerfstudio/images"
     assert len(list(images.iterdir())) == 12
     model = read_model(folder / "work/colmap/sparse/0", ".bin")

@@ -219,7 +219,9 @@ def selected(settings: Mapping[str, Any]) -> list[Pass]:
 
 
 def by_name(name: str) -> Pass:
-    """Return the pass of this name. Raises KeyError if there is none."""
+    """Return the pass of this name. Raises KeyError if there is none, or if it is no text."""
+    if not isinstance(name, str):
+        raise KeyError(name)
     if name.startswith(GROUP_PREFIX):
         return of_group(name.removeprefix(GROUP_PREFIX))
     return PASSES[name]
