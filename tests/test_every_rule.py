@@ -497,8 +497,13 @@ ROUNDS = {
             {"inventory", "probe_cameras", "check_gpu", "LFPlane pack"},
         ),
     },
+    # The cameras' settings hold the rig, and so its frames.
     "a longer sequence": {
-        "moved": ("last: 2", "last: 3", {"inventory", "export_sequence", "pack"})
+        "moved": (
+            "last: 2",
+            "last: 3",
+            {"inventory", "lightfield", "probe_cameras", "export_sequence", "pack"},
+        ),
     },
     "other points of a sequence": {"moved": ("points: 9", "points: 8", {"export_sequence"})},
     "a description, and somebody's light field": {
