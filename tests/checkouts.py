@@ -14,6 +14,23 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
 
+# A scene of views that exist already, with all that its author must say to publish them.
+PUBLISHED_VIEWS = """
+description: Views of others
+publish:
+  creators: [{name: Ada Lovelace}]
+  licence: CC-BY-4.0
+  url: https://example.org/dataset
+  publisher: Zenodo
+  date: 2026-11-30
+  limitations: Few pixels.
+  biases: One room.
+  personal_information: None.
+  use_cases: Tests.
+  social_impact: None.
+scene: {dataset: published}
+"""
+
 
 def checkout(folder, **scenes):
     """Copy what Snakemake needs to ``folder``. ``scenes`` are YAML texts for configs/scenes/.

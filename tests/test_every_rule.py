@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
@@ -73,21 +74,6 @@ flow: {{pairs: neighbours}}
 exports:
   instant_ngp: {{sources: [views]}}
   nerfstudio: {{sources: [views], depth: true}}
-"""
-IMPORTED = """
-description: Views of others
-publish:
-  creators: [{name: Ada Lovelace}]
-  licence: CC-BY-4.0
-  url: https://example.org/dataset
-  publisher: Zenodo
-  date: 2026-11-30
-  limitations: Few pixels.
-  biases: One room.
-  personal_information: None.
-  use_cases: Tests.
-  social_impact: None.
-scene: {dataset: published}
 """
 # A sequence, whose frames share an export.
 MOVED = """

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, with_consumers
 from sphere import write_views
 
@@ -43,21 +44,6 @@ flow: {pairs: neighbours}
 exports:
   instant_ngp: {sources: [views]}
   nerfstudio: {sources: [views], depth: true}
-"""
-IMPORTED = """
-description: Views of others
-scene: {dataset: published}
-publish:
-  creators: [{name: Ada Lovelace}]
-  licence: CC-BY-4.0
-  url: https://example.org/dataset
-  publisher: Zenodo
-  date: 2026-11-30
-  limitations: Few pixels.
-  biases: One room.
-  personal_information: None.
-  use_cases: Tests.
-  social_impact: None.
 """
 # A sequence of a model, whose frames share an export.
 MODELLED = """
