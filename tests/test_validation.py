@@ -1330,7 +1330,7 @@ def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     of_report.write_bytes(b"half a page, which another job may be writing")
     other = Path(shutil.copytree(dataset, tmp_path / "elsewhere" / "room" / "sphere"))
     first = run(run_program, dataset, "--records", tmp_path / "record.json")
-    second = run(run_program, other, "--records", tmp_path / "record.json", "--processes", 2)
+    second = run(run_program, other, "--records", tmp_path / "record.json")
     assert first.stdout == second.stdout
     assert re.fullmatch(
         r"room/sphere: valid: 12 views; 12 views × [\d.]+ neighbours agree 9\d.\d % .*\n",
@@ -1369,6 +1369,22 @@ def kill_workers() -> None:
         worker.kill()
 
 
+@pytest.fixture
+def eager_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let even tiny datasets be read by several processes."""
+    monkeypatch.setattr("lightfield.validation.validate.BYTES_PER_PROCESS", 1)
+
+
+@pytest.mark.usefixtures("eager_processes")
+def test_two_processes_find_what_one_finds(dataset: Path) -> None:
+    flip_byte(dataset / "exr" / "view_0003f.exr")
+    first = validate(dataset)
+    second = validate(dataset, processes=2)
+    assert first == second
+    assert any(check.passed is False for check in first.checks)
+
+
+@pytest.mark.usefixtures("eager_processes")
 def test_a_killed_worker_is_an_error_of_one_line(dataset: Path) -> None:
     killer = threading.Thread(target=kill_workers, daemon=True)
     killer.start()

@@ -73,6 +73,7 @@ def validate(
       exist.
     - ``ledger_sums``: the SHA-256 that files had when they were made, by their paths in the
       dataset.
+    - ``processes``: the most processes that read images. Small datasets take fewer.
 
     Raises `UserError` if one of these cannot be read. The result holds all faults of the dataset.
     """
@@ -91,6 +92,7 @@ def validate(
     export_checks, set_exports = exported_cameras.check(dataset, sets, manifests, export_lists)
     checks += export_checks
     images = views + passes + extras
+    processes = min(processes, _worthwhile_processes(dataset, images))
     facts, image_checks = _check_images(
         dataset, sets, images, presence_checks, set_exports, volumes, processes
     )
@@ -128,6 +130,17 @@ def _recorded_sums(records: Sequence[Path]) -> Sums | None:
     for record in records:
         sums |= read_record(record)
     return sums
+
+
+# A process starts in the time in which it reads about this many bytes of images.
+BYTES_PER_PROCESS = 16_000_000
+
+
+def _worthwhile_processes(dataset: Path, images: Sequence[File]) -> int:
+    """Return how many processes read the images sooner than fewer would."""
+    paths = [dataset / image.path for image in images]
+    image_bytes = sum(path.stat().st_size for path in paths if path.is_file())
+    return 1 + image_bytes // BYTES_PER_PROCESS
 
 
 def _check_images(
