@@ -11,6 +11,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import snakemake_server
+
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
 
@@ -58,14 +60,10 @@ def with_consumers(folder):
     (environment / "complete").touch()
 
 
-def _command(arguments):
-    return [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments]
-
-
 def start_snakemake(folder, *arguments, **options):
     """Start Snakemake in a checkout, in a session of its own. Return the process."""
     return subprocess.Popen(
-        _command(arguments),
+        [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments],
         cwd=folder,
         start_new_session=True,
         **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options,
@@ -76,14 +74,8 @@ def snakemake(folder, *arguments):
     """Run Snakemake in a checkout. Return its CompletedProcess."""
     # The folder of the logger plugin follows the test's own folders.
     folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
-    return subprocess.run(
-        _command(arguments),
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, folders))},
-    )
+    path = os.pathsep.join(filter(None, folders))
+    return snakemake_server.run(["--cores", "1", *arguments], folder, {"PYTHONPATH": path})
 
 
 def wait_until(condition, process, seconds=600, log=None):

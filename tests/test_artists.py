@@ -1,12 +1,11 @@
 """Builds of three .blend files as artists leave them, in a folder of the user's own."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import snakemake_server
 from conftest import ROOT
 
 from lightfield.core.files import sha256
@@ -60,18 +59,12 @@ TAKEN = {
 
 
 def build(folder, *arguments, accept="accept_blend=false"):
-    return subprocess.run(
-        [
-            Path(sys.executable).with_name("snakemake"),
-            *("--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "1"),
-            *arguments,
-            *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
-        ],
-        cwd="/",
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command_line = [
+        *("--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "1"),
+        *arguments,
+        *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
+    ]
+    return snakemake_server.run(command_line, "/")
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,13 @@
 
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
+import snakemake_server
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
@@ -248,23 +248,11 @@ def test_a_single_word_becomes_a_list():
 @pytest.mark.slow
 def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
-    plan = subprocess.run(
-        [
-            SNAKEMAKE,
-            "--cores",
-            "1",
-            "--dry-run",
-            "--quiet",
-            "host",
-            "--config",
-            *folders,
-            *arguments,
-        ],
-        cwd=config.ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
+    plan = snakemake_server.run(
+        ["--cores", "1", "--dry-run", "--quiet", "host", "--config", *folders, *arguments],
+        config.ROOT,
     )
+    assert plan.returncode == 0, plan.stderr
     assert set(re.findall(r"Placing the cameras of \w+/(\w+)", plan.stdout + plan.stderr)) == rigs
 
 
@@ -280,13 +268,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
 )
 @pytest.mark.slow
 def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
-    result = subprocess.run(
-        [SNAKEMAKE, "--cores", "1", "--config", *arguments],
-        cwd=config.ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    result = snakemake_server.run(["--cores", "1", "--config", *arguments], config.ROOT)
     assert result.returncode != 0
     errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]
     assert len(errors) == 1

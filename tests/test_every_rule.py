@@ -147,18 +147,9 @@ class Build:
         shutil.rmtree(folder / ".snakemake")
 
     def start(self, *arguments):
+        """Start a process of its own that makes everything."""
         return subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "snakemake",
-                "--cores",
-                "4",
-                *arguments,
-                *CHOSEN,
-                "--",
-                *TARGETS,
-            ],
+            [sys.executable, "-m", "snakemake", *self.command_line(*arguments)],
             cwd=self.folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -166,12 +157,14 @@ class Build:
             env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
         )
 
+    def command_line(self, *arguments):
+        return ["--cores", "4", *arguments, *CHOSEN, "--", *TARGETS]
+
     def snakemake(self, *arguments):
         """Run everything. Return the terminal's stderr."""
-        process = self.start(*arguments)
-        stdout, stderr = process.communicate()
-        assert process.returncode == 0, stdout + stderr
-        return stderr
+        result = snakemake(self.folder, *self.command_line(*arguments))
+        assert result.returncode == 0, result.stdout + result.stderr
+        return result.stderr
 
     def plan(self, *arguments):
         """Return the jobs that a run would start, by their first output."""

@@ -5,11 +5,11 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import snakemake_server
 from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, with_consumers
 from sphere import write_views
@@ -126,19 +126,13 @@ class Failing:
 
     def run(self, *arguments, work=None):
         """Run Snakemake. ``work`` maps each job's log to what the job writes."""
-        return subprocess.run(
-            [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
-            cwd=self.folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ
-            | {
-                "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
-                "PYTHONPATH": str(Path(__file__).parent),
-                "WORK_TO_DO": json.dumps(work or {}),
-            },
-        )
+        env = {
+            "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
+            "PYTHONPATH": str(Path(__file__).parent),
+            "WORK_TO_DO": json.dumps(work or {}),
+        }
+        arguments = ("--cores", "1", *arguments)
+        return snakemake_server.run(arguments, self.folder, env, merge_outputs=True)
 
     def independent_groups(self):
         """Return the rules in groups. No job reads what another rule of its group writes."""

@@ -1,11 +1,10 @@
 """A user's scenes, poses and results in a folder of their own, outside the repository."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+import snakemake_server
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -49,14 +48,7 @@ def folder(tmp_path):
 
 
 def snakemake(*arguments, cwd="/"):
-    result = subprocess.run(
-        [Path(sys.executable).with_name("snakemake"), *arguments],
-        cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
+    result = snakemake_server.run(arguments, cwd, merge_outputs=True)
     return result.returncode, result.stdout
 
 

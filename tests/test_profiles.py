@@ -3,11 +3,11 @@
 import json
 import os
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
+import snakemake_server
 import yaml
 from checkouts import ROOT, snakemake
 
@@ -38,19 +38,13 @@ def planned(tmp_path_factory):
     def plan(profile, device):
         folder = tmp_path_factory.mktemp("planned")
         results = folder / "results"
-        run = subprocess.run(
-            [
-                *(sys.executable, "-m", "snakemake", "--dry-run", "--logger", "jobs"),
-                *("--profile", f"profiles/{profile}"),
-                *("--config", f"results={results}", f"work={folder / 'work'}", f"device={device}"),
-                *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
-            ],
-            cwd=ROOT,
-            # Snakemake finds the logger plugin here.
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
-            capture_output=True,
-            text=True,
-        )
+        arguments = [
+            *("--dry-run", "--logger", "jobs", "--profile", f"profiles/{profile}"),
+            *("--config", f"results={results}", f"work={folder / 'work'}", f"device={device}"),
+            *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
+        ]
+        # Snakemake finds the logger plugin here.
+        run = snakemake_server.run(arguments, ROOT, {"PYTHONPATH": str(Path(__file__).parent)})
         assert run.returncode == 0, run.stderr
         return [json.loads(line) for line in run.stderr.splitlines() if line.startswith("{")]
 
