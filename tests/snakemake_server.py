@@ -15,16 +15,17 @@ import tempfile
 from pathlib import Path
 
 PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
-# The server of this test process, once it has started.
-STARTED = []
+# The servers of this test process that have started, by the command that starts them.
+STARTED = {}
 
 
-def run(arguments, folder, env=None, merge_outputs=False):
+def run(arguments, folder, env=None, merge_outputs=False, prefix=()):
     """Run ``snakemake`` with arguments in a folder. Return its CompletedProcess.
 
-    ``env`` adds to the environment. ``merge_outputs`` writes stderr to stdout.
+    ``env`` adds to the environment. ``merge_outputs`` writes stderr to stdout. ``prefix`` is a
+    command that runs another, such as ``nice``.
     """
-    server = _server()
+    server = _server(tuple(prefix))
     with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
         files = [f"/proc/{os.getpid()}/fd/{file.fileno()}" for file in (stdout, stderr)]
         request = {
@@ -41,18 +42,18 @@ def run(arguments, folder, env=None, merge_outputs=False):
     return subprocess.CompletedProcess(arguments, returncode, *texts)
 
 
-def _server():
+def _server(prefix):
     """Return the process that forks. Starts it for the first run of a test process."""
-    if not STARTED:
+    if prefix not in STARTED:
         process = subprocess.Popen(
-            [sys.executable, Path(__file__)],
+            [*prefix, sys.executable, Path(__file__)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
-        STARTED.append(process)
+        STARTED[prefix] = process
         atexit.register(process.kill)
-    return STARTED[0]
+    return STARTED[prefix]
 
 
 def serve():

@@ -9,12 +9,11 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import simulated
+import snakemake_server
 from checkouts import (
     assert_same_bytes,
     checkout,
@@ -67,13 +66,8 @@ class Damaged:
         """Run Snakemake as a user who obeys permissions, which root does not."""
         may_not = ["--bounding-set=-dac_override,-dac_read_search"]
         held = [] if os.geteuid() else ["setpriv", *may_not, "--inh-caps=-all"]
-        return subprocess.run(
-            [*held, Path(sys.executable).with_name("snakemake"), "--cores", "2", *arguments],
-            cwd=self.root,
-            capture_output=True,
-            text=True,
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
-        )
+        env = {"PYTHONPATH": str(Path(__file__).parent)}
+        return snakemake_server.run(["--cores", "2", *arguments], self.root, env, prefix=held)
 
     def damaged_and_made(self, result):
         """Return the files that a run reports as damaged, and the files that it makes."""
