@@ -1,11 +1,11 @@
-"""Kill builds, damage their files, and leave them no room; count what is found, mended and lost.
+"""Kill builds, damage their files, limit their size. Count what is found, mended and lost.
 
 Builds a small dataset of the test room twice, each time in a folder of its own. Nothing disturbs
-the first build. The second one may first write no large files, is then killed at random moments,
-and finishes at last. Then the program spoils its files in every way, lets `snakemake verify --mend`
-find them and set them aside, and builds again. In the end all published bytes must be those of the
-undisturbed build. Prints a table. Fails if a fault was not found or not mended, or if anything was
-lost or made twice.
+the first build. The second one may write no large files at first. Then it is killed at random
+moments, and finishes at last. After that the program spoils its files in every way.
+`snakemake verify --mend` must find them and set them aside, and the next build makes them again. In
+the end all published bytes must be those of the undisturbed build. Prints a table. Fails if a fault
+was not found or not mended, or if anything was lost or made twice.
 """
 
 import argparse

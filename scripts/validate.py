@@ -1,12 +1,11 @@
-"""Check a dataset whole: its files, its pixels, and that its views see the same world.
+"""Check a whole dataset: its files, its pixels, and that its views see the same world.
 
-What an invalid dataset fails in is printed, a line a failure; then the exit status is 1.
+Prints a line for each failure. The exit status is then 1.
 
-With --output and --sums, as the workflow has it, the exit status is 0 whatever comes out, and
-validation.json is written, and the checksums of all that the dataset publishes;
-scripts/publish_checksums.py makes them its sha256sums.txt if it is valid. What a killed run left
-half-written in the dataset (hidden *.tmp files), and the sha256sums.txt of an earlier validation,
-are removed first.
+The workflow gives --output and --sums. Then the exit status is 0 for an invalid dataset, too.
+Writes validation.json, and the checksums of all files that the dataset publishes.
+scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an earlier
+sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
 
 A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "records": []}, for the
 flags --reprojection, --exports and --records.
