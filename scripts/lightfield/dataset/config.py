@@ -1128,6 +1128,11 @@ class Scene(Credits):
                 "must be auto, distance or none"
             )
         _check_cube_map(key, rig)
+        if rig.cube_map and self.render and self.render.camera_motion:
+            raise ValueError(
+                f"render.camera_motion: does not go with {key}.cube_map, whose faces would each "
+                "move along axes of their own; render panoramas, and reproject with cube_map"
+            )
         if rig.is_omnidirectional:
             self._check_without_centre(key, name)
         if self.flow and rig.is_at_one_place():
