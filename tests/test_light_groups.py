@@ -358,13 +358,14 @@ def test_impossible_lights_are_refused(more, problem):
 # The plan.
 
 
-def write_scene(folder, monkeypatch, **render):
+def write_scene(folder, monkeypatch, reprojections=None, **render):
     """Write a scene YAML into a user's own folder, and return its only dataset."""
     content = {
         "scene": {"builder": "room"},
         "render": {"samples": 8, "light_groups": "each", **render},
         "rigs": {"LFOne": {"type": "lattice", "cameras": [2, 1, 1], "camera": CAMERA}},
         "relight": {"olat": "each"},
+        "reprojections": reprojections or {},
     }
     path = folder / "configs/scenes/lit.yaml"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -391,6 +392,33 @@ def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch)
     assert many.estimate.all_view_bytes - many.estimate.view_bytes > 10 * (
         few.estimate.all_view_bytes - few.estimate.view_bytes
     )
+
+
+def test_a_moving_camera_is_planned_to_take_longer(tmp_path, monkeypatch):
+    motion = {"travel": [0.1, 0, 0]}
+    still, moving = (
+        write_scene(tmp_path, monkeypatch, **more).estimate.view_seconds
+        for more in ({}, {"camera_motion": motion})
+    )
+    assert 1.05 * still < moving < 1.5 * still
+
+
+def test_reprojected_groups_take_time_and_disk_space(tmp_path, monkeypatch):
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
+    without, with_groups = (
+        write_scene(
+            tmp_path,
+            monkeypatch,
+            {"flat": {"format": "exr", "camera": camera, **more}},
+            light_groups=[f"lamp {number}" for number in range(10)],
+        )
+        for more in ({}, {"passes": ["light_groups"]})
+    )
+    # Half floats of three channels, of ten groups and the rest.
+    added = with_groups.estimate.all_view_bytes - without.estimate.all_view_bytes
+    assert 0.5 * 11 * 6 * 16**2 < added <= 11 * 6 * 16**2
+    seconds = [each.estimate.reprojection_seconds("flat") for each in (without, with_groups)]
+    assert seconds[1] > 11 * seconds[0]
 
 
 @pytest.fixture
