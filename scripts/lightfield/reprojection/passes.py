@@ -85,7 +85,8 @@ class _Balance:
         missing = colour.clip(-HALF_MAX, HALF_MAX).astype(np.float16).astype(np.float32)
         size = np.zeros_like(missing)
         for view_pass in groups:
-            planes = [*_read(job, view_pass, view).channels.values()]
+            channels = _read(job, view_pass, view).channels
+            planes = [channels[name] for name in view_pass.channels]
             light = _not_darker(_resampled(planes, view_pass, lens_map)[..., :3], planes)
             missing -= light
             size += np.abs(light)
