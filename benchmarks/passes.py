@@ -5,6 +5,7 @@ Prints for each lens, of the first view:
 - sum: by how much the parts of light differ from the colour, relative to it, at most. "inside"
   leaves out the rim.
 - groups: the same of the light groups, of which each emitter has one, and the number of groups.
+- reprojected groups: the same through a perspective lens of 100 degrees, by filter.
 - objects: the part of the pixels whose object is the one that Blender's ray casts hit.
 - mattes: the part of the pixels whose first Cryptomatte entry is that object.
 - depth: its relative difference from the ray casts' distance, median and 99th percentile.
@@ -22,11 +23,12 @@ Prints for each lens, of the first view:
 - warped: the mean difference of albedo to that view, where flow leads; not warped: without flow.
 
 Then it prints the core seconds of a view, how many of them the geometry takes, and its bytes, with
-more and more passes.
+more and more passes, and with a moving camera.
 """
 
 import argparse
 import json
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -40,17 +42,21 @@ from scipy.ndimage import binary_erosion
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.cli import run
+from lightfield.core.files import write_json
 from lightfield.dataset import keys
 from lightfield.dataset.journal import read
 from lightfield.dataset.light_groups import resolved
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES, of_group
+from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
 from lightfield.rendering import blend_file, inventory, light, shard
 from lightfield.rendering.colour_pass import render_colour
+from lightfield.reprojection.filters import FILTERS
+from lightfield.validation.light_sums import error
 
 Array = np.ndarray[Any, Any]
 
@@ -73,6 +79,12 @@ STEPS = {
     "all": list(PASSES),
     "surfaces alone": [name for name, each in PASSES.items() if each.unless],
 }
+MOTION = {"travel": [0.05, 0, 0], "turn": [0, 2, 0]}
+# What makes views cost more beside passes, as keys of a render block.
+OTHERS = {
+    "moving camera": {"camera_motion": MOTION},
+    "rolling shutter": {"camera_motion": {**MOTION, "rolling": 0.1}},
+}
 
 
 def main() -> None:
@@ -94,10 +106,11 @@ def main() -> None:
             content.write(folder / NAME)
             _render(content, arguments.blend, folder)
             print(lens, json.dumps(_figures(content, folder)), flush=True)
-        for step, passes in {**STEPS, "light groups alone": []}.items():
+        more = {"light groups alone": {"light_groups": groups}, **OTHERS}
+        for step in [*STEPS, *more]:
+            passes = STEPS.get(step, [])
             content = _content(poses, "fisheye", arguments.size, arguments.samples, passes)
-            if step.startswith("light groups"):
-                content = content.changed(render={**content.render, "light_groups": groups})
+            content = content.changed(render={**content.render, **more.get(step, {})})
             folder = Path(name, step)
             seconds, geometry = _render(content, arguments.blend, folder)
             sizes = {path.parent.name: path.stat().st_size for path in folder.rglob("view_*.exr")}
@@ -161,6 +174,33 @@ def _sum_error(parts: list[Array], colour: Array) -> Array:
     return relative
 
 
+def _reprojected_sums(folder: Path) -> dict[str, float]:
+    """Return how far the light groups are from the colour in a reprojection, by filter."""
+    errors = {}
+    for name in FILTERS:
+        settings = ReprojectionSettings.of(
+            camera={"lens": "rectilinear", "fov": 100, "resolution": [64, 64]},
+            filter=name,
+            formats=["exr"],
+            passes=["light_groups"],
+        )
+        path = folder / f"{name}.json"
+        write_json(path, settings.as_json())
+        program = Path(__file__).resolve().parents[1] / "scripts" / "reproject.py"
+        arguments = ["--settings", path, "--input-cfg", folder / NAME]
+        arguments += ["--input-dir", folder / "exr", "--output-dir", folder / name]
+        arguments += ["--output-cfg", folder / name / NAME]
+        subprocess.run([sys.executable, program, *arguments], check=True, capture_output=True)
+        content = LightField.read(folder / name / NAME)
+        views = [view.name for view in content.views]
+        colours = [images.read_image(folder / name / f"{view}.exr").channels for view in views]
+        errors[name] = max(
+            error(folder / name, view, content.light_groups, np.stack([c[k] for k in "RGB"])) or 0.0
+            for view, c in zip(views, colours, strict=True)
+        )
+    return errors
+
+
 def _ratios(values: Array, paint: Array, pixels: Array) -> list[float]:
     """Return the median, 5 % and 95 % quantile of values over their paint. Empty without pixels."""
     if not pixels.any():
@@ -212,6 +252,7 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
         "sum": float(sum_error.max()),
         "sum inside": float(sum_error[inside].max()),
         "groups": [float(group_error.max()), len(content.light_groups)],
+        "reprojected groups": _reprojected_sums(folder),
         "objects": float((objects == cast)[covered].mean()),
         "mattes": float((matte == expected_matte)[hit].mean()),
         "depth": np.quantile(np.abs(distance / cast_distance - 1)[same], (0.5, 0.99)).tolist(),

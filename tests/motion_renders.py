@@ -10,16 +10,22 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses
-from lightfield.geometry.exposure import pose_at
-from lightfield.rendering import cycles
+from lightfield.geometry.exposure import pose_at, row_times
+from lightfield.measurement.trials import Trials, Window
+from lightfield.rendering import blend_file, cycles
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 
 FOLDER = Path(sys.argv[1])
 SIZE = 64
 CAMERA = {"lens": "rectilinear", "fov": 60, "resolution": [SIZE, SIZE]}
+WIDE = {
+    "fisheye": {"lens": "equidistant", "fov": 180, "resolution": [SIZE, SIZE]},
+    "panorama": {"lens": "equirectangular", "resolution": [SIZE, SIZE // 2]},
+}
 RIG = {"type": "lattice", "cameras": [1, 1, 1], "size": 0}
 RENDER = {"samples": 64, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 TRAVEL = {"travel": [0.3, 0, 0], "turn": [0, 0, 0]}
@@ -41,11 +47,16 @@ def build():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "wall.blend"))
 
 
-def set_up(**motion):
+def lightfield(camera, motion):
     render = RENDER | ({"camera_motion": motion} if motion else {})
-    content = LightField.from_rig(
-        RIG, lenses.from_camera(CAMERA), depth="z", frame=1, render=render, scene={}
+    lens = lenses.from_camera(camera)
+    return LightField.from_rig(
+        RIG, lens, depth=lens.usual_depth or "distance", frame=1, render=render, scene={}
     )
+
+
+def set_up(camera=CAMERA, **motion):
+    content = lightfield(camera, motion)
     cycles.set_up(FOLDER / "wall.blend", None, content, "cpu", 1)
     # The mean of a pixel's square.
     bpy.context.scene.cycles.pixel_filter_type = "BOX"
@@ -80,4 +91,29 @@ pictures["turn_again"] = red(np.eye(4))
 for rolling in (0.01, 0.5):
     set_up(**TRAVEL, rolling=rolling)
     pictures[f"rolling_{rolling}"] = red(np.eye(4))
+# Wide lenses: a turn about the camera's right moves the horizon.
+TILT = {"travel": [0.1, 0, 0], "turn": [8, 4, 0]}
+for name, camera in WIDE.items():
+    set_up(camera)
+    pictures[f"{name}_still"] = red(np.eye(4))
+    pictures[f"{name}_sub_frames"] = sub_frames(TILT)
+    times = row_times(len(pictures[f"{name}_still"]), 0.01)
+    poses = [pose_at(np.eye(4), TILT["travel"], TILT["turn"], time) for time in times]
+    pictures[f"{name}_rows"] = np.stack([red(pose)[row] for row, pose in enumerate(poses)])
+    set_up(camera, **TILT)
+    pictures[name] = red(np.eye(4))
+    set_up(camera, **TILT, rolling=0.01)
+    pictures[f"{name}_rolling"] = red(np.eye(4))
+# A window of a view, as measurements of error and time render it.
+blend_file.open_scene(FOLDER / "wall.blend")
+contents = {"left_out": ["animation"], "sampling": cycles.sampling(), "volumes": []}
+write_json(FOLDER / "inventory.json", contents)
+content = lightfield(CAMERA, {**TRAVEL, "rolling": 0.5})
+content = content.changed(views=[View.placed("wall", np.eye(4))])
+trials = Trials(
+    FOLDER / "wall.blend", FOLDER / "inventory.json", content, "cpu", 1, FOLDER / "cache"
+)
+window = Window(content.views[0], 8, 40, 48, 20)
+for name, part in (("trial", trials.first_view), ("trial_window", window)):
+    pictures[name] = trials.render(part, 1, {"samples": 64}).colour[..., 0]
 np.savez(FOLDER / "results.npz", **pictures)

@@ -36,6 +36,13 @@ KNOWN = {
     "transmission": (0.125,),
     "surface_emission": (0.5, 0.25, 2.0),
 }
+# What a matt cube has instead: it reflects nothing but its colour.
+MATT = KNOWN | {
+    "roughness": (1,),
+    "metallic": (0,),
+    "transmission": (0,),
+    "surface_emission": (0, 0, 0),
+}
 # The floor's base colour is its place times this, and 0.5.
 SLOPE = 0.03
 
@@ -118,6 +125,15 @@ def clamped():
     return made
 
 
+def matt():
+    """Return a material that is one Diffuse BSDF."""
+    made, tree, surface = material("matt")
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = (*KNOWN["base_colour"], 1)
+    tree.links.new(node.outputs[0], surface)
+    return made
+
+
 def glass():
     made, tree, surface = material("glass")
     tree.links.new(tree.nodes.new("ShaderNodeBsdfGlass").outputs[0], surface)
@@ -185,6 +201,7 @@ def build(folder):
         "linked": linked,
         "behind cutout": shared,
         "clamped": clamped(),
+        "matt": matt(),
     }
     other = {
         "mixed": mixed(inner),
@@ -194,8 +211,8 @@ def build(folder):
         "behind veil": shared,
     }
     for number, (name, surface) in enumerate({**exact, **other}.items()):
-        across, up = number % 6, number // 6
-        place = (1.1 * (across - 2.5), 3, 1 + 1.2 * up)
+        across, up = number % 7, number // 7
+        place = (1.1 * (across - 3), 3, 1 + 1.2 * up)
         add(name, "cube", surface, size=0.9, location=place)
         veil = {"behind cutout": with_alpha("cut", 0.0), "behind veil": with_alpha("veil", 0.5)}
         if name in veil:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
@@ -76,6 +78,32 @@ def test_rows_see_the_edge_at_their_times(pictures, rolling):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("lens", ["fisheye", "panorama"])
+def test_wide_lenses_blur_and_roll_as_well(pictures, lens):
+    blurred = pictures[lens]
+    mean = pictures[f"{lens}_sub_frames"]
+    still = pictures[f"{lens}_still"]
+    # A pixel at the edge differs by one of 16 steps, and by the noise of 64 samples.
+    assert np.abs(blurred - mean).max() < 1 / 16 + 4 * 0.5 / 8
+    assert np.abs(blurred - still).max() > 0.25
+    for axis, count in enumerate(blurred.shape):
+        difference = (blurred - mean).mean(axis=axis)
+        assert np.abs(difference).max() < (1 / 16 + 0.5 / 8) / np.sqrt(count)
+    # Each row is that of the camera standing still where it is at the row's time.
+    rows = pictures[f"{lens}_rows"]
+    assert np.abs(rows - still).sum(axis=1).max() > 1
+    assert np.abs(pictures[f"{lens}_rolling"] - rows).sum(axis=1).max() < 0.2
+
+
+@pytest.mark.slow
+def test_a_window_of_a_rolling_shutter_has_the_rows_of_the_view(pictures):
+    window = pictures["trial_window"]
+    np.testing.assert_array_equal(window, pictures["trial"][40:60, 8:56])
+    expected = SIZE / 2 - TRAVEL * PIXELS_PER_METRE * row_times(SIZE, 0.5)[40:60]
+    assert np.abs(56 - window.sum(axis=1) - expected).max() < 0.5
+
+
+@pytest.mark.slow
 def test_depth_is_that_of_the_middle_of_the_exposure(pictures):
     moving = pictures["depth"]
     np.testing.assert_array_equal(np.isinf(moving), np.isinf(pictures["depth_still"]))
@@ -111,3 +139,17 @@ def test_a_turn_has_constant_speed():
     np.testing.assert_allclose(poses[0] @ poses[3], np.eye(3), atol=1e-12)
     angle = np.degrees(np.arccos((np.trace(poses[3]) - 1) / 2))
     assert abs(angle - np.linalg.norm(turn) / 2) < 1e-9
+
+
+def test_a_moving_camera_is_refused_with_cube_maps_whose_faces_have_their_own_axes():
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [8, 8]}
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "cube_map": True, "camera": camera}
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 1, "camera_motion": {"travel": [0.1, 0, 0]}},
+        "rigs": {"cubes": rig},
+    }
+    with pytest.raises(ValidationError, match=r"render\.camera_motion: .*rigs\.cubes\.cube_map"):
+        Scene.model_validate(content)
+    content["rigs"]["cubes"]["cube_map"] = False
+    Scene.model_validate(content)

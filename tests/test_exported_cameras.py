@@ -730,6 +730,40 @@ def test_a_changed_digit_of_an_ncore_store_is_found(name, file, keys, said, plac
     assert any("differs from .zmetadata.cbor.xz" in line for line in problem_lines)
 
 
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    """Return a dataset of a moving camera with a rolling shutter, and its export for NCore."""
+    folder = tmp_path_factory.mktemp("moving") / "dataset"
+    write_views(folder, LENSES["wide"], {"type": "plane", "cameras": [2, 1], "size": 0.4})
+    path = folder / "lightfield.json"
+    motion = {"travel": [0.2, 0, 0], "turn": [0, 20, 0], "rolling": 0.2}
+    LightField.read(path).changed(render={"camera_motion": motion}).with_exposure().write(path)
+    settings = settings_of("ncore").model_validate({"sources": ["views"], "points": 50})
+    export.run("ncore", SourceDataset(folder, "", ".exr"), settings, folder / "exports/ncore")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("file", "keys", "said"),
+    [
+        (None, (), None),
+        (NCORE_POSES, (NCORE_TRAJECTORY, "poses", 0, 0, 3), "at the start of the exposure"),
+        (NCORE_POSES, (NCORE_TRAJECTORY, "poses", 4, 0, 3), "at the end of the exposure"),
+        (NCORE_POSES, (NCORE_TRAJECTORY, "poses", 2, 0, 3), "its position"),
+        (NCORE_POSES, (NCORE_TRAJECTORY, "poses", 1, 0, 3), "poses[1] (view_0000f): is"),
+        (f"{NCORE}/cameras/camera/frames/.zattrs", ("frames_timestamps_us", 0, 0), "times"),
+    ],
+)
+def test_a_changed_digit_of_a_moving_camera_is_found(file, keys, said, moving):
+    if file is None:
+        assert problems(moving, "views", "ncore") == []
+        return
+    path = moving / "exports" / file
+    with changed(path, in_json(path, keys, 0)), consolidated(moving / "exports" / NCORE):
+        problem_lines = problems(moving, "views", "ncore")
+    assert any(said in line for line in problem_lines), problem_lines
+
+
 @pytest.mark.parametrize(("array", "item"), [("_returns/distance_m", 5), ("/direction", 7)])
 def test_a_changed_point_of_an_ncore_store_is_found(array, item, dataset):
     folder = dataset / "wide/exports" / NCORE / f"lidars/points/frames/0/ray_bundle{array}"

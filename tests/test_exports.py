@@ -673,6 +673,94 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
     assert names == sorted(expected)
 
 
+def moving(folder, camera="wide", **motion):
+    """Write views of a camera that moves while its shutter is open."""
+    write_views(folder, LENSES[camera], RIG | {"cameras": [2, 1]})
+    path = folder / "lightfield.json"
+    content = LightField.read(path).changed(render={"camera_motion": motion})
+    content.with_exposure().write(path)
+
+
+def ncore_poses(folder):
+    """Return each frame's start and end, its exposure, and the poses by their times."""
+    store = ZarrFolder(folder / "views.ncore4.zarr")
+    poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]
+    frames = store.attributes("cameras/camera/frames")["frames_timestamps_us"]
+    data = [
+        store.attributes(f"cameras/camera/frames/{end}/generic_data")["exposure_us"]
+        for _, end in frames
+    ]
+    flipped = np.array(poses["poses"]) @ np.diag([1, -1, -1, 1])
+    return frames, data, dict(zip(poses["timestamps_us"], flipped, strict=True))
+
+
+MOTION = {"travel": [0.2, 0, 0.1], "turn": [0, 20, 5]}
+
+
+def test_an_ncore_frame_of_a_blurred_view_is_the_middle_of_its_exposure(tmp_path):
+    moving(tmp_path / "dataset", **MOTION)
+    folder = exported(tmp_path / "dataset", "ncore", "views", tmp_path, points=100)
+    frames, exposures, poses = ncore_poses(folder)
+    for view, (start, end), exposure in zip(
+        LightField.read(tmp_path / "dataset/lightfield.json").views, frames, exposures, strict=True
+    ):
+        assert start == end == sum(exposure) / 2
+        np.testing.assert_allclose(poses[start], view.matrix, atol=1e-9)
+        for time, pose in zip(exposure, view.exposure, strict=True):
+            np.testing.assert_allclose(poses[time], pose, atol=1e-9)
+
+
+@pytest.mark.parametrize("rolling", [0.01, 0.5])
+def test_an_ncore_frame_of_a_rolling_shutter_lasts_from_the_first_row_to_the_last(
+    rolling, tmp_path
+):
+    moving(tmp_path / "dataset", **MOTION, rolling=rolling)
+    folder = exported(tmp_path / "dataset", "ncore", "views", tmp_path, points=100)
+    frames, exposures, poses = ncore_poses(folder)
+    content = LightField.read(tmp_path / "dataset/lightfield.json")
+    height = content.lens.height
+    store = ZarrFolder(folder / "views.ncore4.zarr")
+    lens = store.attributes("intrinsics/default/cameras/camera")["camera_model_parameters"]
+    assert lens["shutter_type"] == "ROLLING_TOP_TO_BOTTOM"
+    for view, (start, end), (begin, finish) in zip(content.views, frames, exposures, strict=True):
+        assert begin < start < end < finish
+        # Cycles' row r of H sees light around ½ + ((r + 1) / H − ½)(1 − rolling) of the exposure.
+        for time, row in ((start, 0), (end, height - 1)):
+            part = 0.5 + ((row + 1) / height - 0.5) * (1 - rolling)
+            assert abs((time - begin) / (finish - begin) - part) < 1e-5
+            turn = Rotation.from_rotvec(np.radians(MOTION["turn"]) * (part - 0.5)).as_matrix()
+            rotation = view.matrix[:3, :3] @ turn
+            np.testing.assert_allclose(poses[time][:3, :3], rotation, atol=1e-5)
+            travel = view.matrix[:3, :3] @ MOTION["travel"] * (part - 0.5)
+            np.testing.assert_allclose(poses[time][:3, 3], view.position + travel, atol=1e-5)
+
+
+def test_ncore_refuses_resampled_rows_of_a_rolling_shutter(tmp_path):
+    moving(tmp_path / "dataset", **MOTION, rolling=0.1)
+    moving(tmp_path / "dataset/perspective", "perspective", **MOTION, rolling=0.1)
+    with pytest.raises(UserError, match="mixes the rows of a rolling shutter") as error:
+        exported(tmp_path / "dataset", "ncore", "perspective", tmp_path)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "ncore").exists()
+
+
+def test_a_scene_yaml_with_such_an_export_is_refused():
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 1, "camera_motion": MOTION},
+        "rigs": {"one": {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "camera": camera}},
+        "reprojections": {"flat": {"camera": camera | {"fov": 90}}},
+        "exports": {"ncore": {"sources": ["flat"]}},
+    }
+    Scene.model_validate(content)
+    content["render"]["camera_motion"] = MOTION | {"rolling": 0.5}
+    with pytest.raises(ValidationError, match=r"exports\.ncore\.sources: flat mixes the rows"):
+        Scene.model_validate(content)
+    content["exports"]["ncore"]["sources"] = ["views"]
+    Scene.model_validate(content)
+
+
 def lichtfeld_cameras(content):
     """Return world-to-camera matrices by image, as LichtFeld's transforms.cpp computes them.
 

@@ -20,6 +20,7 @@ from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.reprojection.filters import FILTERS
 from lightfield.validation.validate import validate
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
@@ -254,15 +255,25 @@ def test_groups_are_reprojected_with_the_colour(develop, tmp_path):
     assert validate(folder, ["flat", "smooth"]).valid
 
 
-@pytest.mark.parametrize(
-    ("filter_name", "is_checked"), [("bilinear", True), ("nearest", True), ("lanczos", None)]
-)
-def test_reprojected_groups_add_up_if_the_filter_is_linear(
-    filter_name, is_checked, tmp_path, tmp_path_factory, run_program
+def sparks(folder, content):
+    """Give the views two groups of sharp lights, whose sum filters change."""
+    rng = np.random.default_rng(0)
+    for view in content.views:
+        lamp, sky = (rng.pareto(0.5, (16, 16, 3)).clip(0, 1000) for _ in range(2))
+        sky *= rng.random((16, 16, 3)) < 0.2
+        write(folder, "Combined_lamp", view.name, lamp)
+        write(folder, "Combined_sky", view.name, sky)
+        write(folder, "exr", view.name, lamp + sky)
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+@pytest.mark.parametrize("fov", [60, 140])
+def test_reprojected_groups_add_up_with_every_filter(
+    filter_name, fov, tmp_path, tmp_path_factory, run_program
 ):
     folder = tmp_path / "rig"
-    dataset(folder)
-    camera = {"lens": "rectilinear", "fov": 60, "resolution": [12, 12]}
+    sparks(folder, dataset(folder))
+    camera = {"lens": "rectilinear", "fov": fov, "resolution": [12, 12]}
     reprojection = {"format": "exr", "camera": camera, "passes": ["light_groups"]}
     content = scene(reprojections={"flat": reprojection | {"filter": filter_name}})
     path = tmp_path_factory.mktemp("settings") / "flat.json"
@@ -272,10 +283,15 @@ def test_reprojected_groups_add_up_if_the_filter_is_linear(
         *("--input-dir", folder / "exr", "--output-dir", folder / "flat"),
         *("--output-cfg", folder / "flat/lightfield.json"),
     )
-    assert (folder / "flat/Combined_sky/view_0001f.exr").exists()
+    for view in ("view_0000f", "view_0001f"):
+        seen = colour(folder, "flat", view)
+        groups = [colour(folder / "flat", f"Combined_{name}", view) for name in ("lamp", "sky")]
+        for group in groups:
+            assert (group >= np.minimum(seen, 0)).all()
+        assert (np.abs(sum(groups) - seen) / np.maximum(np.abs(seen), 1e-3)).max() < 1e-3
     result = validate(folder, ["flat"])
     (check,) = (check for check in result.checks if check.name == "flat/light_groups")
-    assert result.valid and check.passed is is_checked
+    assert result.valid and check.passed
 
 
 def test_a_light_of_unknown_groups_is_refused_before_it_is_developed(develop, tmp_path):
@@ -342,13 +358,14 @@ def test_impossible_lights_are_refused(more, problem):
 # The plan.
 
 
-def write_scene(folder, monkeypatch, **render):
+def write_scene(folder, monkeypatch, reprojections=None, **render):
     """Write a scene YAML into a user's own folder, and return its only dataset."""
     content = {
         "scene": {"builder": "room"},
         "render": {"samples": 8, "light_groups": "each", **render},
         "rigs": {"LFOne": {"type": "lattice", "cameras": [2, 1, 1], "camera": CAMERA}},
         "relight": {"olat": "each"},
+        "reprojections": reprojections or {},
     }
     path = folder / "configs/scenes/lit.yaml"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -375,6 +392,33 @@ def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch)
     assert many.estimate.all_view_bytes - many.estimate.view_bytes > 10 * (
         few.estimate.all_view_bytes - few.estimate.view_bytes
     )
+
+
+def test_a_moving_camera_is_planned_to_take_longer(tmp_path, monkeypatch):
+    motion = {"travel": [0.1, 0, 0]}
+    still, moving = (
+        write_scene(tmp_path, monkeypatch, **more).estimate.view_seconds
+        for more in ({}, {"camera_motion": motion})
+    )
+    assert 1.05 * still < moving < 1.5 * still
+
+
+def test_reprojected_groups_take_time_and_disk_space(tmp_path, monkeypatch):
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
+    without, with_groups = (
+        write_scene(
+            tmp_path,
+            monkeypatch,
+            {"flat": {"format": "exr", "camera": camera, **more}},
+            light_groups=[f"lamp {number}" for number in range(10)],
+        )
+        for more in ({}, {"passes": ["light_groups"]})
+    )
+    # Half floats of three channels, of ten groups and the rest.
+    added = with_groups.estimate.all_view_bytes - without.estimate.all_view_bytes
+    assert 0.5 * 11 * 6 * 16**2 < added <= 11 * 6 * 16**2
+    seconds = [each.estimate.reprojection_seconds("flat") for each in (without, with_groups)]
+    assert seconds[1] > 11 * seconds[0]
 
 
 @pytest.fixture

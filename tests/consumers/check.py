@@ -184,6 +184,52 @@ def ncore(folder, name):
     assert levels < 10
 
 
+def moving(folder):
+    """Check the rays of a moving camera that NCore's camera gives at each row's time."""
+    import torch
+    from ncore.data import FrameTimepoint
+    from ncore.data.v4 import SequenceComponentGroupsReader, SequenceLoaderV4
+    from ncore.sensors import CameraModel
+
+    saved = np.load(folder / "views.npz")
+    loader = SequenceLoaderV4(SequenceComponentGroupsReader([folder / "ncore" / "views.json"]))
+    (camera,) = map(loader.get_camera_sensor, loader.camera_ids)
+    model = CameraModel.from_parameters(camera.model_parameters, device="cpu", dtype=torch.float32)
+    row, column = np.nonzero(np.isfinite(saved["rays"][..., 0]))
+    height = len(saved["rays"])
+    # Blender's rows see light one after the other. Without a rolling shutter, the middle counts.
+    times = np.zeros(len(row))
+    if "rolling" in saved:
+        times = ((row + 1) / height - 0.5) * (1 - saved["rolling"])
+    turns = [cv2.Rodrigues(np.radians(saved["turn"]) * time)[0] for time in times]
+    rays = saved["rays"][row, column]
+    local = np.einsum("nij,nj->ni", turns, rays)
+    radians = metres = 0.0
+    names = saved["names"].tolist()
+    for index in range(camera.frames_count):
+        name = camera.get_frame_generic_meta_data(index)["name"]
+        matrix = saved["matrices"][names.index(name)]
+        start, end = (
+            camera.get_frames_T_source_target(
+                camera.sensor_id, "world", np.array(index), moment
+            ).reshape(4, 4)
+            for moment in (FrameTimepoint.START, FrameTimepoint.END)
+        )
+        world = model.pixels_to_world_rays_shutter_pose(
+            np.column_stack([column, row]), start.astype(np.float32), end.astype(np.float32)
+        ).world_rays.numpy()
+        radians = max(radians, angle(world[:, 3:].astype(float), local @ matrix[:3, :3].T).max())
+        places = matrix[:3, 3] + times[:, None] * (matrix[:3, :3] @ saved["travel"])
+        metres = max(metres, np.abs(world[:, :3] - places).max())
+    print(
+        f"NCore, {folder.name}, {model.shutter_type.name}: rays of each row's time within "
+        f"{radians:.2g} rad and {1000 * metres:.2g} mm"
+    )
+    assert ("rolling" in saved) == (model.shutter_type.name == "ROLLING_TOP_TO_BOTTOM")
+    assert radians < 1e-5
+    assert metres < 1e-5
+
+
 def opencv(folder, name):
     transforms = folder / "nerfstudio" / name / "transforms.json"
     if transforms.exists():
@@ -235,6 +281,8 @@ def main():
     for check in (colmap, nerfstudio, ncore):
         for path in sorted((folder / check.__name__).iterdir()):
             check(folder, path.name)
+    for path in sorted((folder / "moving").iterdir()):
+        moving(path)
     for name in ("fisheye", "opencv"):
         opencv(folder, name)
     radiance_field(folder)

@@ -51,6 +51,25 @@ OF = {
 }
 
 
+# Cameras that move while their shutters are open.
+TRAVEL = {"travel": [0.2, 0, 0.1], "turn": [0, 20, 5]}
+MOVING = {"blurred": TRAVEL, "rolling": TRAVEL | {"rolling": 0.2}}
+
+
+def export_moving(folder: Path, motion: dict[str, object]) -> None:
+    """Export views of a moving camera for NCore."""
+    write_views(folder / "dataset", enlarged(LENSES["wide"], 2), RIG)
+    path = folder / "dataset" / "lightfield.json"
+    content = LightField.read(path).changed(render={"camera_motion": motion}).with_exposure()
+    content.write(path)
+    source = SourceDataset(folder / "dataset", "", ".exr")
+    settings = settings_of("ncore").model_validate({"sources": ["views"], "points": 40000})
+    export.run("ncore", source, settings, folder / "ncore")
+    rays = source.lens.pixel_rays()
+    names = [view.name for view in content.views]
+    np.savez(folder / "views.npz", names=names, matrices=content.matrices, rays=rays, **motion)
+
+
 def publish_views(folder: Path) -> None:
     """Publish views with a split and a reprojection."""
     rig = RIG | {"split": {"every": 3}}
@@ -87,6 +106,8 @@ def main() -> None:
             settings = settings_of(kind).model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
+    for name, motion in MOVING.items():
+        export_moving(folder / "moving" / name, motion)
     publish_views(folder / "publish")
     write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")

@@ -1061,6 +1061,13 @@ class Scene(Credits):
             if reprojection:
                 has_depth &= reprojection.format == "exr"
             self._check_passes_of(key, source, export)
+            motion = self.render and self.render.camera_motion
+            is_resampled = reprojection is not None and reprojection.camera is not None
+            if export.has_row_times and is_resampled and motion and motion.rolling not in (None, 1):
+                raise ValueError(
+                    f"{key}: {source} mixes the rows of a rolling shutter, whose times the export "
+                    f"has; export {VIEWS}"
+                )
             for name in (reprojection and reprojection.rigs) or self.rigs:
                 rig = self.rigs[name]
                 camera = (reprojection and reprojection.camera) or rig.camera
@@ -1121,6 +1128,11 @@ class Scene(Credits):
                 "must be auto, distance or none"
             )
         _check_cube_map(key, rig)
+        if rig.cube_map and self.render and self.render.camera_motion:
+            raise ValueError(
+                f"render.camera_motion: does not go with {key}.cube_map, whose faces would each "
+                "move along axes of their own; render panoramas, and reproject with cube_map"
+            )
         if rig.is_omnidirectional:
             self._check_without_centre(key, name)
         if self.flow and rig.is_at_one_place():

@@ -11,8 +11,10 @@ from lightfield.core.files import DAMAGE
 from lightfield.dataset import light_groups, memory, passes
 from lightfield.dataset.config import FILE, Reprojection, SensorReprojection
 from lightfield.dataset.dataset_paths import DatasetPaths
+from lightfield.dataset.reprojections import LIGHT_GROUPS
 from lightfield.dataset.unit_costs import (
     BRACKET_SECONDS,
+    CAMERA_MOTION_PART,
     CHECK_SECONDS,
     COMPRESSED,
     DENOISING_SAMPLES,
@@ -54,7 +56,13 @@ class Estimate:
         """Seconds that one core takes to render a view, by a probe or as a guess."""
         if self._probe:
             return self._probe[0]
-        return self.dataset.pixels * self._cost_samples * SECONDS_PER_SAMPLE
+        return self.dataset.pixels * self._cost_samples * self._sample_seconds
+
+    @property
+    def _sample_seconds(self) -> float:
+        """Seconds that one core takes for a sample of a pixel."""
+        is_moving = bool(self.dataset.render.get("camera_motion"))
+        return SECONDS_PER_SAMPLE * (1 + CAMERA_MOTION_PART if is_moving else 1)
 
     @cached_property
     def view_bytes(self) -> float:
@@ -106,14 +114,22 @@ class Estimate:
 
     def _reprojected_pixel_bytes(self, reprojection: Reprojection) -> float:
         """Return the bytes of a pixel of a reprojection, with the files beside its views."""
+        groups, others = self._reprojected_passes(reprojection)
+        pass_bytes = COMPRESSED * (6 * groups + sum(each.bytes for each in others))
         if reprojection.format == "exr":
-            return 10 * COMPRESSED
+            return 10 * COMPRESSED + pass_bytes
         if not isinstance(reprojection, SensorReprojection):
-            return PNG_BYTES * reprojection.bits / 8
+            return PNG_BYTES * reprojection.bits / 8 + pass_bytes
         size = NOISY_BYTES * reprojection.bits / 8
         if reprojection.sensor.bracket is not None:
             size += WEIGHT_BYTES * COMPRESSED
         return size
+
+    def _reprojected_passes(self, reprojection: Reprojection) -> tuple[int, list[passes.Pass]]:
+        """Return the number of a reprojection's light groups, and its other passes."""
+        names = reprojection.passes or []
+        groups = self.light_group_count if LIGHT_GROUPS in names else 0
+        return groups, [passes.by_name(name) for name in names if name != LIGHT_GROUPS]
 
     def memory_bytes(self, pixels: int) -> int:
         """Return the memory in bytes of a process that renders views of this many pixels.
@@ -145,7 +161,11 @@ class Estimate:
         read_pixels = self.dataset.pixels
         if reprojection.relight is not None:
             read_pixels *= 1 + self.light_group_count
-        pixel_seconds = REPROJECTION_SECONDS
+        # Light groups are resampled twice: once to add them up.
+        groups, others = self._reprojected_passes(reprojection)
+        resampled_passes = 2 * groups + len(others)
+        read_pixels += self.dataset.pixels * resampled_passes
+        pixel_seconds = REPROJECTION_SECONDS * (1 + resampled_passes)
         if isinstance(reprojection, SensorReprojection):
             is_bracket = reprojection.sensor.bracket is not None
             pixel_seconds += BRACKET_SECONDS if is_bracket else SENSOR_SECONDS
@@ -213,7 +233,7 @@ class Estimate:
         dataset = self.dataset
         if dataset.imported:
             return self.import_seconds + sum(map(self.reprojection_seconds, dataset.reprojections))
-        return dataset.pixels * self._planned_samples * SECONDS_PER_SAMPLE
+        return dataset.pixels * self._planned_samples * self._sample_seconds
 
     @cached_property
     def _probe(self) -> tuple[float, float] | None:

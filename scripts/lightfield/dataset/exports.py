@@ -41,6 +41,8 @@ class Export(Settings):
     is_for_training: ClassVar[bool] = False
     # Whether the export is made of all frames of a sequence.
     is_of_sequence: ClassVar[bool] = False
+    # Whether the export has the times of a rolling shutter's rows.
+    has_row_times: ClassVar[bool] = False
 
     sources: list[str] = Field(
         min_length=1,
@@ -282,6 +284,7 @@ class NCore(Developed):
     """A sequence of NCore v4, for gsplat and 3DGRUT."""
 
     is_for_training: ClassVar[bool] = True
+    has_row_times: ClassVar[bool] = True
 
     points: PointCount = Field(50000, description="Most points lifted from depth.")
 

@@ -24,6 +24,8 @@ from lightfield.dataset.names import BUILDERS
 # Raise these when rendering, or the computation of flow, writes other files for equal settings.
 RENDER_VERSION = 4
 FLOW_VERSION = 1
+# The same for the passes of surfaces. Only their views have it in their keys.
+SURFACES_VERSION = 2
 # Raise this when the import of a model makes another scene of it.
 MODEL_VERSION = 1
 
@@ -68,7 +70,10 @@ def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.matrix.tolist()
     content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
-    return _digest([RENDER_VERSION, version("bpy"), content, view.name, pose])
+    key = [RENDER_VERSION, version("bpy"), content, view.name, pose]
+    if any(view_pass.unless for view_pass in lightfield.passes):
+        key.append(SURFACES_VERSION)
+    return _digest(key)
 
 
 def names_key(lightfield: LightField) -> str:

@@ -10,11 +10,20 @@
     gsplat's and 3DGRUT's readers take these. With other points, too, they stop.
 
 Frames are in the order of the views' names. NCore needs a different time for each. So each is
-exposed a second after the one before, in microseconds, for an instant. Source: NCore's
-data/v4/components.py, data/types.py and sensors/camera.py, and gsplat's datasets/ncore.py.
+exposed a second after the one before, in microseconds.
+
+- A still camera's exposure takes an instant.
+- A moving camera's takes half a second. The camera has poses at its start, middle and end, whose
+  times are ``exposure_us`` of the frame. NCore's readers use the pose at the frame's start time for
+  all rows. So the frame is the exposure's middle.
+- With a rolling shutter, the frame lasts from the time of the first row to that of the last.
+
+Source: NCore's data/v4/components.py, data/types.py and sensors/camera.py, and gsplat's
+datasets/ncore.py.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +38,7 @@ from lightfield.export import cameras
 from lightfield.export.points import Points, lift
 from lightfield.export.source import SourceDataset
 from lightfield.export.zarr_store import ZarrStore
+from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -43,9 +53,62 @@ DEFAULT = "default"
 
 # Microseconds between the views.
 STEP = 1_000_000
+# Microseconds of a moving camera's exposure.
+EXPOSURE = 500_000
 
 # From Blender's camera (y up, looks along −z) to NCore's (y down, looks along z).
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The times of a view's picture in microseconds, and the camera's poses (4, 4) by their times.
+
+    All rows see light from ``start`` to ``end``, or the first at ``start`` and the last at ``end``.
+    ``exposure`` is the exposure of a moving camera.
+    """
+
+    view: View
+    start: int
+    end: int
+    poses: Mapping[int, Floats]
+    exposure: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, view: View, index: int, rows: tuple[float, float] | None) -> "_Frame":
+        """Return the frame of the view at this ``index`` of the sequence.
+
+        ``rows`` are the times, −½ to ½, of the first and the last row of a rolling shutter.
+        """
+        begin = index * STEP
+        if view.exposure is None:
+            return cls(view, begin, begin, {begin: view.matrix})
+        middle = begin + EXPOSURE // 2
+        start, end = (middle + round(time * EXPOSURE) for time in rows or (0, 0))
+        poses = {
+            time: pose_between(*view.exposure, (time - begin) / EXPOSURE)
+            for time in sorted({begin, start, middle, end, begin + EXPOSURE})
+        }
+        return cls(view, start, end, poses, (begin, begin + EXPOSURE))
+
+
+def _row_times(source: SourceDataset) -> tuple[float, float] | None:
+    """Return the times of the first and the last row of a rolling shutter. None without one.
+
+    Raises `UserError` if resampling mixed the rows.
+    """
+    motion = source.rendered.content.get("render", {}).get("camera_motion") or {}
+    rolling = motion.get("rolling", 1)
+    if rolling == 1:
+        return None
+    rotation = source.lightfield.content.get("reprojection", {}).get("rotation", ())
+    if source.lens != source.rendered.lens or any(rotation):
+        raise UserError(
+            f"{source.lightfield.path}: reprojection: mixes the rows of a rolling shutter, and "
+            "NCore needs their times; export the rendered views"
+        )
+    times = row_times(source.lens.height, rolling)
+    return float(times[0]), float(times[-1])
 
 
 def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
@@ -53,10 +116,12 @@ def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
     views = sorted(source.lightfield.views, key=lambda view: view.name)
     if len(views) < 2:
         raise UserError(f"{source.lightfield.path}: frames: has one view; NCore needs two or more")
+    rows = _row_times(source)
+    frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
     sequence = {
         "sequence_id": SEQUENCE,
         # The end is not included.
-        "sequence_timestamp_interval_us": {"start": 0, "stop": (len(views) - 1) * STEP + 1},
+        "sequence_timestamp_interval_us": {"start": 0, "stop": max(frames[-1].poses) + 1},
         "generic_meta_data": {},
         "version": "v4",
     }
@@ -79,10 +144,10 @@ def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
         }
         store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
     store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
-    _write_poses(store, views)
-    _write_lens(store, source.lens)
+    _write_poses(store, frames)
+    _write_lens(store, camera(source.lens, is_rolling=rows is not None))
     _write_points(store, lift(source, count=settings.points))
-    _write_frames(store, source, views)
+    _write_frames(store, source, frames)
     digest = store.close()
     versions = {
         component: {instance: {"version": "v1", "generic_meta_data": {}}}
@@ -92,11 +157,11 @@ def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
     write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
 
 
-def camera(lens: Lens) -> dict[str, Any]:
+def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
     """Return NCore's type of a lens, and its parameters in pixels and radians."""
     common = {
         "resolution": [lens.width, lens.height],
-        "shutter_type": "GLOBAL",
+        "shutter_type": "ROLLING_TOP_TO_BOTTOM" if is_rolling else "GLOBAL",
         "external_distortion_parameters": None,
     }
     parameters: dict[str, Any]
@@ -129,10 +194,11 @@ def camera(lens: Lens) -> dict[str, Any]:
     return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
 
 
-def _write_poses(store: ZarrStore, views: Sequence[View]) -> None:
+def _write_poses(store: ZarrStore, frames: Sequence[_Frame]) -> None:
+    matrices = [matrix for frame in frames for matrix in frame.poses.values()]
     poses = {
-        "poses": [(view.matrix @ _FLIP).tolist() for view in views],
-        "timestamps_us": [index * STEP for index in range(len(views))],
+        "poses": [(matrix @ _FLIP).tolist() for matrix in matrices],
+        "timestamps_us": [time for frame in frames for time in frame.poses],
         "dtype": "float64",
     }
     lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
@@ -140,9 +206,9 @@ def _write_poses(store: ZarrStore, views: Sequence[View]) -> None:
     store.group("poses/default/dynamic_poses", {str((CAMERA, WORLD)): poses})
 
 
-def _write_lens(store: ZarrStore, lens: Lens) -> None:
+def _write_lens(store: ZarrStore, intrinsics: dict[str, Any]) -> None:
     store.group("intrinsics/default/cameras")
-    store.group(f"intrinsics/default/cameras/{CAMERA}", camera(lens))
+    store.group(f"intrinsics/default/cameras/{CAMERA}", intrinsics)
     store.group("intrinsics/default/lidars")
     # These are masks for all frames. Each frame has its own.
     store.group("masks/default/cameras")
@@ -174,20 +240,24 @@ def _write_points(store: ZarrStore, points: Points) -> None:
     store.array(f"{frame}/ray_bundle_returns_valid_mask_packed", is_valid, sizes)
 
 
-def _write_frames(store: ZarrStore, source: SourceDataset, views: Sequence[View]) -> None:
-    frames = f"cameras/{CAMERA}/frames"
-    times = [index * STEP for index in range(len(views))]
-    store.group(frames, {"frames_timestamps_us": [[time, time] for time in times]})
-    progress = Progress(len(views), "ncore", "views")
-    for time, view in zip(times, views, strict=True):
-        frame = f"{frames}/{time}"
-        store.group(frame)
-        store.group(f"{frame}/generic_data", {"name": view.name})
+def _write_frames(store: ZarrStore, source: SourceDataset, frames: Sequence[_Frame]) -> None:
+    folder = f"cameras/{CAMERA}/frames"
+    times = [[frame.start, frame.end] for frame in frames]
+    store.group(folder, {"frames_timestamps_us": times})
+    progress = Progress(len(frames), "ncore", "views")
+    for frame in frames:
+        view = frame.view
+        place = f"{folder}/{frame.end}"
+        store.group(place)
+        about: dict[str, Any] = {"name": view.name}
+        if frame.exposure:
+            about["exposure_us"] = list(frame.exposure)
+        store.group(f"{place}/generic_data", about)
         valid = source.valid(view)
         if not valid.all():
-            store.array(f"{frame}/generic_data/mask", valid.astype(np.uint8) * 255)
+            store.array(f"{place}/generic_data/mask", valid.astype(np.uint8) * 255)
         # gsplat takes three channels.
         picture = store.folder / f"{view.name}.png"
         images.write_png(picture, source.colour(view))
-        store.encoded(f"{frame}/image", picture, {"format": "png"})
+        store.encoded(f"{place}/image", picture, {"format": "png"})
         progress.done()

@@ -21,6 +21,24 @@ def pose_at(matrix: Floats, travel: Sequence[float], turn: Sequence[float], time
     return pose
 
 
+def pose_between(start: Floats, end: Floats, part: float) -> Floats:
+    """Return the pose (4, 4) at a ``part`` from 0 to 1 of an exposure, from its two end poses.
+
+    The position moves on a line, and the rotation turns about one axis, by less than 180°.
+    """
+    rotation = start[:3, :3].T @ end[:3, :3]
+    twice_sine = np.array([rotation[2, 1], rotation[0, 2], rotation[1, 0]]) - np.array(
+        [rotation[1, 2], rotation[2, 0], rotation[0, 1]]
+    )
+    length = float(np.linalg.norm(twice_sine))
+    angle = float(np.arctan2(length, np.trace(rotation) - 1))
+    axis = twice_sine / length if length else np.zeros(3)
+    pose = start.copy()
+    pose[:3, 3] += (end - start)[:3, 3] * part
+    pose[:3, :3] = start[:3, :3] @ _rotation(axis * angle * part)
+    return pose
+
+
 def row_times(height: int, rolling: float) -> Floats:
     """Return the time, −½ to ½, in the middle of the exposure of each row (height,), top first.
 

@@ -1,5 +1,7 @@
 """Writes the inputs of Principled BSDFs into passes, where a surface is one Principled BSDF alone.
 
+A Diffuse BSDF counts as one without reflections. Its roughness is 1.
+
 Materials write them into AOVs, which are Cycles' name for passes that nodes write. The nodes are
 added to the open scene, not to its file. A ray passes through what transparency cuts out, and each
 layer adds its values. So a layer that is cut out writes nothing. A surface that is anything else
@@ -13,11 +15,23 @@ import bpy
 
 from lightfield.dataset.passes import AOV_PREFIX, INEXACT, Pass
 
+_PRINCIPLED = "ShaderNodeBsdfPrincipled"
+_DIFFUSE = "ShaderNodeBsdfDiffuse"
+
 # The inputs of the Principled BSDF by the names of their passes. Their values are from 0 to 1.
 _VALUES = {
     "roughness": "Roughness",
     "metallic": "Metallic",
     "transmission": "Transmission Weight",
+}
+# The inputs of the Principled BSDF that looks like a Diffuse BSDF, beside its colour.
+_MATT = {
+    "Alpha": 1.0,
+    "Roughness": 1.0,
+    "Metallic": 0.0,
+    "Transmission Weight": 0.0,
+    "Emission Color": (0.0, 0.0, 0.0),
+    "Emission Strength": 0.0,
 }
 # With at least this alpha a surface counts as opaque, and with at most 1 less it is cut out.
 _OPAQUE = 0.999
@@ -37,11 +51,11 @@ def set_up(layer: Any, passes: Collection[Pass]) -> None:
         output = tree.get_output_node("CYCLES") if tree else None
         if output is None or _source(output.inputs["Surface"]) is None:
             continue
-        principled = _single_principled(output)
-        if principled is None:
+        bsdf = _single_bsdf(output)
+        if bsdf is None:
             _Writer(tree).write(INEXACT, "Value", 1.0)
         else:
-            _write_inputs(principled, of_surfaces)
+            _write_inputs(bsdf, of_surfaces)
 
 
 def _add_aov(layer: Any, name: str, kind: str) -> None:
@@ -56,8 +70,8 @@ def _source(socket: Any) -> Any:
     return links[0].from_socket if links else None
 
 
-def _single_principled(output: Any) -> Any | None:
-    """Return the Principled BSDF that a material's output shows unchanged. None for anything else.
+def _single_bsdf(output: Any) -> Any | None:
+    """Return the Principled or Diffuse BSDF that a material's output shows unchanged, or None.
 
     It may lie in groups. Other materials may use a group in another way, so this one gets a copy.
     """
@@ -66,7 +80,7 @@ def _single_principled(output: Any) -> Any | None:
         node = source.node
         if node.mute:
             return None
-        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+        if node.bl_idname in (_PRINCIPLED, _DIFFUSE):
             return node
         if node.bl_idname == "NodeReroute":
             socket = node.inputs[0]
@@ -82,34 +96,41 @@ def _single_principled(output: Any) -> Any | None:
     return None
 
 
-def _write_inputs(principled: Any, passes: Collection[str]) -> None:
-    """Write the inputs of a Principled BSDF into the AOVs of ``passes``."""
-    writer = _Writer(principled.id_data)
-    inputs = principled.inputs
+def _write_inputs(bsdf: Any, passes: Collection[str]) -> None:
+    """Write the inputs of a BSDF into the AOVs of ``passes``."""
+    writer = _Writer(bsdf.id_data)
     opaque: Any = 1.0
-    alpha = inputs["Alpha"]
-    if _source(alpha) or alpha.default_value < _OPAQUE:
-        opaque = writer.math("GREATER_THAN", _value(alpha), _OPAQUE)
-        visible = writer.math("GREATER_THAN", _value(alpha), 1 - _OPAQUE)
+    alpha = _input(bsdf, "Alpha")
+    if not isinstance(alpha, float) or alpha < _OPAQUE:
+        opaque = writer.math("GREATER_THAN", alpha, _OPAQUE)
+        visible = writer.math("GREATER_THAN", alpha, 1 - _OPAQUE)
         writer.write(INEXACT, "Value", writer.math("SUBTRACT", visible, opaque))
     if "surface_mask" in passes:
         writer.write(f"{AOV_PREFIX}surface_mask", "Value", opaque)
     for name, title in _VALUES.items():
         if name in passes:
             # Cycles clamps these inputs.
-            value = writer.math("ADD", _value(inputs[title]), 0.0, clamped=True)
+            value = writer.math("ADD", _input(bsdf, title), 0.0, clamped=True)
             writer.write(f"{AOV_PREFIX}{name}", "Value", writer.math("MULTIPLY", value, opaque))
     if "base_colour" in passes:
-        colour = writer.scaled(_value(inputs["Base Color"]), opaque)
+        colour = writer.scaled(_input(bsdf, "Base Color"), opaque)
         writer.write(f"{AOV_PREFIX}base_colour", "Color", colour)
     if "surface_emission" in passes:
-        strength = writer.math("MULTIPLY", _value(inputs["Emission Strength"]), opaque)
-        emission = writer.scaled(_value(inputs["Emission Color"]), strength)
+        strength = writer.math("MULTIPLY", _input(bsdf, "Emission Strength"), opaque)
+        emission = writer.scaled(_input(bsdf, "Emission Color"), strength)
         writer.write(f"{AOV_PREFIX}surface_emission", "Color", emission)
 
 
-def _value(socket: Any) -> Any:
-    """Return what gives an input its value: another node's output, or a number or colour."""
+def _input(bsdf: Any, name: str) -> Any:
+    """Return an input of a BSDF, by the Principled BSDF's ``name``.
+
+    It is another node's output, or a number or colour.
+    """
+    if bsdf.bl_idname == _DIFFUSE:
+        if name in _MATT:
+            return _MATT[name]
+        name = "Color"
+    socket = bsdf.inputs[name]
     source = _source(socket)
     if source is not None:
         return source

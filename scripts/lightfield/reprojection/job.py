@@ -187,6 +187,8 @@ class Job:
             content["transparent"] = True
         if light.weights is not None:
             content["light"] = light.weights
+        if any(map(passes.is_group, self.passes)):
+            content["light_groups"] = "add up to the colour"
         if parameters := self.sensor_parameters(view, target):
             content["sensor"] = parameters.to_json()
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -16,7 +16,7 @@ from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, Light, SourceView
-from lightfield.reprojection.passes import write_pass
+from lightfield.reprojection.passes import write_passes
 from lightfield.reprojection.pixels import SourcePixels, write
 
 
@@ -102,8 +102,8 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
         for index, target, light, key in todo:
             source.light_up(light)
             write(job, view, target, light, job.maps[index], source, key)
-            for view_pass, path in job.pass_outputs(view, target).items():
-                write_pass(job, view_pass, view, job.maps[index], path, key)
+            pass_paths = job.pass_outputs(view, target)
+            write_passes(job, view, pass_paths, job.maps[index], source, key)
     return paths_of_view
 
 

@@ -72,11 +72,13 @@ class SourcePixels:
         # Trust the file first: another program may have written the lightfield.json.
         meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
+        self.is_relit = False
 
     def light_up(self, light: Light) -> None:
         """Replace the colour by the sum of the light groups with the weights of a light."""
         if light.weights is None:
             return
+        self.is_relit = True
         total = np.zeros((*self.colour.shape[:2], 3), np.float32)
         for group, weights in light.weights.items():
             if any(weights):

@@ -184,6 +184,7 @@ def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
             yield f"{exported_camera.place}: {fault} {expected.path}"
     if exported.views:
         yield from _pose_faults(exported.views, expected)
+        yield from _exposure_faults(exported.views, expected)
         yield from _name_faults(exported, expected)
     for part in exported.parts:
         yield from _different_names(part.place, part.names, expected.parts[part.part], expected)
@@ -262,6 +263,24 @@ def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[
             yield f"{where}: its rotation differs by {amount} from that in {expected.path}"
         if last_row_error[row] != 0:
             yield f"{where}: the last row of its matrix is not 0, 0, 0, 1"
+
+
+def _exposure_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:
+    """Yield the views whose poses at the start and the end of the exposure are others."""
+    for view in views:
+        reference = expected.view(view.name) if view.name else None
+        if view.exposure is None or reference is None:
+            continue
+        where = f"{view.file}: {view.place} ({view.name})"
+        if reference.exposure is None:
+            yield f"{where}: its camera moves, and not in {expected.path}"
+            continue
+        reach = 1 + np.abs(reference.position).max()
+        for name, pose, true_pose in zip(
+            ("start", "end"), view.exposure, reference.exposure, strict=True
+        ):
+            if not np.abs(pose - true_pose).max() <= FLOAT32 * reach:
+                yield f"{where}: its pose at the {name} of the exposure is not in {expected.path}"
 
 
 def _nearest(positions: Floats, expected: Expected) -> Iterable[View]:

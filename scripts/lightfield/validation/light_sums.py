@@ -12,19 +12,12 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images
 
 # The sum may differ from the colour by this part of it. Rounding to halves takes up to 2⁻¹⁰: half
-# of that in the colour, and half in the groups. A reprojection rounds once more.
+# of that in the colour, and half in the groups.
 MOST_OFF = 1e-3
-MOST_OFF_RESAMPLED = 2e-3
-# Filters that give each pixel the same weights in every pass. The others keep each pass from
-# becoming negative.
-LINEAR_FILTERS = ("nearest", "bilinear")
 
 
-def reason_against(lightfield: LightField, source: LightField | None) -> str | None:
-    """Return why the light groups of an image set need not add up. None if they must.
-
-    ``source`` are the rendered views of a reprojection.
-    """
+def reason_against(lightfield: LightField) -> str | None:
+    """Return why the light groups of an image set need not add up. None if they must."""
     reprojection = lightfield.content.get("reprojection")
     if reprojection is None:
         return None
@@ -32,20 +25,7 @@ def reason_against(lightfield: LightField, source: LightField | None) -> str | N
         return "the views are relit"
     if reprojection.get("exposure") != 0 or reprojection.get("reinhard") != 1:
         return "the views have another exposure or tone mapping than their light groups"
-    if not _is_copy(lightfield, source) and reprojection["filter"] not in LINEAR_FILTERS:
-        return f"the filter {reprojection['filter']} keeps each group from becoming negative"
     return None
-
-
-def most_off(lightfield: LightField, source: LightField | None) -> float:
-    """Return by which part of the colour the sum of the light groups may differ from it."""
-    return MOST_OFF if _is_copy(lightfield, source) else MOST_OFF_RESAMPLED
-
-
-def _is_copy(lightfield: LightField, source: LightField | None) -> bool:
-    """Return whether the views are rendered, or copies of the ``source`` in other files."""
-    rotation = lightfield.content.get("reprojection", {}).get("rotation", ())
-    return source is None or (source.lens == lightfield.lens and not any(rotation))
 
 
 def error(folder: Path, view: str, groups: list[str], colour: NDArray[Any]) -> float | None:

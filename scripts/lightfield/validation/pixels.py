@@ -176,10 +176,8 @@ class Examiner:
         self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
     ) -> None:
         """Compare the sum of a view's light groups with its colour."""
-        rendered_set = rendered(self.sets) if image_set.name else None
-        source = rendered_set.lightfield if rendered_set else None
         lightfield = image_set.lightfield
-        facts.not_summed = light_sums.reason_against(lightfield, source)
+        facts.not_summed = light_sums.reason_against(lightfield)
         if facts.not_summed:
             return
         colour = np.stack([image.channels[name] for name in "RGB"])
@@ -187,7 +185,7 @@ class Examiner:
         view = image_set.views[file.view]
         facts.sum_error = light_sums.error(folder, view, lightfield.light_groups, colour)
         if facts.sum_error is not None:
-            is_off = not facts.sum_error <= light_sums.most_off(lightfield, source)
+            is_off = not facts.sum_error <= light_sums.MOST_OFF
             text = f"the sum of the light groups is off by {facts.sum_error:.2g} of the colour"
             facts.fault("light_groups", text, is_off)
 

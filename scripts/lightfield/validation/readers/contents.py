@@ -22,13 +22,15 @@ class ExportedView:
     """One view: ``matrix`` (4, 4) is camera-to-world, metres, x right, y up, looking along −z.
 
     ``file`` and ``place`` say where it stands. ``name`` is the view's, or None where the export
-    numbers its pictures.
+    numbers its pictures. ``exposure`` are the matrices at the start and the end of a moving
+    camera's exposure.
     """
 
     file: Path
     place: str
     name: str | None
     matrix: Floats
+    exposure: tuple[Floats, Floats] | None = None
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import read_json, reading
+from lightfield.geometry.exposure import pose_between
 from lightfield.validation.readers.cameras import Camera, FTheta, Pinhole
 from lightfield.validation.readers.contents import (
     Cloud,
@@ -33,6 +34,8 @@ POINT_POSE = "('points', 'world')"
 CAMERA = "intrinsics/default/cameras/camera"
 FRAMES = "cameras/camera/frames"
 POINTS = "lidars/points/frames"
+# The first has no rows of different times.
+SHUTTERS = ("GLOBAL", "ROLLING_TOP_TO_BOTTOM")
 
 # From NCore's camera to that of lightfield.json (y up, looks along −z).
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -105,13 +108,20 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     with reading(lens_file, "camera of NCore"):
         camera = _camera(store.attributes(CAMERA), str(lens_file), exported)
         exported.cameras.append(ExportedCamera(str(lens_file), camera))
-    _read_views(store, sequence["sequence_timestamp_interval_us"], size, exported)
+        shutter = store.attributes(CAMERA)["camera_model_parameters"]["shutter_type"]
+        exported.expect(f"{lens_file}: shutter_type", shutter in SHUTTERS, True)
+    interval = sequence["sequence_timestamp_interval_us"]
+    _read_views(store, interval, size, shutter != SHUTTERS[0], exported)
     _read_points(store, exported)
     return exported
 
 
 def _read_views(
-    store: Store, interval: dict[str, Any], size: tuple[int, int], exported: Exported
+    store: Store,
+    interval: dict[str, Any],
+    size: tuple[int, int],
+    is_rolling: bool,
+    exported: Exported,
 ) -> None:
     poses_file = store.file("poses/default/dynamic_poses/.zattrs")
     frames_file = store.file(f"{FRAMES}/.zattrs")
@@ -120,20 +130,25 @@ def _read_views(
         times = [int(time) for time in trajectory["timestamps_us"]]
         matrices = numbers(trajectory["poses"], (len(times), 4, 4))
     with reading(frames_file, "times of NCore's frames"):
-        exposures = store.attributes(FRAMES)["frames_timestamps_us"]
-        # A still view is exposed for an instant.
-        instants = [[time, time] for time in times]
-        exported.expect(f"{frames_file}: times are the poses'", exposures == instants, True)
+        spans = store.attributes(FRAMES)["frames_timestamps_us"]
+        poses = dict(zip(times, enumerate(matrices @ _FLIP), strict=True))
+        have_poses = all(time in poses for span in spans for time in span)
+        exported.expect(f"{frames_file}: times are those of the poses", have_poses, True)
+        # A rolling shutter takes time. Otherwise, readers use one pose for the whole frame.
+        fit_shutter = all(start < end if is_rolling else start == end for start, end in spans)
+        exported.expect(f"{frames_file}: times last as the shutter says", fit_shutter, True)
         rising = bool((np.diff(times) > 0).all())
         exported.expect(f"{poses_file}: times rise", rising, True)
         within = [interval["start"], interval["stop"] - 1] == [times[0], times[-1]]
         exported.expect(f"{poses_file}: times are those of the sequence", within, True)
-    for index, ((_, end), matrix) in enumerate(zip(exposures, matrices, strict=False)):
-        frame = f"{FRAMES}/{end}"
+    for span in spans if have_poses and fit_shutter else ():
+        frame = f"{FRAMES}/{span[1]}"
         place = store.file(f"{frame}/generic_data/.zattrs")
         with reading(place, "frame of NCore"):
-            name = str(store.attributes(f"{frame}/generic_data")["name"])
-        exported.views.append(ExportedView(poses_file, f"poses[{index}]", name, matrix @ _FLIP))
+            about = store.attributes(f"{frame}/generic_data")
+            exposed = about.get("exposure_us")
+            view = _view(poses_file, str(about["name"]), span, exposed, poses, exported)
+            exported.views.append(view)
         picture = store.file(f"{frame}/image/0")
         with reading(picture, "PNG"):
             content = picture.read_bytes()
@@ -145,6 +160,31 @@ def _read_views(
         if f"{mask}/.zarray" in store.metadata:
             shape = store.array(mask).shape
             exported.expect(f"{store.file(mask)}: shape", shape, (size[1], size[0]))
+
+
+def _view(
+    file: Path,
+    name: str,
+    span: tuple[int, int],
+    exposed: tuple[int, int] | None,
+    poses: dict[int, tuple[int, Floats]],
+    exported: Exported,
+) -> ExportedView:
+    """Return the view of a frame. ``poses`` are numbers and poses by their times.
+
+    ``exposed`` are the start and the end of a moving camera's exposure. In its middle it is at the
+    view's pose.
+    """
+    begin, finish = exposed or span
+    row, matrix = poses[(begin + finish) // 2]
+    if exposed is None:
+        return ExportedView(file, f"poses[{row}]", name, matrix)
+    ends = poses[begin][1], poses[finish][1]
+    for time in span:
+        number_of_pose, pose = poses[time]
+        between = pose_between(*ends, (time - begin) / (finish - begin))
+        exported.expect(f"{file}: poses[{number_of_pose}] ({name})", pose.tolist(), between)
+    return ExportedView(file, f"poses[{row}]", name, matrix, ends)
 
 
 def _read_points(store: Store, exported: Exported) -> None:
@@ -171,7 +211,6 @@ def _read_points(store: Store, exported: Exported) -> None:
 def _camera(attributes: dict[str, Any], place: str, exported: Exported) -> Camera:
     parameters = attributes["camera_model_parameters"]
     width, height = (int(side) for side in parameters["resolution"])
-    exported.expect(f"{place}: shutter_type", parameters["shutter_type"], "GLOBAL")
     cx, cy = numbers(parameters["principal_point"], (2,)).tolist()
     kind = attributes["camera_model_type"]
     if kind == "opencv-pinhole":
