@@ -52,7 +52,7 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     for folder in ("library", source.builder):
         for file in sorted((BUILDERS / folder).rglob("*.py")):
             files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
-    return _digest([files, source.parameters.model_dump(), version("bpy")])
+    return _digest([files, source.parameters.model_dump(exclude_none=True), version("bpy")])
 
 
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
