@@ -45,6 +45,14 @@ class Draw:
     def choice(self, name: str, options: Sequence[Option]) -> Option:
         return options[int(self.generator(name).integers(len(options)))]
 
+    def absent(self, probabilities: Mapping[str, float]) -> frozenset[str]:
+        """The names that are not drawn, each by the probability with which it is there."""
+        return frozenset(
+            name
+            for name, probability in probabilities.items()
+            if not self.chance(f"{name} is there", probability)
+        )
+
     def tints(self, table: Mapping[str, Sequence[Factors]]) -> dict[str, Factors]:
         """One of its factors for each material of a table. Materials with a comma share theirs."""
         chosen: dict[str, Factors] = {}
@@ -96,10 +104,10 @@ def move(objects: Iterable[bpy.types.Object], how: Move) -> None:
 
 
 def tint(name: str, factors: Factors) -> None:
-    """Multiply the colours of a material's surfaces, textures too. No result exceeds 1."""
+    """Multiply the colours of a material's surfaces and glow, textures too. None exceeds 1."""
     tree = bpy.data.materials[name].node_tree
     for node in list(tree.nodes):
-        if not node.bl_idname.startswith("ShaderNodeBsdf"):
+        if not node.bl_idname.startswith(("ShaderNodeBsdf", "ShaderNodeEmission")):
             continue
         socket = node.inputs.get("Base Color") or node.inputs.get("Color")
         if socket is None:
