@@ -14,7 +14,7 @@ from scenes.library import shapes
 from scenes.library.architecture import frame
 from scenes.library.points import Points, points, rectangle, smooth_path, xyz
 from scenes.library.shapes import Shape, box, join, lettering, prism, sheet, transform
-from scenes.library.variation import AS_IT_IS, Variation, move, tint
+from scenes.library.variation import AS_IT_IS, Variation, tint
 
 Plan = TypeVar("Plan", bound=Variation)
 SHARP = np.radians(35)  # the usual angle between faces above which an edge stays sharp
@@ -125,13 +125,10 @@ def fill(
         tint(material, factors)
     scene = Scene(int(parameters["seed"]), float(parameters["detail"]), plan)
     for element in elements:
-        name = element.__name__
-        if name in plan.absent:
-            continue
-        earlier = set(bpy.data.objects) if name in plan.moves else set()
-        element(scene)
-        if name in plan.moves:
-            move(set(bpy.data.objects) - earlier, plan.moves[name])
+        if element.__name__ not in plan.absent:
+            earlier = set(bpy.data.objects)
+            element(scene)
+            plan.arrange(element.__name__, set(bpy.data.objects) - earlier)
 
 
 def place(name: str, data: bpy.types.ID | None, matrix: Matrix | None = None) -> bpy.types.Object:
