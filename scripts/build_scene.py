@@ -33,6 +33,8 @@ def main() -> None:
         settings = read_settings(BuildSettings, arguments.settings)
     else:
         parameters = {"seed": arguments.seed, "detail": arguments.detail}
+        if arguments.place is not None:
+            parameters["place"] = arguments.place
         content = {"builder": arguments.builder, "parameters": parameters}
         settings = checked(TypeAdapter(BuildSettings), content, "flags")
     builder = importlib.import_module(f"scenes.{settings.builder}")
@@ -48,6 +50,7 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     flags.add_argument("--builder", choices=builders(), help="builder of the scene")
     flags.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
     flags.add_argument("--detail", type=float, default=1.0, help="up to 1, which is full (default)")
+    flags.add_argument("--place", type=int, help="draws another layout, materials and light")
 
 
 if __name__ == "__main__":

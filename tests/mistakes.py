@@ -426,6 +426,7 @@ REFUSED = [
     *(("publish", value) for value in (True, [])),
     *(("scene.parameters.detail", value) for value in (0, 1.1, "1")),
     *(("scene.parameters.seed", value) for value in (2**63, "7", 0.0)),
+    *(("scene.parameters.place", value) for value in (-1, "7", 0.5)),
     *(("scene.frame", value) for value in (-1, 1048575, 1.0, "last", "file")),
     *(("scene", value) for value in (None, [], {})),
     ("scene.view_layers", ["a"]),

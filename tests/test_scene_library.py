@@ -142,7 +142,7 @@ def test_less_detail_has_a_part_of_the_triangles():
 
 
 def test_builders_are_the_folders_beside_the_library():
-    assert names.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
+    assert names.builders() == ["barbershop", "garden", "lone_monk", "room", "rooms", "still_life"]
 
 
 @pytest.mark.parametrize(

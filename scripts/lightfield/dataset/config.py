@@ -324,6 +324,11 @@ class Parameters(Settings):
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
         1.0, description="Level of detail of plants and meshes. 1 is full."
     )
+    place: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = Field(
+        None,
+        description="Another place has another layout, other materials and another light. "
+        "None is the builder's own layout. The builder `room` has no other.",
+    )
 
 
 _MODEL_SUFFIXES = "|".join(suffix[1:] for suffix in (*MODELS, *map(str.upper, MODELS)))

@@ -10,6 +10,7 @@ So each view names the machine that rendered it, and validation reports differen
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import metadata
@@ -40,7 +41,8 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     - A .blend: its SHA-256, and the path and SHA-256 of each of the ``external`` files that it
       reads. None stands for a missing file. Raises `UserError` if its own SHA-256 is unknown.
     - Somebody else's views: their lightfield.json.
-    - A builder: its source code, that of the builders' library, the parameters, and bpy's version.
+    - A builder: its source code, that of the builders' library and of builders whose pieces it
+      uses, the parameters, and bpy's version.
       The built .blend does not count: it holds memory addresses, which differ between builds.
     """
     if source.blend:
@@ -51,10 +53,20 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
         return _digest(published.fingerprint(source.dataset))
     assert source.builder
     files = []
-    for folder in ("library", source.builder):
+    for folder in _builder_folders(source.builder):
         for file in sorted((BUILDERS / folder).rglob("*.py")):
             files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
-    return _digest([files, source.parameters.model_dump(), version("bpy")])
+    return _digest([files, source.parameters.model_dump(exclude_none=True), version("bpy")])
+
+
+def _builder_folders(builder: str) -> list[str]:
+    """Return the folders with a builder's source: the library, its own, and those that it uses."""
+    folders = ["library", builder]
+    for folder in folders:
+        for file in sorted((BUILDERS / folder).rglob("*.py")):
+            imported = re.findall(r"^from scenes\.(\w+)", file.read_text(), re.MULTILINE)
+            folders += [name for name in dict.fromkeys(imported) if name not in folders]
+    return folders
 
 
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:

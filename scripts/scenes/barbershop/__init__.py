@@ -22,6 +22,8 @@ from scenes.barbershop import (
 )
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
+from scenes.barbershop.place import drawn
+from scenes.barbershop.plan import ORIGINAL
 from scenes.library.scene import Scene, fill
 
 
@@ -118,4 +120,4 @@ ELEMENTS = (
     plants.plant_hook,
     stocked,
 )
-build = partial(fill, palette, ELEMENTS)
+build = partial(fill, palette, ELEMENTS, drawn=drawn, original=ORIGINAL)

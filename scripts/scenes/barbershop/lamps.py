@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from scenes.barbershop.materials import WARM
-from scenes.barbershop.plan import HALF_Y, WINDOW_MIDDLE, against, put, standing
+from scenes.barbershop.plan import HALF_Y, WINDOW_MIDDLE, Barbershop, against, put, standing
 from scenes.library.lights import area_light
 from scenes.library.materials import SkyGraph
 from scenes.library.points import evenly, mirrored
@@ -137,14 +136,17 @@ def wall_lamp(scene: Scene) -> None:
     )
 
 
-def lights(scene: Scene) -> None:
+def lights(scene: Scene[Barbershop]) -> None:
     """A few large lights, which converge soon: daylight, a low sun, and the lamps' own light.
 
     No camera or mirror sees them; what seems to shine is a glowing mesh. A plain bright sky lights
     the street, but is not sampled from inside the room.
     """
+    light = scene.plan.light
+    lamps = light.lamps
+    color = light.lamp_color
     graph = SkyGraph()
-    graph.finish((0.72, 0.86, 1.0), 1.6)
+    graph.finish(light.sky_color, light.sky)
     graph.world.cycles.sampling_method = "NONE"
     x, z = WINDOW_MIDDLE
     window = transform((x, HALF_Y - 0.16, z), (-np.pi / 2, 0, 0))
@@ -153,15 +155,15 @@ def lights(scene: Scene) -> None:
     # the back has no daylight
     back = transform((0, -1.5, 2.03))
     front = transform((0, 1.5, 2.03))
-    rays = towards((0.9, 8.5, 4.9), (-1.0, -6.3, -4.9))
-    sun = area_light("Sun", rays, (4.2, 2.2), 260, (1.0, 0.86, 0.66))
+    rays = towards((light.sun_x, 8.5, 4.9), (-0.1 - light.sun_x, -6.3, -4.9))
+    sun = area_light("Sun", rays, (4.2, 2.2), light.sun, light.sun_color)
     sun.data.spread = np.radians(2.5)
     for lamp in (
         sun,
-        area_light("Daylight", window, (2.4, 1.3), 45, (0.80, 0.90, 1.0)),
-        area_light("Ceiling fill", above, (3.6, 6.0), 48, WARM),
-        area_light("Back pendants' light", back, (2.8, 0.6), 125, WARM),
-        area_light("Front pendants' light", front, (2.8, 0.6), 80, WARM),
-        area_light("Mirror light", tubes, (5.2, 0.14), 56, (1.0, 0.9, 0.76)),
+        area_light("Daylight", window, (2.4, 1.3), light.daylight, light.daylight_color),
+        area_light("Ceiling fill", above, (3.6, 6.0), 48 * lamps, color),
+        area_light("Back pendants' light", back, (2.8, 0.6), 125 * lamps, color),
+        area_light("Front pendants' light", front, (2.8, 0.6), 80 * lamps, color),
+        area_light("Mirror light", tubes, (5.2, 0.14), 56 * lamps, (1.0, 0.9, 0.76)),
     ):
         lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False

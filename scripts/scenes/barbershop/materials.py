@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from scenes.barbershop.plan import WARM
 from scenes.library.materials import Color, MaterialGraph, emissive, plain, plains, wood
 from scenes.library.points import Points
-
-WARM: Color = (1.0, 0.80, 0.58)
 
 PAINTS = [
     ("Cream glaze 0", (0.74, 0.68, 0.55), 0.13),

@@ -5,16 +5,20 @@ as the viewer sees it and faces +Z; on a wall it hangs upright.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from scenes.library.materials import Color
 from scenes.library.scene import place
 from scenes.library.shapes import transform
+from scenes.library.variation import Variation
 
 TAU = 2 * np.pi
+WARM: Color = (1.0, 0.80, 0.58)
 
 ROOM = (5.0, 7.5, 3.0)  # metres in x, y, z
 HALF_X, HALF_Y = ROOM[0] / 2, ROOM[1] / 2
@@ -72,3 +76,29 @@ def put(
     """
     for frame in [where] if isinstance(where, Matrix) else where:
         place(data.name, data, frame @ transform(at, np.radians(degrees), scale))
+
+
+@dataclass(frozen=True)
+class Light:
+    """The light of a time of day. sun, daylight: watts. lamps: a factor of the lamps' watts."""
+
+    sky: float = 1.6
+    sky_color: Color = (0.72, 0.86, 1.0)
+    sun: float = 260
+    sun_color: Color = (1.0, 0.86, 0.66)
+    sun_x: float = 0.9  # where the sun comes from, before the shop window
+    daylight: float = 45
+    daylight_color: Color = (0.80, 0.90, 1.0)
+    lamps: float = 1.0
+    lamp_color: Color = WARM
+
+
+@dataclass(frozen=True)
+class Barbershop(Variation):
+    """chair_turns: of the barbers' chairs, in degrees."""
+
+    light: Light = field(default_factory=Light)
+    chair_turns: tuple[float, float, float] = (128, 104, 66)
+
+
+ORIGINAL = Barbershop()

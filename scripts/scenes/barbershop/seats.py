@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import STATIONS, against, put, standing
+from scenes.barbershop.plan import STATIONS, Barbershop, against, put, standing
 from scenes.library.points import evenly, lattice, mirrored, rectangle, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, copies, join, prism, sheet
@@ -30,10 +30,10 @@ def cushion(scene: Scene, size: Sequence[float], tufts: Sequence[int]) -> Shape:
     return join([front, back, copies(button, places[(a + b) % 2 == 0])])
 
 
-def barber_chairs(scene: Scene) -> None:
+def barber_chairs(scene: Scene[Barbershop]) -> None:
     """Three hydraulic chairs, turned to their mirrors, on mats of ribbed rubber."""
     seat, back = chair_seat(scene), chair_back(scene)
-    for y, turn in zip(STATIONS, (128, 104, 66), strict=True):
+    for y, turn in zip(STATIONS, scene.plan.chair_turns, strict=True):
         where = standing(x=-1.38, y=y, z=0.009, turned=turn)
         put(seat, where)
         put(back, where, (0, -0.25, 0.58), (14, 0, 0))

@@ -8,6 +8,8 @@ from functools import partial
 
 from scenes.garden import court, distance, fire, lanterns, monuments, pond, trees, undergrowth
 from scenes.garden.materials import palette
+from scenes.garden.place import drawn
+from scenes.garden.plan import ORIGINAL
 from scenes.library.scene import fill
 
 ELEMENTS = (
@@ -18,4 +20,4 @@ ELEMENTS = (
     *(trees.bamboo, trees.maple, trees.pines, trees.woods),
     *(undergrowth.shrubs, undergrowth.grass, undergrowth.fallen_leaves),
 )
-build = partial(fill, palette, ELEMENTS)
+build = partial(fill, palette, ELEMENTS, drawn=drawn, original=ORIGINAL)

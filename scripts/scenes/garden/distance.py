@@ -2,32 +2,43 @@
 
 import numpy as np
 
-from scenes.garden.plan import SUN_AZIMUTH, TAU
+from scenes.garden.plan import TAU, GardenPlan
 from scenes.library.lights import hdri_world, sun_light
+from scenes.library.materials import SkyGraph
 from scenes.library.points import noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, place
 from scenes.library.shapes import facets, join, sheet, transform
 
-# The sun's azimuth in sunrise.exr. The sky is turned so that its sun has SUN_AZIMUTH.
-SKY_SUN_AZIMUTH = np.radians(-35.5)
 FOG_ARCS = 10
 
 
-def sky(scene: Scene) -> None:
-    """The sunrise that ships with bpy. A sun lamp, higher up, replaces its sun."""
-    hdri_world("sunrise.exr", 2.0, SUN_AZIMUTH - SKY_SUN_AZIMUTH, brightest=8.0)
-    sun_light("Sun", SUN_AZIMUTH, np.radians(35.0), 5.5, (1.0, 0.80, 0.58), np.radians(1.5))
+def sky(scene: Scene[GardenPlan]) -> None:
+    """An environment that ships with bpy, or a physical sky. A sun lamp replaces its sun."""
+    light = scene.plan.sky
+    if light.environment:
+        turn = light.sun_azimuth - light.environment_sun
+        hdri_world(light.environment, light.strength, turn, brightest=8.0)
+    else:
+        graph = SkyGraph()
+        look = {"sky_type": "MULTIPLE_SCATTERING", "sun_disc": False, "aerosol_density": 0.6}
+        clockwise = np.pi / 2 - light.sun_azimuth  # from +Y
+        above = max(light.sun_elevation, 0.0)
+        blue = graph.add("TexSky", sun_elevation=above, sun_rotation=clockwise, **look)
+        graph.finish(blue, light.strength)
+    angle = np.radians(1.5)
+    sun_light("Sun", light.sun_azimuth, light.sun_elevation, light.sun, light.sun_color, angle)
 
 
-def mountains(scene: Scene) -> None:
+def mountains(scene: Scene[GardenPlan]) -> None:
     """Ridges all round the horizon, lower where the sun rises."""
     angle = np.linspace(0, TAU, scene.segments(540), endpoint=False)
     radius = np.linspace(520, 170, scene.segments(60))[:, None]
     flat = polar(radius, angle)
-    ridge = 1 - np.abs(noise(flat / 150.0, 98, 1)) * 2.2
-    sunward = 0.5 + 0.5 * np.cos(angle - SUN_AZIMUTH)
+    hills = flat + scene.plan.ground_shift * 30.0
+    ridge = 1 - np.abs(noise(hills / 150.0, 98, 1)) * 2.2
+    sunward = 0.5 + 0.5 * np.cos(angle - scene.plan.sky.sun_azimuth)
     tall = (150 - 70 * sunward**2) * smoothstep(175, 400, radius)
-    height = 2.0 + tall * (0.38 + 0.62 * ridge + 0.30 * noise(flat / 60.0, 99, 5))
+    height = 2.0 + tall * (0.38 + 0.62 * ridge + 0.30 * noise(hills / 60.0, 99, 5))
     scene.add("Mountains", sheet(flat + xyz(0, 0, height), closed=True), "Mountain")
 
 

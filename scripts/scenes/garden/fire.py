@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.garden.plan import CANDLE_COLOR, FIRE, TAU
+from scenes.garden.plan import CANDLE_COLOR, TAU, GardenPlan
 from scenes.library.lights import point_light
 from scenes.library.points import noise, points, polar, xyz
 from scenes.library.scene import Scene, animate, place
@@ -11,33 +11,11 @@ from scenes.library.shapes import icosphere, join, transform, tube
 
 FLAME_TONGUES = 6
 FLAME_SHELLS = (1.0, 0.78, 0.5)
-# on gravel, plinth, gravel, and afloat
-CANDLES = [
-    (-0.62, 2.82, 0),
-    (-0.48, 2.9, 0),
-    (-0.40, 2.73, 0),
-    (0.47, 2.88, 0),
-    (0.60, 2.76, 0),
-    (0.70, 2.9, 0),
-    (-0.28, 3.05, 0.14),
-    (-0.12, 3.05, 0.14),
-    (0.05, 3.05, 0.14),
-    (0.3, 3.05, 0.14),
-    (-1.30, 2.13, 0),
-    (-1.17, 2.27, 0),
-    (-1.43, 1.97, 0),
-    (-3.95, 0.2, -0.08),
-    (-4.3, 1.25, -0.08),
-    (-4.75, -0.35, -0.08),
-    (-5.2, 0.75, -0.08),
-    (-5.9, 1.6, -0.08),
-]
-CANDLE_LIGHTS = [(-0.5, 2.8, 0.32), (0.58, 2.83, 0.32), (-1.3, 2.1, 0.3), (-4.6, 0.5, 0.12)]
 
 
-def fire(scene: Scene) -> None:
+def fire(scene: Scene[GardenPlan]) -> None:
     """An iron bowl with burning logs."""
-    x, y = FIRE
+    x, y = scene.plan.fire
     outside = [
         (0.05, 0.30),
         (0.24, 0.34),
@@ -115,7 +93,7 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
                 bend.texture_coords_object = carrier
 
 
-def candles(scene: Scene) -> None:
+def candles(scene: Scene[GardenPlan]) -> None:
     """Candles, 0.2 m high, at the statue's feet, by the rocks, and afloat on the pond."""
     random = scene.random("candles")
     wax = scene.lathe(
@@ -131,7 +109,7 @@ def candles(scene: Scene) -> None:
     burning = scene.mesh("Candle flame", flame, "Candle flame")
     rim = [(0.03, -0.015), (0.075, 0), (0.095, 0.035), (0.09, 0.035), (0.07, 0.012), (0, 0.01)]
     cup = scene.mesh("Candle cup", scene.lathe(rim, 28), "Candle cup")
-    for i, (x, y, base) in enumerate(points(CANDLES)):
+    for i, (x, y, base) in enumerate(points(scene.plan.candles)):
         afloat = base < 0
         size = random.uniform(0.8, 1.15)
         tall = size * (0.35 if afloat else random.uniform(0.5, 1.3))
@@ -143,5 +121,5 @@ def candles(scene: Scene) -> None:
         flame_object.visible_shadow = False
         if afloat:
             place(f"Candle cup.{i:02d}", cup, transform((x, y, base)))
-    for i, spot in enumerate(points(CANDLE_LIGHTS)):
+    for i, spot in enumerate(points(scene.plan.candle_lights)):
         point_light(f"Candle light.{i}", spot, 3.0, CANDLE_COLOR, 0.03)

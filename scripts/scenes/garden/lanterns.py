@@ -2,16 +2,14 @@
 
 import numpy as np
 
-from scenes.garden.plan import CANDLE_COLOR, STONE_LANTERNS, TAU, ground_height
+from scenes.garden.plan import CANDLE_COLOR, TAU, GardenPlan
 from scenes.library.lights import point_light
 from scenes.library.points import circle, points, polar, rectangle, xyz
 from scenes.library.scene import Scene, place
 from scenes.library.shapes import Shape, box, join, lathe, prism, sheet, transform, tube
 
-FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 
-
-def stone_lanterns(scene: Scene) -> None:
+def stone_lanterns(scene: Scene[GardenPlan]) -> None:
     """Kasuga lanterns, 1.75 m high: base, shaft, fire box with paper panes, curved roof, knob."""
     shaft = [(0.12, 0.26), (0.115, 0.5), (0.14, 0.53), (0.14, 0.57), (0.115, 0.6), (0.12, 0.86)]
     stack = [
@@ -36,8 +34,8 @@ def stone_lanterns(scene: Scene) -> None:
     stone = scene.mesh("Lantern stone", join(stack), "Lantern granite", smooth=0.6)
     corners = circle(0.205, 6)
     panes = scene.mesh("Lantern panes", paper_wall(corners, 1.05, 1.37), "Pane paper", smooth=False)
-    for i, (x, y, size) in enumerate(STONE_LANTERNS):
-        z = float(ground_height(x, y)) - 0.03
+    for i, (x, y, size) in enumerate(scene.plan.stone_lanterns):
+        z = float(scene.plan.ground_height(x, y)) - 0.03
         spot = transform((x, y, z), (0, 0, 0.4 * i), size)
         place(f"Lantern stone.{i}", stone, spot)
         place(f"Lantern panes.{i}", panes, spot)
@@ -49,13 +47,13 @@ def paper_wall(outline: np.ndarray, low: float, high: float) -> Shape:
     return sheet(xyz(*outline.T, [[low], [high]]), closed=True)
 
 
-def paper_globes(scene: Scene) -> None:
+def paper_globes(scene: Scene[GardenPlan]) -> None:
     """A string of paper globes, 0.4 m across on hoops of bamboo, over the path."""
     t = np.linspace(0.12, np.pi - 0.12, scene.segments(90, 12))
     hoops = 0.20 * np.sin(t) ** 0.8 * (1 - 0.03 * np.abs(np.sin(t * 9)))
     globe = scene.lathe(np.column_stack([hoops, -0.19 * np.cos(t)]), 40, capped=False)
     globes = [scene.mesh("Globe", globe, f"{tint} globe paper") for tint in ("Cream", "Red")]
-    ends = points([(-1.35, -4.35, 2.55), (2.3, -4.5, 2.6)])
+    ends = points(scene.plan.globe_rope)
     t = np.linspace(0, 1, 25)[:, None]
     rope = ends[0] + t * (ends[1] - ends[0]) - (0, 0, 1.4) * t * (1 - t)
     scene.add("Lantern rope", tube(rope, 0.006, 5), "Rope")
@@ -67,7 +65,7 @@ def paper_globes(scene: Scene) -> None:
         point_light(f"Globe light.{i}", (x, y, z), 9.0, CANDLE_COLOR, 0.05)
 
 
-def floor_lanterns(scene: Scene) -> None:
+def floor_lanterns(scene: Scene[GardenPlan]) -> None:
     """Framed paper lanterns beside the path."""
     width, height = 0.13, 0.52
     corners = rectangle(2 * width, 2 * width)
@@ -79,7 +77,7 @@ def floor_lanterns(scene: Scene) -> None:
     frame = scene.mesh("Floor lantern frame", join(bars), "Dark wood", smooth=False)
     paper = paper_wall(rectangle(0.248, 0.248), 0.09, height - 0.02)
     panes = scene.mesh("Floor lantern paper", paper, "Floor lantern paper", smooth=False)
-    for i, (x, y) in enumerate(FLOOR_LANTERNS):
+    for i, (x, y) in enumerate(scene.plan.floor_lanterns):
         spot = transform((x, y, 0.0), (0, 0, 0.2 + i))
         place(f"Floor lantern frame.{i}", frame, spot)
         place(f"Floor lantern paper.{i}", panes, spot)

@@ -5,19 +5,17 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from scenes.garden.plan import STATUE, TAU, TORII, ground_height
+from scenes.garden.plan import TAU, GardenPlan
 from scenes.library import shapes
 from scenes.library.architecture import upright
 from scenes.library.points import Points, noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, place
 from scenes.library.shapes import Shape, box, copies, icosphere, join, sheet, transform
 
-MIRROR = (1.75, 3.25)
 
-
-def statue(scene: Scene) -> None:
+def statue(scene: Scene[GardenPlan]) -> None:
     """The figure on a lotus seat and a granite plinth, with a halo of polished brass."""
-    x, y = STATUE
+    x, y = scene.plan.statue
     for i, (width, low, high) in enumerate(
         points([(1.55, -0.1, 0.14), (1.32, 0.14, 0.5), (1.45, 0.5, 0.58)])
     ):
@@ -135,7 +133,7 @@ def lotus(scene: Scene) -> Shape:
     return join(parts)
 
 
-def mirror(scene: Scene) -> None:
+def mirror(scene: Scene[GardenPlan]) -> None:
     """A standing mirror in a dark wooden frame beside the statue, turned towards the viewer."""
     width, height = 0.82, 1.45
     parts = [box((width + 0.14, 0.05, 0.07), 0.012).moved(0, 0, z) for z in (0.0, height)]
@@ -145,14 +143,14 @@ def mirror(scene: Scene) -> None:
         parts.append(box((0.07, 0.05, height), 0.012).moved(inner, 0, height / 2))
         parts.append(box((0.07, 0.07, 1.3), 0.012).moved(outer, 0.02, 0.43))
         parts.append(box((0.09, 0.55, 0.07), 0.015).moved(outer, 0.02, -0.2))
-    turn = np.radians(6.0) - np.arctan2(*MIRROR)  # towards the viewer
-    spot = transform((*MIRROR, 0.24), (np.radians(-3.0), 0, turn))
+    turn = np.radians(6.0) - np.arctan2(*scene.plan.mirror)  # towards the viewer
+    spot = transform((*scene.plan.mirror, 0.24), (np.radians(-3.0), 0, turn))
     scene.add("Mirror frame", join(parts), "Dark wood", matrix=spot, smooth=0.7)
     pane = sheet(xyz([-width / 2, width / 2], 0.005, [[0], [height]]))
     place("Mirror", scene.mesh("Mirror", pane, "Mirror", smooth=False), spot)
 
 
-def torii(scene: Scene) -> None:
+def torii(scene: Scene[GardenPlan]) -> None:
     """Two leaning posts with black feet, a tie beam, and two lintels that rise at their ends."""
     beams = box((3.4, 0.12, 0.2), 0.01).moved(0, 0, 2.6), box((0.22, 0.1, 0.4), 0.01)
     red = [lintel(scene, 1.95, 3.17, 3.36, 0.12, 0.14), beams[0], beams[1].moved(0, 0, 2.9)]
@@ -162,7 +160,7 @@ def torii(scene: Scene) -> None:
         head = np.array([side * 1.36, 0, 3.2])
         red.append(scene.tube(np.linspace(foot, head, 9), np.linspace(0.15, 0.125, 9), 32))
         black.append(scene.tube(np.linspace(foot, foot + 0.16 * (head - foot), 3), 0.18, 32))
-    spot = transform((*TORII, float(ground_height(*TORII))))
+    spot = transform((*scene.plan.torii, float(scene.plan.ground_height(*scene.plan.torii))))
     shape = join([*red, join(black).painted(1)])
     scene.add("Torii", shape, "Vermilion", "Black lacquer", matrix=spot, smooth=0.6)
 

@@ -3,23 +3,26 @@
 import numpy as np
 from mathutils import Matrix
 
-from scenes.garden import plan
-from scenes.garden.plan import POND_CENTER, TAU, WATER_LEVEL, pond_distance, spread, standing
+from scenes.garden.plan import TAU, WATER_LEVEL, GardenPlan
 from scenes.library.plants import blade, tuft
 from scenes.library.points import Array, noise, points, polar, xyz
 from scenes.library.scene import Scene, scatter
 from scenes.library.shapes import copies, facets, join, sheet, transform
 
 
-def water(scene: Scene) -> None:
+def water(scene: Scene[GardenPlan]) -> None:
     """The pond's surface."""
-    shore = plan.pond_shore(np.linspace(0, TAU, scene.segments(120, 16), endpoint=False))
+    shore = scene.plan.pond_shore(np.linspace(0, TAU, scene.segments(120, 16), endpoint=False))
     inwards = np.linspace(1.0, 0.02, scene.segments(12, 3))[:, None, None]
-    x, y = np.moveaxis(POND_CENTER + inwards * (shore - POND_CENTER), -1, 0)
+    x, y = np.moveaxis(
+        np.array(scene.plan.pond_center) + inwards * (shore - np.array(scene.plan.pond_center)),
+        -1,
+        0,
+    )
     scene.add("Water", sheet(xyz(x, y, WATER_LEVEL), closed=True), "Water")
 
 
-def water_lilies(scene: Scene) -> None:
+def water_lilies(scene: Scene[GardenPlan]) -> None:
     """Drifts of lily pads, some with a flower of three rings of petals."""
     random = scene.random("pond")
     angle = np.linspace(0.16, TAU - 0.16, scene.segments(40, 8))
@@ -36,18 +39,24 @@ def water_lilies(scene: Scene) -> None:
     lily = scene.mesh("Water lily", join(rings), "Lily petal")
 
     def allowed(x: Array, y: Array) -> Array:
-        return (noise(xyz(x, y) / 1.3, 91) > 0.02) & (pond_distance(x, y) < -0.45)
+        return (noise(xyz(x, y) / 1.3, 91) > 0.02) & (scene.plan.pond_distance(x, y) < -0.45)
 
     def afloat(x: float, y: float, low: float, high: float) -> Matrix:
         turn = (0, 0, random.uniform(0, TAU))
         return transform((x, y, WATER_LEVEL + 0.008), turn, random.uniform(low, high))
 
-    spots = spread(random, 34, (*(POND_CENTER - 3.2), *(POND_CENTER + 3.2)), 0.30, allowed)
+    spots = scene.plan.spread(
+        random,
+        34,
+        (*(np.array(scene.plan.pond_center) - 3.2), *(np.array(scene.plan.pond_center) + 3.2)),
+        0.30,
+        allowed,
+    )
     scatter("Lily pad", [pad], [afloat(x, y, 0.10, 0.19) for x, y in spots])
     scatter("Water lily", [lily], [afloat(x + 0.1, y, 0.8, 1.2) for x, y in spots[::6]])
 
 
-def carp(scene: Scene) -> None:
+def carp(scene: Scene[GardenPlan]) -> None:
     """Koi under the surface."""
     t = np.linspace(0, 1, scene.segments(28, 8))
     radius = 0.062 * np.sin(np.pi * t**0.6) ** 0.8 * (1 - 0.35 * t) + 0.004
@@ -64,27 +73,20 @@ def carp(scene: Scene) -> None:
         ridge = ridge + points([(0, 0.02, 0.04), (0, 0, 0.085), (0, 0, 0.06), (0, 0, 0.03)])
         fins = [facets(fin, (0, 1, 2, 3)) for fin in (tail, side, side * (-1, 1, 1), ridge)]
         kinds.append(scene.mesh(f"Koi.{i}", join([scene.tube(spine, radius, 16), *fins]), "Koi"))
-    swimming = points(
-        [
-            (-4.1, 0.75, 0.4),
-            (-4.55, 0.35, 1.2),
-            (-4.35, -0.3, 2.6),
-            (-5.1, 1.5, 4.0),
-            (-5.4, -0.2, 5.2),
-            (-4.9, 0.95, 2.0),
-        ]
-    )
-    places = [transform((x, y, WATER_LEVEL - 0.13), (0, 0, a), 0.9) for x, y, a in swimming]
+    places = [transform((x, y, WATER_LEVEL - 0.13), (0, 0, a), 0.9) for x, y, a in scene.plan.koi]
     scatter("Koi", kinds, places)
 
 
-def iris(scene: Scene) -> None:
+def iris(scene: Scene[GardenPlan]) -> None:
     """Sheaves of sword-like leaves along the far shore."""
     random = scene.random("iris")
     count = scene.count(46, 8)
     leaf = blade(0.018, 6, 0.35)
     sheaves = [tuft(random, leaf, count, 0.15, (0.35, 0.8)) for _ in range(2)]
     angle = np.concatenate([random.uniform(1.2, 5.2, 20), random.uniform(-0.9, 0.9, 3)])
-    shore = POND_CENTER + (plan.pond_shore(angle) - POND_CENTER) * 1.06
+    shore = (
+        np.array(scene.plan.pond_center)
+        + (scene.plan.pond_shore(angle) - np.array(scene.plan.pond_center)) * 1.06
+    )
     meshes = [scene.mesh("Iris", sheaf, "Iris leaves") for sheaf in sheaves]
-    scatter("Iris", meshes, standing(random, shore, (0.8, 1.2)))
+    scatter("Iris", meshes, scene.plan.standing(random, shore, (0.8, 1.2)))

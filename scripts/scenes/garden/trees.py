@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from scenes.garden.plan import MAPLE, SUN_AZIMUTH, TAU, ground_height, spread, standing
+from scenes.garden.plan import TAU, GardenPlan
 from scenes.library.plants import Growth, branches, leaves_on, oval_leaf
 from scenes.library.points import Array, noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, place, scatter
 from scenes.library.shapes import Shape, copies, facets, join, sheet, transform, tube
 
-GROVES = ((-5.5, 6.4, 6.5, 9.5), (2.2, -8.5, 9.0, -5.2))  # of bamboo: rectangles x0, y0, x1, y1
 MAPLE_GROWTH = Growth(
     (2.9, 3.5, 1.5, 0.65), (9, 6, 4), (1.0, 0.8, 0.7), (0.05, 0.055, 0.0, -0.02), 0.17, 0.13, 0.62
 )
@@ -17,15 +16,15 @@ WOOD_GROWTH = Growth(
 )
 
 
-def bamboo(scene: Scene) -> None:
+def bamboo(scene: Scene[GardenPlan]) -> None:
     """Groves of bamboo behind the statue and beside the path."""
     random = scene.random("bamboo")
     used = ("Bamboo culm", "Bamboo leaves")
     meshes = [scene.mesh(f"Bamboo.{i}", bamboo_culm(scene, i), *used) for i in range(5)]
     places = []
-    for corners, count in zip(GROVES, (44, 32), strict=True):
-        spots = spread(random, count, corners, 0.34, pond=0.5, path=1.6)
-        places += standing(random, spots, (0.75, 1.1), 0.05, 0.03)
+    for corners, count in scene.plan.groves:
+        spots = scene.plan.spread(random, count, corners, 0.34, pond=0.5, path=1.6)
+        places += scene.plan.standing(random, spots, (0.75, 1.1), 0.05, 0.03)
     scatter("Bamboo", meshes, places)
 
 
@@ -80,14 +79,16 @@ def maple_leaf() -> Shape:
     return facets([*rim, (0.0, 0.25, 0.03)], *fan)
 
 
-def maple(scene: Scene) -> None:
+def maple(scene: Scene[GardenPlan]) -> None:
     """A red maple whose crown reaches over the viewer, high enough to leave the rigs clear."""
     random = scene.random("maple")
     wood, twigs = branches(scene, random, MAPLE_GROWTH)
     count = scene.count(28, 3)
     leaves = leaves_on(random, twigs, maple_leaf(), count, (0.065, 0.115), 0.35, 0.08)
-    z = float(ground_height(*MAPLE))
-    spot = transform((*MAPLE, z), (0.0, 0.14, np.arctan2(-MAPLE[1], -MAPLE[0])))
+    z = float(scene.plan.ground_height(*scene.plan.maple))
+    spot = transform(
+        (*scene.plan.maple, z), (0.0, 0.14, np.arctan2(-scene.plan.maple[1], -scene.plan.maple[0]))
+    )
     shape = join([wood, leaves.painted(1)]).transformed(spot)
     # Lift the parts of the crown over the rigs above 2.2 m.
     x, y, height = shape.vertices.T
@@ -96,11 +97,13 @@ def maple(scene: Scene) -> None:
     shape = shape.reshaped(xyz(x, y, height + over * (raised - height)))
     tree = scene.mesh("Maple", shape.transformed(spot.inverted()), "Maple bark", "Maple leaves")
     place("Maple", tree, spot)
-    place("Maple far", tree, transform((5.5, -3.0, 0.1), (0, 0, 2.5), 1.05))
-    place("Maple farther", tree, transform((-8.3, 5.6, 0.1), (0, 0, 4.5), 1.1))
+    for name, (x, y), turn, size in zip(
+        ("Maple far", "Maple farther"), scene.plan.far_maples, (2.5, 4.5), (1.05, 1.1), strict=False
+    ):
+        place(name, tree, transform((x, y, 0.1), (0, 0, turn), size))
 
 
-def pines(scene: Scene) -> None:
+def pines(scene: Scene[GardenPlan]) -> None:
     """Cloud-pruned pines, 3 m high: swaying stems, limbs, and a dome of brushes on each."""
     random = scene.random("pines")
     meshes = []
@@ -132,16 +135,13 @@ def pines(scene: Scene) -> None:
             pads.append(copies(brush, spots + tip, forward, upwards, sizes))
         tree = join([*parts, join(pads).painted(1)])
         meshes.append(scene.mesh("Pine", tree, "Pine bark", "Pine needles"))
-    spots = points(
-        [(5.9, 0.2), (3.1, 6.3), (-7.6, -2.6), (-3.3, 5.6), (6.4, 5.4), (-5.8, -5.6), (9.5, 2.4)]
-    )
-    scatter("Pine", meshes, standing(random, spots, (0.85, 1.3)))
+    scatter("Pine", meshes, scene.plan.standing(random, points(scene.plan.pines), (0.85, 1.3)))
 
 
-def woods(scene: Scene) -> None:
+def woods(scene: Scene[GardenPlan]) -> None:
     """Broad-leaved trees around the garden, thinning out towards the hills."""
     random = scene.random("woods")
-    simpler = Scene(scene.seed, 0.3 * scene.detail)
+    simpler = Scene(scene.seed, 0.3 * scene.detail, scene.plan)
     meshes = []
     for colour in ("Green", "Yellowing", "Autumn"):
         wood, twigs = branches(simpler, random, WOOD_GROWTH)
@@ -152,11 +152,11 @@ def woods(scene: Scene) -> None:
 
     def allowed(x: Array, y: Array) -> Array:
         r = np.hypot(x, y)
-        open_to_sun = np.cos(np.arctan2(y, x) - SUN_AZIMUTH) >= 0.93
+        open_to_sun = np.cos(np.arctan2(y, x) - scene.plan.sky.sun_azimuth) >= 0.93
         thicket = noise(xyz(x, y) / 16.0, 95) > -0.05 - 0.1 * (r < 25)
         return (r > 11.5) & (r < 75) & (~open_to_sun | (r > 30)) & thicket
 
-    near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed, path=3)
-    far = spread(random, 90, (-75, -75, 75, 75), 4.5, allowed, path=3)
-    places = standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
+    near = scene.plan.spread(random, 40, (-26, -26, 26, 26), 3.4, allowed, path=3)
+    far = scene.plan.spread(random, 90, (-75, -75, 75, 75), 4.5, allowed, path=3)
+    places = scene.plan.standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
     scatter("Tree", [meshes[k] for k in (0, 1, 0, 1, 0, 2, 0, 1)], places)

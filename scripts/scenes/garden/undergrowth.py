@@ -3,7 +3,7 @@
 import numpy as np
 
 from scenes.garden.court import flagstone_layout, raked_height
-from scenes.garden.plan import COURT, IN_THE_MOSS, TAU, court_distance, spread, standing
+from scenes.garden.plan import TAU, GardenPlan
 from scenes.garden.trees import maple_leaf
 from scenes.library.plants import blade, oval_leaf, tuft
 from scenes.library.points import Array, noise, polar, xyz
@@ -11,7 +11,7 @@ from scenes.library.scene import Scene, scatter
 from scenes.library.shapes import copies, icosphere, join
 
 
-def shrubs(scene: Scene) -> None:
+def shrubs(scene: Scene[GardenPlan]) -> None:
     """Azaleas clipped into cushions 1 m across: a core, leaves, and flowers for a part of them."""
     random = scene.random("shrubs")
     leaf = oval_leaf()
@@ -33,15 +33,15 @@ def shrubs(scene: Scene) -> None:
         meshes.append(scene.mesh("Shrub", shape, "Shrub core", "Azalea leaves", "Azalea flowers"))
 
     def allowed(x: Array, y: Array) -> Array:
-        apart = [np.hypot(x - tx, y - ty) for tx, ty in IN_THE_MOSS]
+        apart = [np.hypot(x - tx, y - ty) for tx, ty in scene.plan.in_the_moss]
         return (np.hypot(x, y) < 14) & (np.min(apart, axis=0) > 0.6)
 
     off = {"court": 0.75, "pond": 0.9, "path": 1.3}
-    spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed, **off)
-    scatter("Shrub", meshes, standing(random, spots, (0.8, 1.9)))
+    spots = scene.plan.spread(random, 56, (-14, -14, 14, 14), 1.15, allowed, **off)
+    scatter("Shrub", meshes, scene.plan.standing(random, spots, (0.8, 1.9)))
 
 
-def grass(scene: Scene) -> None:
+def grass(scene: Scene[GardenPlan]) -> None:
     """Grass in the moss around the court, taller towards the woods."""
     random = scene.random("grass")
     count = scene.count(760, 30)
@@ -57,21 +57,23 @@ def grass(scene: Scene) -> None:
 
     off = {"court": 0.5, "pond": 0.25, "path": 0.95}
     count = scene.count(330, 40)
-    near = spread(random, count, (-9.5, -9.5, 9.5, 9.5), 0.66, patch, **off)
-    far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther, **off)
-    places = standing(random, near, (0.8, 1.25), sloping=True)
-    scatter("Grass", meshes, places + standing(random, far, (1.8, 2.8), sloping=True))
+    near = scene.plan.spread(random, count, (-9.5, -9.5, 9.5, 9.5), 0.66, patch, **off)
+    far = scene.plan.spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther, **off)
+    places = scene.plan.standing(random, near, (0.8, 1.25), sloping=True)
+    scatter("Grass", meshes, places + scene.plan.standing(random, far, (1.8, 2.8), sloping=True))
 
 
-def fallen_leaves(scene: Scene) -> None:
+def fallen_leaves(scene: Scene[GardenPlan]) -> None:
     """Maple leaves on the gravel and the flagstones, thickest under the crown."""
     random = scene.random("fallen leaves")
     count = scene.count(420, 20)
     under_crown = random.normal((-1.2, -2.0), 1.3, (count, 2))
-    spots = np.vstack([under_crown, random.uniform(COURT[:2], COURT[2:], (count // 3, 2))])
-    spots = spots[court_distance(*spots.T) < -0.2]
+    spots = np.vstack(
+        [under_crown, random.uniform(scene.plan.court[:2], scene.plan.court[2:], (count // 3, 2))]
+    )
+    spots = spots[scene.plan.court_distance(*spots.T) < -0.2]
     stones = flagstone_layout(scene)
-    heights = raked_height(*spots.T, stones) + 0.012
+    heights = raked_height(scene.plan, *spots.T, stones) + 0.012
     is_kept = np.ones(len(spots), dtype=bool)
     for outline, height in stones:
         reach = np.hypot(*(spots - outline.mean(0)).T)

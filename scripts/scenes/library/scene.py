@@ -3,7 +3,7 @@
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypedDict, Unpack
+from typing import Any, Generic, TypedDict, TypeVar, Unpack
 
 import bpy
 import numpy as np
@@ -14,13 +14,15 @@ from scenes.library import shapes
 from scenes.library.architecture import frame
 from scenes.library.points import Points, points, rectangle, smooth_path, xyz
 from scenes.library.shapes import Shape, box, join, lettering, prism, sheet, transform
+from scenes.library.variation import AS_IT_IS, Variation, tint
 
+Plan = TypeVar("Plan", bound=Variation)
 SHARP = np.radians(35)  # the usual angle between faces above which an edge stays sharp
 
 
 @dataclass(frozen=True)
-class Scene:
-    """The seed and the level of detail (1 is full).
+class Scene(Generic[Plan]):
+    """The seed, the level of detail (1 is full), and the plan of the place.
 
     An element is a function that takes a Scene and puts objects into Blender's scene. The shapes of
     a Scene have fewer segments at less detail. The number of triangles is proportional to `detail`,
@@ -29,6 +31,7 @@ class Scene:
 
     seed: int
     detail: float
+    plan: Plan = AS_IT_IS  # type: ignore[assignment]  # changes nothing
 
     def random(self, element: str) -> np.random.Generator:
         """An element's own random numbers, so that its changes do not affect other elements."""
@@ -103,12 +106,29 @@ class Scene:
         return place(name, self.mesh(name, shape, *materials, **smooth), matrix)
 
 
-def fill(palette: Callable, elements: Iterable[Callable], parameters: Mapping[str, Any]) -> None:
-    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is full)."""
+def fill(
+    palette: Callable,
+    elements: Iterable[Callable],
+    parameters: Mapping[str, Any],
+    drawn: Callable[[int], Variation] = lambda place: AS_IT_IS,
+    original: Variation = AS_IT_IS,
+) -> None:
+    """Fill the empty scene.
+
+    drawn: draws the plan of a place. original: the plan without a place. parameters: `seed` (int),
+    `detail` (1.0 is full), and `place` (int, or None for the original).
+    """
+    number = parameters.get("place")
+    plan = original if number is None else drawn(int(number))
     palette()
-    scene = Scene(int(parameters["seed"]), float(parameters["detail"]))
+    for material, factors in plan.tints.items():
+        tint(material, factors)
+    scene = Scene(int(parameters["seed"]), float(parameters["detail"]), plan)
     for element in elements:
-        element(scene)
+        if element.__name__ not in plan.absent:
+            earlier = set(bpy.data.objects)
+            element(scene)
+            plan.arrange(element.__name__, set(bpy.data.objects) - earlier)
 
 
 def place(name: str, data: bpy.types.ID | None, matrix: Matrix | None = None) -> bpy.types.Object:

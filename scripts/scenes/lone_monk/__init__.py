@@ -8,6 +8,8 @@ from functools import partial
 from scenes.library.scene import fill
 from scenes.lone_monk import arcades, church, court, furniture, monk, plants, roofs, sky, walls
 from scenes.lone_monk.materials import palette
+from scenes.lone_monk.place import drawn
+from scenes.lone_monk.plan import ORIGINAL
 
 ELEMENTS = (
     *(sky.sky, sky.swallows, court.paving, court.lawns, furniture.well, arcades.arcades),
@@ -16,4 +18,4 @@ ELEMENTS = (
     *(furniture.jars, furniture.chair, furniture.broom, plants.shrubs, plants.olive_tree),
     *(plants.cypresses, plants.ivy, plants.geraniums, plants.fallen_leaves, monk.monk),
 )
-build = partial(fill, palette, ELEMENTS)
+build = partial(fill, palette, ELEMENTS, drawn=drawn, original=ORIGINAL)

@@ -7,7 +7,7 @@ from scenes.library.points import Points, points, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, copies, grid, join, sheet
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import ARCADE, ARCADE_WALL, FRONT, SPRINGING, VAULT_RISE, WALK, on_sides
+from scenes.lone_monk.plan import ARCADE_WALL, SPRINGING, VAULT_RISE, Cloister
 
 ARCH_RADIUS = 0.92
 # A column's base, shaft and neck, and the bell of its capital: radius and height.
@@ -72,42 +72,53 @@ LOW_WALL = [
 ]
 
 
-def arcades(scene: Scene) -> None:
+def arcades(scene: Scene[Cloister]) -> None:
     """Low walls with columns, open at the gates, and piers where two arcades meet."""
     # The wall over one arch, with voussoirs and hood moulds; its origin is at the springing.
     bay = Model(scene)
     n = scene.segments(24)
     opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
-    wall = panel(plan.BAY, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
+    wall = panel(scene.plan.bay, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
     bay.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
     bay.add(arch_stones(ARCH_RADIUS - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
-    x, z = arch_outline(plan.BAY / 2 - 0.001, 0.0, 0.0, plan.BAY / 2 - 0.001, n).T
+    x, z = arch_outline(scene.plan.bay / 2 - 0.001, 0.0, 0.0, scene.plan.bay / 2 - 0.001, n).T
     hood = scene.tube(xyz(x, 0, z), 0.035)
     for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
         bay.add(hood, "Limestone", (0, face, 0))
-    on_sides("Arcade", [bay.mesh("Arcade bay")], plan.BAY_AXES, ARCADE, SPRINGING)
+    scene.plan.on_sides(
+        "Arcade", [bay.mesh("Arcade bay")], scene.plan.bay_axes, scene.plan.arcade, SPRINGING
+    )
     column = Model(scene)
     pier = Model(scene)
     long = Model(scene)
     column.add(twin_column(scene), "Carved stone")
-    on_sides("Column", [column.mesh("Column")], plan.COLUMNS[1:-1], ARCADE, plan.STYLOBATE)
+    scene.plan.on_sides(
+        "Column",
+        [column.mesh("Column")],
+        scene.plan.columns[1:-1],
+        scene.plan.arcade,
+        plan.STYLOBATE,
+    )
     pier.add(pillar(PIER_FOOT), "Carved stone")
     pier.add(pillar(PIER), "Ashlar", (0, 0, SPRINGING))
     pier.add(pillar(PIER_HEAD), "Carved stone", (0, 0, SPRINGING))
-    on_sides("Pier", [pier.mesh("Pier")], -ARCADE, ARCADE)
+    scene.plan.on_sides("Pier", [pier.mesh("Pier")], -scene.plan.arcade, scene.plan.arcade)
     random = scene.random("low wall")
     for count, gate, depth, z, height in points(LOW_WALL):
         for sign in (-1, 1):
-            middle, length = cut(random, gate, ARCADE - 0.38, int(count))
-            places = xyz(sign * middle, ARCADE, z)
+            middle, length = cut(random, gate, scene.plan.arcade - 0.38, int(count))
+            places = xyz(sign * middle, scene.plan.arcade, z)
             sizes = xyz(length - 0.007, depth, height)
             long.add(blocks(places, sizes, 0.016), "Limestone")
-    front = (0, FRONT, plan.ARCADE_TOP)
-    strings = [(0, 0, -0.28, 2 * FRONT, 0.13, 0.06), (0, 0, -0.1, 2 * FRONT, 0.2, 0.07)]
-    dentils = xyz(np.arange(0.12 - FRONT, FRONT - 0.05, 0.2), -0.03, -0.19)
+    front = (0, scene.plan.front, plan.ARCADE_TOP)
+    strings = [
+        (0, 0, -0.28, 2 * scene.plan.front, 0.13, 0.06),
+        (0, 0, -0.1, 2 * scene.plan.front, 0.2, 0.07),
+    ]
+    dentils = xyz(np.arange(0.12 - scene.plan.front, scene.plan.front - 0.05, 0.2), -0.03, -0.19)
     long.add(stones(strings), "Limestone", front)
     long.add(blocks(dentils, (0.09, 0.12, 0.11), 0.008), "Limestone", front)
-    on_sides("Low wall", [long.mesh("Low wall and cornice")])
+    scene.plan.on_sides("Low wall", [long.mesh("Low wall and cornice")])
 
 
 def pillar(section: Points) -> Shape:
@@ -139,31 +150,39 @@ def leaf(scene: Scene, height: float, reach: float) -> Shape:
     return sheet(xyz(x, out - 0.3 * np.abs(x), height * (t - 0.42 * t**4)))
 
 
-def vaults(scene: Scene) -> None:
+def vaults(scene: Scene[Cloister]) -> None:
     """A vault for each bay and each corner of the walks, and the brackets that carry them."""
-    middle = plan.WALK_MIDDLE
-    before = ARCADE - plan.WALK_MIDDLE - ARCADE_WALL / 2
-    on_sides("Vault", [vault(scene, plan.BAY).mesh("Vault")], plan.BAY_AXES, middle, SPRINGING)
-    corner = vault(scene, WALK)
+    middle = scene.plan.walk_middle
+    before = scene.plan.arcade - scene.plan.walk_middle - ARCADE_WALL / 2
+    scene.plan.on_sides(
+        "Vault",
+        [vault(scene, scene.plan.bay).mesh("Vault")],
+        scene.plan.bay_axes,
+        middle,
+        SPRINGING,
+    )
+    corner = vault(scene, scene.plan.walk)
     corbel = Model(scene)
-    rise = arch_outline(WALK / 2 - 0.12, 0.0, 0.0, VAULT_RISE - 0.08, scene.segments(20))
-    arch = panel(WALK, 0.0, 1.2, rise, ARCADE_WALL)
+    rise = arch_outline(scene.plan.walk / 2 - 0.12, 0.0, 0.0, VAULT_RISE - 0.08, scene.segments(20))
+    arch = panel(scene.plan.walk, 0.0, 1.2, rise, ARCADE_WALL)
     corner.add(arch, "Limestone", (before, 0, 0), (0, 0, -90))
     corner.add(arch, "Limestone", (0, before, 0))
-    on_sides("Corner vault", [corner.mesh("Corner vault")], middle, middle, SPRINGING)
+    scene.plan.on_sides("Corner vault", [corner.mesh("Corner vault")], middle, middle, SPRINGING)
     bell = scene.lathe(
         [(0.02, -0.34), (0.05, -0.31), (0.07, -0.2), (0.13, -0.1), (0.14, -0.09)], 12
     )
     corbel.add(join([bell, stones([(0, 0, -0.045, 0.34, 0.34, 0.09)])]), "Carved stone")
-    on_sides("Corbel", [corbel.mesh("Corbel")], plan.COLUMNS, plan.BACK, SPRINGING)
+    scene.plan.on_sides(
+        "Corbel", [corbel.mesh("Corbel")], scene.plan.columns, scene.plan.back, SPRINGING
+    )
 
 
-def vault(scene: Scene, length: float) -> Model:
+def vault(scene: Scene[Cloister], length: float) -> Model:
     """The higher of two crossing elliptic barrels over a bay, with ribs along its groins."""
     model = Model(scene)
     n = scene.segments(20, 6) // 2 * 2
     a = length / 2
-    b = WALK / 2
+    b = scene.plan.walk / 2
     t = np.sin(np.linspace(-np.pi / 2, np.pi / 2, n + 1))
     barrel = VAULT_RISE * np.sqrt(1 - t**2)
     model.add(grid(a * t, b * t, np.maximum(barrel, barrel[:, None])), "Whitewash")

@@ -6,13 +6,12 @@ from scenes.library.architecture import arch_outline, blocks, filled, panel, sto
 from scenes.library.points import Array, circle, polar, xyz
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import box, join, lathe, transform
-from scenes.lone_monk.plan import BACK, EAST, LEAN_TO_TOP, NORTH, SIDES, on_sides, side
+from scenes.lone_monk.plan import EAST, NORTH, SIDES, Cloister
 from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
 from scenes.lone_monk.walls import glaze, wall
 
 TOP = 9.4
 BAYS = 7
-WIDTH = 2 * BACK / BAYS
 LANCET = (0.42, 6.2, 7.75, 0.62)  # an arch, as in `walls`
 ROSE = (1.15, 7.3)  # its radius and height
 
@@ -39,9 +38,10 @@ HOUR_HAND = [(0, -0.05, 0.13, 0.035, 0.015, 0.36)]
 MINUTE_HAND = [(0, -0.05, 0.22, 0.035, 0.015, 0.54)]
 
 
-def church(scene: Scene) -> None:
+def church(scene: Scene[Cloister]) -> None:
     """Seven bays of brick between pilaster strips, with lancets and a rose, under a frieze."""
-    area = (WIDTH, LEAN_TO_TOP, TOP, 0.5)
+    width = _bay_width(scene)
+    area = (width, scene.plan.lean_to_top, TOP, 0.5)
     hole = arch_outline(*LANCET, scene.segments(20))
     lancet = wall(scene, "Brick", area, hole, (0.14, 0.04))
     lancet.add(stones([(0, -0.04, 6.12, 1.2, 0.2, 0.1)], 0.02), "Limestone")
@@ -58,30 +58,46 @@ def church(scene: Scene) -> None:
         parts.append(foil.moved(*polar(0.14, angle)))
     rose.add(upright(join(parts)), "Limestone", (0, 0.16, height))
     rose.add(filled(hole, 0.3), "Glass")
-    x = np.delete(in_row(BAYS), BAYS // 2)
-    on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, BACK, sides=[EAST])
-    on_sides("Rose bay", [rose.mesh("Rose bay")], 0, BACK, sides=[EAST])
+    x = np.delete(in_row(scene, BAYS), BAYS // 2)
+    scene.plan.on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, scene.plan.back, sides=[EAST])
+    scene.plan.on_sides("Rose bay", [rose.mesh("Rose bay")], 0, scene.plan.back, sides=[EAST])
     frieze = Model(scene)
     strip = Model(scene)
     low = TOP - 0.62
     arch = arch_outline(0.17, low, TOP - 0.45, 0.17, scene.segments(10))
-    frieze.add(panel(WIDTH / 7, low, TOP - 0.1, arch, 0.14), "Brick")
-    frieze.add(stones([(-WIDTH / 14, 0.04, low - 0.05, 0.1, 0.14, 0.12)], 0.02), "Limestone")
-    on_sides("Frieze", [frieze.mesh("Frieze")], in_row(7 * BAYS) / 7, BACK - 0.13, sides=[EAST])
-    height = TOP - LEAN_TO_TOP - 0.1
-    strip.add(box((0.42, 0.16, height)), "Brick", (0, BACK - 0.06, LEAN_TO_TOP + height / 2))
-    on_sides("Pilaster strip", [strip.mesh("Pilaster strip")], in_row(BAYS + 1), sides=[EAST])
-    house(scene, EAST, (-BACK, BACK + 3.5), TOP, 14, "Brick")
+    frieze.add(panel(width / 7, low, TOP - 0.1, arch, 0.14), "Brick")
+    frieze.add(stones([(-width / 14, 0.04, low - 0.05, 0.1, 0.14, 0.12)], 0.02), "Limestone")
+    scene.plan.on_sides(
+        "Frieze",
+        [frieze.mesh("Frieze")],
+        in_row(scene, 7 * BAYS) / 7,
+        scene.plan.back - 0.13,
+        sides=[EAST],
+    )
+    height = TOP - scene.plan.lean_to_top - 0.1
+    strip.add(
+        box((0.42, 0.16, height)),
+        "Brick",
+        (0, scene.plan.back - 0.06, scene.plan.lean_to_top + height / 2),
+    )
+    scene.plan.on_sides(
+        "Pilaster strip", [strip.mesh("Pilaster strip")], in_row(scene, BAYS + 1), sides=[EAST]
+    )
+    house(scene, EAST, (-scene.plan.back, scene.plan.back + 3.5), TOP, 14, "Brick")
 
 
-def in_row(count: int) -> Array:
+def in_row(scene: Scene[Cloister], count: int) -> Array:
     """The x of `count` objects a bay's width apart, symmetric about 0."""
-    return (np.arange(count) - (count - 1) / 2) * WIDTH
+    return (np.arange(count) - (count - 1) / 2) * _bay_width(scene)
 
 
-def tower(scene: Scene) -> None:
+def _bay_width(scene: Scene[Cloister]) -> float:
+    return 2 * scene.plan.back / BAYS
+
+
+def tower(scene: Scene[Cloister]) -> None:
     """The tower: four sides alike about one core, under a pyramid of tiles."""
-    at = side(NORTH, (BACK + HALF, BACK + HALF, 0))
+    at = scene.plan.side(NORTH, (scene.plan.back + HALF, scene.plan.back + HALF, 0))
     place("Tower", core(scene).mesh("Tower"), at)
     opening = arch_outline(0.62, BELFRY + 0.5, TOWER_TOP - 1.3, 0.62, scene.segments(20))
     belfry = wall(scene, "Brick", (HALF, BELFRY, TOWER_TOP, 0.45), opening, (0.14, 0.05))

@@ -11,33 +11,37 @@ from scenes.library.plants import blade, folded_leaf
 from scenes.library.points import noise, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, copies, grid, join, transform
-from scenes.lone_monk.plan import ARCADE, BACK, CROSS_PATH, LAWN, PLAZA, WALK_FLOOR, on_sides
+from scenes.lone_monk.plan import CROSS_PATH, PLAZA, WALK_FLOOR, Cloister
 
 CELLS = 16  # of grass along a lawn's edge
-CELL = (LAWN - CROSS_PATH) / CELLS
 
 
-def paving(scene: Scene) -> None:
+def paving(scene: Scene[Cloister]) -> None:
     """The paths by the arcades and to the well, its plaza, the walks' floors, and bare earth."""
     scene.add("Ground", grid([-120, 120], [-120, 120], -0.03), "Dry earth")
     random = scene.random("paving")
     paths = Model(scene)
     plaza = Model(scene)
     coarser = min(1.0, scene.detail) ** -0.5
-    outer = ARCADE - 0.25
+    outer = scene.plan.arcade - 0.25
     slab = (0.52 * coarser, 0.41)
     tile = (0.3 * coarser, 0.3)
-    far = BACK + 0.1
-    paths.add(slabs(random, (-outer, LAWN, LAWN, outer), slab, 0.015), "Paving")
-    paths.add(slabs(random, (-CROSS_PATH, CROSS_PATH, PLAZA - 0.1, LAWN), slab, 0.015), "Paving")
+    far = scene.plan.back + 0.1
+    paths.add(
+        slabs(random, (-outer, scene.plan.lawn, scene.plan.lawn, outer), slab, 0.015), "Paving"
+    )
+    paths.add(
+        slabs(random, (-CROSS_PATH, CROSS_PATH, PLAZA - 0.1, scene.plan.lawn), slab, 0.015),
+        "Paving",
+    )
     paths.add(slabs(random, (-far, outer, outer, far), tile, WALK_FLOOR), "Terracotta floor")
     paths.add(stones([(0, outer - 0.15, 0.03, 1.75, 0.34, 0.1)], 0.015), "Paving")
     for radius in np.linspace(1.0, PLAZA - 0.145, 5):
         count = max(8, round(2 * np.pi * radius / slab[0]))
         ring = ring_of_stones(count, radius, 0.28, -0.045, 0.12)
         plaza.add(ring, "Paving", degrees=(0, 0, random.uniform(0, 60)))
-    on_sides("Paving", [paths.mesh("Paving")])
-    on_sides("Plaza", [plaza.mesh("Plaza")], sides=[0])
+    scene.plan.on_sides("Paving", [paths.mesh("Paving")])
+    scene.plan.on_sides("Plaza", [plaza.mesh("Plaza")], sides=[0])
 
 
 def slabs(random: Generator, area: Sequence[float], size: Sequence[float], top: float) -> Shape:
@@ -56,11 +60,12 @@ def slabs(random: Generator, area: Sequence[float], size: Sequence[float], top: 
     return stones(laid[np.hypot(laid[:, 0], laid[:, 1]) > PLAZA + 0.16])
 
 
-def lawns(scene: Scene) -> None:
+def lawns(scene: Scene[Cloister]) -> None:
     """Turf and grass; the corner of each lawn next to the well is cut round."""
     random = scene.random("lawns")
+    cell = (scene.plan.lawn - CROSS_PATH) / CELLS
     lawn = Model(scene)
-    along = np.linspace(CROSS_PATH, LAWN, 25)
+    along = np.linspace(CROSS_PATH, scene.plan.lawn, 25)
     x, y = np.meshgrid(along, along)
     bumps = 0.012 * noise(xyz(x, y) * 1.5, scene.seed) - 0.01
     lawn.add(grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps)), "Turf")
@@ -68,16 +73,16 @@ def lawns(scene: Scene) -> None:
     corner = np.arcsin(CROSS_PATH / PLAZA)
     arc = ring_of_stones(5, PLAZA + 0.05, 0.1, 0.0, 0.14, np.pi / 2 - 2 * corner)
     lawn.add(arc.transformed(transform(rotation=(0, 0, corner))), "Limestone")
-    for line, start in ((CROSS_PATH, PLAZA * np.cos(corner)), (LAWN, CROSS_PATH)):
-        length = (LAWN - start) / 9
+    for line, start in ((CROSS_PATH, PLAZA * np.cos(corner)), (scene.plan.lawn, CROSS_PATH)):
+        length = (scene.plan.lawn - start) / 9
         run = start + (np.arange(9) + 0.5) * length
         lawn.add(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)), "Limestone")
         lawn.add(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)), "Limestone")
-    on_sides("Lawn", [lawn.mesh("Lawn")])
+    scene.plan.on_sides("Lawn", [lawn.mesh("Lawn")])
     patches = []
     count = scene.count(150)
     for _ in range(6):  # squares of grass, with a daisy here and there
-        foot = xyz(*random.uniform(-CELL / 2, CELL / 2, (2, count)), -0.01)
+        foot = xyz(*random.uniform(-cell / 2, cell / 2, (2, count)), -0.01)
         forward = random.normal(0, (1, 1, 0), (count, 3))
         up = random.normal((0, 0, 1), 0.3, (count, 3))
         parts = [
@@ -90,8 +95,8 @@ def lawns(scene: Scene) -> None:
                 copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1)
             )
         patches.append(scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False))
-    x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * CELL
+    x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * cell
     x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
     turn = 90 * random.integers(4, size=len(x))
     size = random.uniform(0.95, 1.15, len(x))
-    on_sides("Grass", patches, x, y, 0, turn, size)
+    scene.plan.on_sides("Grass", patches, x, y, 0, turn, size)

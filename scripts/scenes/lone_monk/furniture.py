@@ -8,7 +8,7 @@ from scenes.library.points import points, polar, xyz
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import copies, join
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import ARCADE, BACK, NORTH, WALK_FLOOR, on_sides, side
+from scenes.lone_monk.plan import NORTH, WALK_FLOOR, Cloister
 
 # The well's rings of stones: how many, the radius of their middle, width, middle height, height.
 COURSES = [
@@ -72,7 +72,7 @@ JAR = [
 ]
 
 
-def well(scene: Scene) -> None:
+def well(scene: Scene[Cloister]) -> None:
     """Steps, a ring of stones, and an iron arch that carries pulley, rope and two buckets."""
     model = Model(scene)
     for count, radius, width, z, height in points(COURSES):
@@ -102,10 +102,10 @@ def well(scene: Scene) -> None:
     for path in (TAUT, SLACK):
         model.add(scene.bend(path, 0.013, 12, 6), "Rope")
     model.add(scene.tube(polar(0.13, coil, 0.003 * coil), 0.013, 6), "Rope", (-0.43, 0.53, 1.11))
-    place("Well", model.mesh("Well"), side(NORTH))
+    place("Well", model.mesh("Well"), scene.plan.side(NORTH))
     pail = bucket(scene).mesh("Bucket")
-    place("Bucket.0", pail, side(NORTH, (0.10, 0.01, 1.25)))
-    place("Bucket.1", pail, side(NORTH, (1.02, -0.62, 0.305), 34))
+    place("Bucket.0", pail, scene.plan.side(NORTH, (0.10, 0.01, 1.25)))
+    place("Bucket.1", pail, scene.plan.side(NORTH, (1.02, -0.62, 0.305), 34))
 
 
 def bucket(scene: Scene) -> Model:
@@ -123,15 +123,17 @@ def bucket(scene: Scene) -> Model:
     return model
 
 
-def benches(scene: Scene) -> None:
+def benches(scene: Scene[Cloister]) -> None:
     """Benches 1.6 m long along the walls of the walks, and three in the court."""
     seat = [scene.mesh("Bench", stones(BENCH, 0.006), "Wood", smooth=False)]
-    on_sides("Bench", seat, plan.BAY_AXES[[1, 5]], BACK - 0.32, WALK_FLOOR)
+    scene.plan.on_sides(
+        "Bench", seat, scene.plan.bay_axes[[1, -2]], scene.plan.back - 0.32, WALK_FLOOR
+    )
     for number, x in ((plan.EAST, 2.9), (NORTH, -3.3), (plan.WEST, 2.7)):
-        on_sides("Court bench", seat, x, ARCADE - 0.66, 0.015, sides=[number])
+        scene.plan.on_sides("Court bench", seat, x, scene.plan.arcade - 0.66, 0.015, sides=[number])
 
 
-def lanterns(scene: Scene) -> None:
+def lanterns(scene: Scene[Cloister]) -> None:
     """Lanterns of iron with a candle, hung under the vaults' bosses."""
     model = Model(scene)
     around = polar(0.11, np.arange(6) * np.pi / 3)
@@ -140,21 +142,23 @@ def lanterns(scene: Scene) -> None:
     bars = copies(scene.tube([(0, 0, -1.12), (0, 0, -0.82)], 0.008, 4), around)
     model.add(join([scene.tube([(0, 0, 0), (0, 0, -0.7)], 0.008, 5), roof, plate, bars]), "Iron")
     model.add(scene.lathe([(0.03, -1.12), (0.03, -0.97)], 8), "Daisy")
-    boss = (plan.WALK_MIDDLE, plan.SPRINGING + plan.VAULT_RISE - 0.1)
-    on_sides("Lantern", [model.mesh("Lantern")], plan.BAY_AXES[::2], *boss)
+    boss = (scene.plan.walk_middle, plan.SPRINGING + plan.VAULT_RISE - 0.1)
+    scene.plan.on_sides("Lantern", [model.mesh("Lantern")], scene.plan.bay_axes[::2], *boss)
 
 
-def jars(scene: Scene) -> None:
+def jars(scene: Scene[Cloister]) -> None:
     """Oil jars in the corners of the walks."""
     jar = Model(scene)
     jar.add(scene.lathe(JAR, 28, capped=False), "Pot")
     x, y, turn, size = points(
         [(0.4, -0.4, 50, 0.9), (0.95, -0.5, 180, 1.15), (1.5, -0.4, 280, 0.75)]
     ).T
-    on_sides("Jar", [jar.mesh("Jar")], x - BACK, y + BACK, WALK_FLOOR, turn, size)
+    scene.plan.on_sides(
+        "Jar", [jar.mesh("Jar")], x - scene.plan.back, y + scene.plan.back, WALK_FLOOR, turn, size
+    )
 
 
-def chair(scene: Scene) -> None:
+def chair(scene: Scene[Cloister]) -> None:
     """A ladder-back chair on the lawn with a book on it."""
     model = Model(scene)
     book = (0.03, -0.03, 0.468)
@@ -164,10 +168,10 @@ def chair(scene: Scene) -> None:
         model.add(scene.tube(np.reshape(ends, (2, 3)), radius), "Wood")
     model.add(stones([(0, 0, 0.012, 0.16, 0.22, 0.024)], 0.002), "Robe", book, turn)
     model.add(stones([(0.004, 0, 0.012, 0.155, 0.21, 0.02)], 0.001), "Daisy", book, turn)
-    place("Chair", model.mesh("Chair"), side(NORTH, (4.5, -2.2, 0.0), -63))
+    place("Chair", model.mesh("Chair"), scene.plan.side(NORTH, (*scene.plan.chair, 0.0), -63))
 
 
-def broom(scene: Scene) -> None:
+def broom(scene: Scene[Cloister]) -> None:
     """A broom against a column."""
     random = scene.random("broom")
     model = Model(scene)
@@ -175,4 +179,8 @@ def broom(scene: Scene) -> None:
     foot = random.normal((0, 0, 0.33), (0.02, 0.02, 0), (90, 3))
     down = random.normal((0, -0.25, -1), (0.22, 0.12, 0), (90, 3))
     model.add(copies(folded_leaf(0.03), foot, down, (0, 1, 0.2), 0.33), "Rope")
-    place("Broom", model.mesh("Broom"), side(plan.SOUTH, (-3.1, ARCADE - 0.62, 0.0), 11))
+    place(
+        "Broom",
+        model.mesh("Broom"),
+        scene.plan.side(plan.SOUTH, (-3.1, scene.plan.arcade - 0.62, 0.0), 11),
+    )

@@ -7,7 +7,7 @@ from scenes.library.plants import leaves_at
 from scenes.library.points import Array, Points, directions, points, polar, xyz
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import Shape, icosphere, join, sheet, transform, tube
-from scenes.lone_monk.plan import NORTH, side
+from scenes.lone_monk.plan import NORTH, Cloister
 
 # From hem to neck: height, radius, and how deep the folds are, as a part of it.
 ROBE = [
@@ -46,7 +46,7 @@ HAIR = [
 ]
 
 
-def monk(scene: Scene) -> None:
+def monk(scene: Scene[Cloister]) -> None:
     """The monk, 1.8 m high, facing +X."""
     model = Model(scene)
     around = np.linspace(0, 2 * np.pi, scene.segments(72, 12), endpoint=False)
@@ -76,8 +76,9 @@ def monk(scene: Scene) -> None:
         root = directions(random, n) * at[3:] + at[:3]
         hair = leaves_at(random, root, random.normal((x, y, z), 0.25, (n, 3)), length, 0.12)
         model.add(hair.transformed(HEAD), "Daisy")
+    x, y, turn = scene.plan.monk
     mesh = model.mesh("Monk", smooth=np.radians(50))
-    place("Monk", mesh, side(NORTH, (4.35, -0.25, 0.015), 177, 1.06))
+    place("Monk", mesh, scene.plan.side(NORTH, (x, y, 0.015), turn, 1.06))
 
 
 def garment(profile: Points, around: Array, folds: Array, depth: float) -> Shape:

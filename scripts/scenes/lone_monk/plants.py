@@ -16,7 +16,7 @@ from scenes.library.points import (
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import copies, icosphere
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import ARCADE, ARCADE_TOP, BAY, EAST, FRONT, LAWN, NORTH, SOUTH, WEST
+from scenes.lone_monk.plan import ARCADE_TOP, EAST, NORTH, SOUTH, WEST, Cloister
 
 OLIVE = Growth((1.35, 2.0, 0.95), (6, 9), (0.9, 0.9), (0.1, 0.12, 0.02), 0.27, 0.22, bare=0.75)
 # x, y, size
@@ -31,8 +31,8 @@ BOX_BALLS = [(5.3, 5.3), (1.45, 5.3), (5.3, 1.45), (1.45, 2.75), (2.75, 1.45)]  
 POT = [(0.12, 0), (0.175, 0.27), (0.195, 0.27), (0.2, 0.33), (0.175, 0.33), (0.165, 0.27)]
 
 
-def olive_tree(scene: Scene) -> None:
-    """An old olive on the north-western lawn: a gnarled trunk, crooked limbs, silvery leaves."""
+def olive_tree(scene: Scene[Cloister]) -> None:
+    """An old olive on a lawn: a gnarled trunk, crooked limbs, silvery leaves."""
     random = scene.random("olive")
     tree = Model(scene)
     wood, twigs = branches(scene, random, OLIVE)
@@ -42,7 +42,7 @@ def olive_tree(scene: Scene) -> None:
     leaf = folded_leaf(0.24)
     count = scene.count(320)
     tree.add(leaves_on(random, twigs, leaf, count, (0.05, 0.07), 0.1, 0.09), "Olive leaf")
-    place("Olive", tree.mesh("Olive"), plan.side(NORTH, (-3.5, 3.5, 0)))
+    place("Olive", tree.mesh("Olive"), scene.plan.side(NORTH, (*scene.plan.olive, 0)))
 
 
 def flame(t: Array) -> Array:
@@ -50,8 +50,8 @@ def flame(t: Array) -> Array:
     return np.sin(np.pi * (t * 0.93 + 0.05)) ** 0.6 * (1 - 0.45 * t)
 
 
-def cypresses(scene: Scene) -> None:
-    """A slim cypress on the north-eastern lawn, and tall ones beyond the western wall."""
+def cypresses(scene: Scene[Cloister]) -> None:
+    """A slim cypress on a lawn, and tall ones beyond the western wall."""
     random = scene.random("cypresses")
     count = scene.count(16000)
     tree = Model(scene)
@@ -66,45 +66,45 @@ def cypresses(scene: Scene) -> None:
     tree.add(scene.lathe(np.column_stack([0.36 * flame(t), 0.45 + 4.9 * t]), 10), "Cypress leaf")
     tree.add(scene.tube([(0, 0, -0.1), (0, 0, 2.5), (0, 0, 5.2)], [0.10, 0.08, 0.01]), "Bark")
     mesh = tree.mesh("Cypress")
-    place("Cypress", mesh, plan.side(NORTH, (3.6, 3.7, 0), 57, 0.95))
+    place("Cypress", mesh, scene.plan.side(NORTH, (*scene.plan.cypress, 0), 57, 0.95))
     x, y, size = points(BEYOND).T
-    plan.on_sides("Cypress", [mesh], x, y, 0, 70 * x, size, sides=[WEST])
+    scene.plan.on_sides("Cypress", [mesh], x, y, 0, 70 * x, size, sides=[WEST])
 
 
-def ivy(scene: Scene) -> None:
+def ivy(scene: Scene[Cloister]) -> None:
     """Ivy that climbs the south-western pier, spreads over two bays, and hangs from the eaves."""
     random = scene.random("ivy")
     count = scene.count(26000)
     model = Model(scene)
     from_pier = random.random(count) ** 1.4
-    x = ARCADE - 4.6 * from_pier
+    x = scene.plan.arcade - 4.6 * from_pier
     z = random.uniform(0.0, ARCADE_TOP - 0.1, count)
-    from_axis = np.abs((x - ARCADE) / BAY % 1 - 0.5) * BAY
+    from_axis = np.abs((x - scene.plan.arcade) / scene.plan.bay % 1 - 0.5) * scene.plan.bay
     in_arch = (z > 0.62) & (np.hypot(from_axis, np.maximum(z - plan.SPRINGING, 0)) < 0.95)
     thick = 0.9 * noise(xyz(x, 0, z) * 0.9, scene.seed + 5, 3) + 0.13 * z - 0.95 * from_pier
     grows = (thick > -0.2) & ~in_arch
     x = x[grows]
     z = z[grows]
     count = int(grows.sum())
-    spots = xyz(x, ivy_face(x, z) - random.uniform(0.01, 0.10, count), z)
+    spots = xyz(x, ivy_face(scene.plan, x, z) - random.uniform(0.01, 0.10, count), z)
     forward = random.normal((0, -0.4, -1), (0.7, 0.2, 0), (count, 3))
     up = random.normal((0, -1, 0.4), (0.3, 0, 0.3), (count, 3))
     leaves = copies(folded_leaf(0.9), spots, forward, up, random.uniform(0.05, 0.085, count))
     model.add(leaves, "Ivy leaf")
     z = np.linspace(0.0, ARCADE_TOP - 0.4, 7)
     for _ in range(9):
-        x = ARCADE - np.cumsum(random.uniform(0.0, 0.5, 7))
-        model.add(scene.bend(xyz(x, ivy_face(x, z + 1), z), 0.012, 20, 6), "Bark")
-    place("Ivy", model.mesh("Ivy"), plan.side(SOUTH))
+        x = scene.plan.arcade - np.cumsum(random.uniform(0.0, 0.5, 7))
+        model.add(scene.bend(xyz(x, ivy_face(scene.plan, x, z + 1), z), 0.012, 20, 6), "Bark")
+    place("Ivy", model.mesh("Ivy"), scene.plan.side(SOUTH))
 
 
-def ivy_face(x: Array, z: Array) -> Array:
+def ivy_face(plan: Cloister, x: Array, z: Array) -> Array:
     """How far out the face of pier, low wall or arcade is that ivy clings to."""
-    on_wall = np.where(z < 0.62, ARCADE - 0.34, FRONT - 0.02)
-    return np.where(x > ARCADE - 0.42, ARCADE - 0.36, on_wall)
+    on_wall = np.where(z < 0.62, plan.arcade - 0.34, plan.front - 0.02)
+    return np.where(x > plan.arcade - 0.42, plan.arcade - 0.36, on_wall)
 
 
-def geraniums(scene: Scene) -> None:
+def geraniums(scene: Scene[Cloister]) -> None:
     """Pots of geraniums beside the gates, and smaller ones on the low walls."""
     random = scene.random("geraniums")
     pots = []
@@ -121,14 +121,17 @@ def geraniums(scene: Scene) -> None:
             model.add(stalk, "Box leaf")
         pots.append(model.mesh("Geranium"))
     for number in plan.SIDES:
-        x = np.delete(plan.BAY_AXES, 3)[random.random(6) < 0.6]
+        x = np.delete(scene.plan.bay_axes, scene.plan.bays // 2)
+        x = x[random.random(len(x)) < 0.6]
         x = x + random.uniform(-0.4, 0.4, len(x))
-        place_on = (x, ARCADE - 0.05, plan.STYLOBATE, 300 * x, 0.72)
-        plan.on_sides("Small geranium", pots, *place_on, sides=[number])
-    plan.on_sides("Geranium", pots, (-1.22, 1.22), ARCADE - 0.62, 0.015, (0, 130), 1.15)
+        place_on = (x, scene.plan.arcade - 0.05, plan.STYLOBATE, 300 * x, 0.72)
+        scene.plan.on_sides("Small geranium", pots, *place_on, sides=[number])
+    scene.plan.on_sides(
+        "Geranium", pots, (-1.22, 1.22), scene.plan.arcade - 0.62, 0.015, (0, 130), 1.15
+    )
 
 
-def shrubs(scene: Scene) -> None:
+def shrubs(scene: Scene[Cloister]) -> None:
     """Clipped box balls at the lawns' corners, and lavender along the sunny kerbs."""
     random = scene.random("shrubs")
     balls = [Model(scene), Model(scene)]
@@ -138,10 +141,10 @@ def shrubs(scene: Scene) -> None:
         ball.add(icosphere(2, 0.27), "Turf")
     meshes = [ball.mesh("Box ball") for ball in balls]
     for number in plan.SIDES:
-        away = [plan.side(number, (*spot, 0)).translation.length > 3.2 for spot in spots]
+        away = [scene.plan.side(number, (*spot, 0)).translation.length > 3.2 for spot in spots]
         x, y = spots[away].T  # where no rig is near
         size = random.uniform(0.85, 1.15, len(x))
-        plan.on_sides("Box ball", meshes, x, y, 0.3, 50 * size, size, sides=[number])
+        scene.plan.on_sides("Box ball", meshes, x, y, 0.3, 50 * size, size, sides=[number])
     bushes = []
     for _ in range(2):
         model = Model(scene)
@@ -156,21 +159,21 @@ def shrubs(scene: Scene) -> None:
             forward = directions(random, count) + lean
             model.add(leaves_at(random, lean * (tall + below), forward, 0.032, 0.7), "Lavender")
         bushes.append(model.mesh("Lavender"))
-    x = np.arange(1.95, LAWN - 0.85, 0.42)
+    x = np.arange(1.95, scene.plan.lawn - 0.85, 0.42)
     size = random.uniform(0.8, 1.1, len(x))
     sunny = (NORTH, EAST, WEST)
-    plan.on_sides("Lavender", bushes, x, LAWN - 0.3, 0, 200 * x, size, sides=sunny)
+    scene.plan.on_sides("Lavender", bushes, x, scene.plan.lawn - 0.3, 0, 200 * x, size, sides=sunny)
 
 
-def fallen_leaves(scene: Scene) -> None:
+def fallen_leaves(scene: Scene[Cloister]) -> None:
     """Dry leaves on the paths and lawns, thicker along the walls."""
     random = scene.random("fallen leaves")
     count = scene.count(1500)
     inwards = random.random((2, count)) ** 1.7
-    x, y = (ARCADE - 0.4) * (1 - inwards) * random.choice([-1, 1], (2, count))
+    x, y = (scene.plan.arcade - 0.4) * (1 - inwards) * random.choice([-1, 1], (2, count))
     at = xyz(x, y, random.uniform(0.022, 0.03, count))[np.hypot(x, y) > 1.6]
     forward = random.normal((0, 0, 0.2), (1, 1, 0.1), at.shape)
     up = random.normal((0, 0, 1), 0.3, at.shape)
     size = random.uniform(0.04, 0.075, len(at))
     shape = copies(folded_leaf(0.55), at, forward, up, size)
-    scene.add("Fallen leaves", shape, "Dead leaf", matrix=plan.side(NORTH), smooth=False)
+    scene.add("Fallen leaves", shape, "Dead leaf", matrix=scene.plan.side(NORTH), smooth=False)

@@ -10,7 +10,7 @@ from scenes.library.points import Array, circle, points, polar, xyz
 from scenes.library.scene import SHARP, Model, Scene, place
 from scenes.library.shapes import Shape, copies, join, prism, sheet, transform
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import BACK, EAVE, EAVE_OUT, FRONT, LEAN_TO_TOP, SLOPE, on_sides, side
+from scenes.lone_monk.plan import EAVE, EAVE_OUT, SLOPE, Cloister
 
 PITCH = 0.215  # from cover to cover
 EXPOSED = 0.36  # the visible length of a tile
@@ -90,28 +90,30 @@ def eaves(model: Model, ends: tuple[float, float], y: float, z: float) -> None:
     model.add(stones(fascia, 0.005), "Wood")
 
 
-def lean_to_roofs(scene: Scene) -> None:
+def lean_to_roofs(scene: Scene[Cloister]) -> None:
     """The tiled roofs over the walks; they meet in valleys over the court's corners."""
     model = Model(scene)
-    y = FRONT - EAVE_OUT
-    x = np.arange(-BACK + 0.1, BACK, PITCH)
-    rows = round((BACK - y) / UP)
+    y = scene.plan.front - EAVE_OUT
+    x = np.arange(-scene.plan.back + 0.1, scene.plan.back, PITCH)
+    rows = round((scene.plan.back - y) / UP)
     first = np.maximum(0, np.ceil((np.abs(x) - y) / UP))
     is_laid = first < rows
     x = x[is_laid]
     first = first[is_laid]
     for number in plan.SIDES:
-        slope = side(number, (0, y, EAVE + 0.01)) @ transform(rotation=(SLOPE, 0, 0))
+        slope = scene.plan.side(number, (0, y, EAVE + 0.01)) @ transform(rotation=(SLOPE, 0, 0))
         lay_tiles(scene, f"Lean-to {number}", slope, x, first, rows)
-    top_left = (-BACK, BACK, LEAN_TO_TOP)
-    top_right = (BACK, BACK, LEAN_TO_TOP)
+    top_left = (-scene.plan.back, scene.plan.back, scene.plan.lean_to_top)
+    top_right = (scene.plan.back, scene.plan.back, scene.plan.lean_to_top)
     model.add(deck([(-y, y, EAVE), (y, y, EAVE), top_right, top_left]), "Wood")
     model.add(scene.tube([(0.05 - y, y - 0.05, EAVE + 0.03), top_left], 0.09), "Lead")
-    flashing = [(0, BACK - 0.05, LEAN_TO_TOP + 0.07, 2 * BACK, 0.14, 0.14)]
+    flashing = [
+        (0, scene.plan.back - 0.05, scene.plan.lean_to_top + 0.07, 2 * scene.plan.back, 0.14, 0.14)
+    ]
     model.add(stones(flashing, 0.03), "Limestone")
     eaves(model, (0.2 - y, y - 0.2), y, EAVE)
     model.add(gutter(scene, y - 0.06), "Lead")
-    on_sides("Lean-to", [model.mesh("Lean-to")])
+    scene.plan.on_sides("Lean-to", [model.mesh("Lean-to")])
 
 
 def gutter(scene: Scene, y: float) -> Shape:
@@ -129,19 +131,24 @@ def gutter(scene: Scene, y: float) -> Shape:
 
 
 def house(
-    scene: Scene, number: int, ends: tuple[float, float], top: float, rows: int, stuff: str
+    scene: Scene[Cloister],
+    number: int,
+    ends: tuple[float, float],
+    top: float,
+    rows: int,
+    stuff: str,
 ) -> None:
     """The house behind an upper wall: its body, gables, tiled slope, ridge, and eaves."""
     model = Model(scene)
     left, right = ends
     edge = top - 0.02
-    y = BACK - EAVE_OUT
+    y = scene.plan.back - EAVE_OUT
     middle = (left + right) / 2
     length = right - left
     ridge_y = y + rows * UP
     ridge_z = edge + rows * EXPOSED * np.sin(SLOPE)
-    near = BACK + 0.42
-    far = 2 * ridge_y - BACK
+    near = scene.plan.back + 0.42
+    far = 2 * ridge_y - scene.plan.back
     far_eave = 2 * ridge_y - y
     gable = [(near, 0), (far, 0), (far, top - 0.1), (ridge_y, ridge_z - 0.25), (near, top - 0.1)]
     model.add(prism(gable, length), stuff, (left, 0, 0), (90, 0, 90))
@@ -151,9 +158,9 @@ def house(
         model.add(deck([*lower_edge, *upper_edge]), "Wood")
     eaves(model, ends, y, edge)
     model.add(ridge(scene, ends, 0.13), "Roof tile", (0, ridge_y, ridge_z))
-    strings = [(BACK - 0.04, top - 0.2, length, 0.16, 0.12)]
-    strings += [(BACK - 0.02, LEAN_TO_TOP + 0.16, length, 0.10, 0.08)]
+    strings = [(scene.plan.back - 0.04, top - 0.2, length, 0.16, 0.12)]
+    strings += [(scene.plan.back - 0.02, scene.plan.lean_to_top + 0.16, length, 0.10, 0.08)]
     model.add(stones([(middle, *string) for string in strings], 0.02), "Limestone")
-    on_sides("House", [model.mesh("House")], sides=[number])
-    slope = side(number, (0, y, top)) @ transform(rotation=(SLOPE, 0, 0))
+    scene.plan.on_sides("House", [model.mesh("House")], sides=[number])
+    slope = scene.plan.side(number, (0, y, top)) @ transform(rotation=(SLOPE, 0, 0))
     lay_tiles(scene, f"Roof {number}", slope, np.arange(left + 0.05, right, PITCH), 0, rows)

@@ -9,14 +9,13 @@ from scenes.library.points import Array, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, join, sheet, transform
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import ARCADE, BACK, BACK_WALL, LEAN_TO_TOP, WALK_FLOOR, on_sides
+from scenes.lone_monk.plan import BACK_WALL, WALK_FLOOR, Cloister
 from scenes.lone_monk.roofs import house, ridge
 
 # Arched openings: half their width, and the heights of sill, springing, and the arch over it.
 DOORWAY = (0.56, WALK_FLOOR, 1.85, 0.42)
 WINDOW = (0.38, 1.15, 1.80, 0.38)
 UPPER_WINDOW = (0.42, 6.0, 6.62, 0.12)
-WALK_WALL = (plan.BAY, 0.0, LEAN_TO_TOP, BACK_WALL)  # of a bay: width, foot, top, thickness
 # A shutter's frame: middle x, y, z and width, depth, height.
 SHUTTER = [
     (-0.19, 0, 0, 0.05, 0.035, 0.74),
@@ -55,11 +54,16 @@ def glaze(model: Model, opening: Array, y: float, bars: int, stuff: str) -> None
     model.add(join([posts, blocks(xyz(0, y - 0.03, z), (right - left, 0.025, 0.02), 0.003)]), stuff)
 
 
+def _walk_wall(scene: Scene[Cloister]) -> tuple[float, float, float, float]:
+    """The wall of a bay of a walk: its width, foot, top and thickness."""
+    return scene.plan.bay, 0.0, scene.plan.lean_to_top, BACK_WALL
+
+
 def doorway(scene: Scene, y: float) -> Model:
     """A wall of the walks with a door of planks, iron straps, nails and a ring at depth y."""
     half, sill, springing, rise = DOORWAY
     hole = arch_outline(*DOORWAY, scene.segments(16))
-    model = wall(scene, "Whitewash", WALK_WALL, hole, (0.16, 0.05))
+    model = wall(scene, "Whitewash", _walk_wall(scene), hole, (0.16, 0.05))
     model.add(filled(hole, y + 0.03), "Wood")
     edges = np.linspace(-half, half, 8)
     for x in zip(edges[:-1] + 0.004, edges[1:] - 0.004, strict=True):
@@ -74,55 +78,65 @@ def doorway(scene: Scene, y: float) -> Model:
     return model
 
 
-def back_walls(scene: Scene) -> None:
+def back_walls(scene: Scene[Cloister]) -> None:
     """The walls behind the walks: whitewashed, with doors and windows by turns."""
     hole = arch_outline(*WINDOW, scene.segments(16))
-    window = wall(scene, "Whitewash", WALK_WALL, hole, (0.1, 0.03))
+    window = wall(scene, "Whitewash", _walk_wall(scene), hole, (0.1, 0.03))
     window.add(stones([(0, -0.02, 1.11, 1.0, 0.16, 0.08)]), "Limestone")
     glaze(window, hole, 0.3, 3, "Lead")
     bays = window.mesh("Wall with window"), doorway(scene, 0.22).mesh("Wall with door")
     for number in plan.SIDES:
-        for i, x in enumerate(plan.BAY_AXES):
-            bay = bays[i in (3, number * 2 % 7)]
-            on_sides(f"Wall.{i}", [bay], x, BACK, sides=[number])
+        for i, x in enumerate(scene.plan.bay_axes):
+            bay = bays[i in (scene.plan.bays // 2, number * 2 % scene.plan.bays)]
+            scene.plan.on_sides(f"Wall.{i}", [bay], x, scene.plan.back, sides=[number])
     ends = Model(scene)
-    width = BACK - ARCADE
-    top = LEAN_TO_TOP
-    for x in (-ARCADE - width / 2, ARCADE + width / 2):
-        ends.add(box((width, BACK_WALL, top)), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))
-    ends.add(stones([(0, BACK - 0.02, WALK_FLOOR + 0.1, 2 * BACK, 0.06, 0.2)]), "Limestone")
-    on_sides("Wall ends", [ends.mesh("Wall ends")])
+    width = scene.plan.back - scene.plan.arcade
+    top = scene.plan.lean_to_top
+    for x in (-scene.plan.arcade - width / 2, scene.plan.arcade + width / 2):
+        ends.add(
+            box((width, BACK_WALL, top)), "Whitewash", (x, scene.plan.back + BACK_WALL / 2, top / 2)
+        )
+    ends.add(
+        stones([(0, scene.plan.back - 0.02, WALK_FLOOR + 0.1, 2 * scene.plan.back, 0.06, 0.2)]),
+        "Limestone",
+    )
+    scene.plan.on_sides("Wall ends", [ends.mesh("Wall ends")])
 
 
-def upper_storeys(scene: Scene) -> None:
+def upper_storeys(scene: Scene[Cloister]) -> None:
     """The storeys above the walks in the north and south, with shutters at their windows."""
     hole = arch_outline(*UPPER_WINDOW, scene.segments(16))
     bays = 8
-    width = 2 * BACK / bays
+    width = 2 * scene.plan.back / bays
     slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
     slats = copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))
     shutter = join([stones(SHUTTER, 0.006), slats])  # one wing, 0.42 by 0.72 m, about its middle
-    for number, top, left in ((plan.NORTH, 7.7, -BACK - 0.5), (plan.SOUTH, 7.2, -BACK)):
+    for number, top, left in (
+        (plan.NORTH, 7.7, -scene.plan.back - 0.5),
+        (plan.SOUTH, 7.2, -scene.plan.back),
+    ):
         meshes = []
         for swing in (21, 7, 7, 7):
-            bay = wall(scene, "Plaster", (width, LEAN_TO_TOP, top, 0.4), hole, (0.1, 0.03))
+            bay = wall(
+                scene, "Plaster", (width, scene.plan.lean_to_top, top, 0.4), hole, (0.1, 0.03)
+            )
             bay.add(stones([(0, -0.03, 5.95, 1.1, 0.18, 0.1)], 0.015), "Limestone")
             glaze(bay, hole, 0.22, 1, "Wood")
             for sign in (-1, 1):
                 wing = shutter.moved(0.22 * sign, 0, 0)
                 bay.add(wing, "Wood", (0.53 * sign, -0.05, 6.36), (0, 0, sign * swing))
             meshes.append(bay.mesh("Upper wall"))
-        x = (np.arange(bays) + 0.5) * width - BACK
-        on_sides("Upper wall", meshes, x, BACK, sides=[number])
-        house(scene, number, (left, left + 2 * BACK + 0.5), top, 12, "Plaster")
+        x = (np.arange(bays) + 0.5) * width - scene.plan.back
+        scene.plan.on_sides("Upper wall", meshes, x, scene.plan.back, sides=[number])
+        house(scene, number, (left, left + 2 * scene.plan.back + 0.5), top, 12, "Plaster")
 
 
-def west_wall(scene: Scene) -> None:
+def west_wall(scene: Scene[Cloister]) -> None:
     """The low western wall, over which the sun comes in, under a row of ridge tiles."""
     model = Model(scene)
-    y = BACK + BACK_WALL / 2
-    z = LEAN_TO_TOP + 0.2
-    model.add(box((2 * BACK + 1, BACK_WALL, 0.4)), "Plaster", (0, y, z - 0.1))
-    coping = ridge(scene, (-BACK - 0.3, BACK + 0.3), 0.28)
+    y = scene.plan.back + BACK_WALL / 2
+    z = scene.plan.lean_to_top + 0.2
+    model.add(box((2 * scene.plan.back + 1, BACK_WALL, 0.4)), "Plaster", (0, y, z - 0.1))
+    coping = ridge(scene, (-scene.plan.back - 0.3, scene.plan.back + 0.3), 0.28)
     model.add(coping, "Roof tile", (0, y, z + 0.1), scale=(1, 1, 0.55))
-    on_sides("West wall", [model.mesh("West wall")], sides=[plan.WEST])
+    scene.plan.on_sides("West wall", [model.mesh("West wall")], sides=[plan.WEST])

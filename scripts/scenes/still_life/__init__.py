@@ -10,10 +10,11 @@ from functools import partial
 from scenes.library.scene import fill
 from scenes.still_life import board, chick, fruit, vessels
 from scenes.still_life.materials import palette
+from scenes.still_life.plan import ORIGINAL, drawn
 
 ELEMENTS = (
     *(board.lamps, board.board, board.cloth, board.pearls, vessels.kettle, vessels.carafe),
     *(vessels.wineglass, vessels.candle, vessels.bowl, vessels.knife),
     *(fruit.pears, fruit.grapes, fruit.lemons, chick.chick),
 )
-build = partial(fill, palette, ELEMENTS)
+build = partial(fill, palette, ELEMENTS, drawn=drawn, original=ORIGINAL)

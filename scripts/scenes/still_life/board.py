@@ -6,8 +6,8 @@ from scenes.library.lights import area_light, hdri_world
 from scenes.library.points import noise, points, smooth_path, smoothstep, unit, xyz
 from scenes.library.scene import Scene
 from scenes.library.shapes import copies, sheet, towards
+from scenes.still_life.plan import RADIUS, STRING, StillLife
 
-RADIUS = 0.3
 PROFILE = [
     (0.262, -0.044),
     (0.284, -0.042),
@@ -18,31 +18,12 @@ PROFILE = [
     (0.291, -0.002),
     (0.283, 0),
 ]
-# On the board, from the kettle round the chick, over itself, to the rim.
-STRING = [
-    (-0.215, -0.035),
-    (-0.2, -0.09),
-    (-0.17, -0.135),
-    (-0.19, -0.185),
-    (-0.145, -0.215),
-    (-0.095, -0.23),
-    (-0.05, -0.205),
-    (-0.045, -0.16),
-]
-# A window on the left, a cool rim behind, a low fill, and one above: place, width and height in
-# metres, watts, and colour.
-LAMPS = [
-    (-1.7, -1.1, 1.9, 1.0, 1.3, 56, 1.0, 0.90, 0.76),
-    (1.6, 1.5, 1.3, 0.7, 1.1, 32, 0.72, 0.85, 1.0),
-    (1.5, -1.9, 0.9, 1.2, 0.8, 12, 1.0, 0.95, 0.90),
-    (0.0, 0.2, 2.4, 0.9, 0.9, 14, 1.0, 0.97, 0.93),
-]
 
 
-def lamps(scene: Scene) -> None:
+def lamps(scene: Scene[StillLife]) -> None:
     """Area lamps that look at the board's middle, in a dim room."""
-    hdri_world("interior.exr", 0.45, np.radians(-40))
-    for number, row in enumerate(points(LAMPS)):
+    hdri_world(scene.plan.room, scene.plan.room_strength, np.radians(scene.plan.room_turned))
+    for number, row in enumerate(points(scene.plan.lamps)):
         at, size, watts, color = np.split(row, [3, 5, 6])
         lamp = area_light(f"Lamp {number}", towards(at, -at), tuple(size), watts[0], color)
         lamp.visible_camera = False

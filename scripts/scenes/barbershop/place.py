@@ -1,0 +1,183 @@
+"""Draws barbershops: another size, other colours and woods, another hour, other furniture."""
+
+from collections.abc import Mapping
+
+from scenes.barbershop.plan import WARM, Barbershop, Light
+from scenes.library.materials import Color
+from scenes.library.variation import Draw, Factors
+
+AS_IT_IS: Factors = (1.0, 1.0, 1.0)
+
+# Factors of the materials' colours. Materials with a comma share theirs.
+TINTS = {
+    "Wallpaper": (
+        AS_IT_IS,
+        (7.0, 0.9, 0.8),
+        (1.2, 1.4, 4.0),
+        (9.0, 5.0, 3.5),
+        (4.0, 1.8, 3.0),
+        (0.6, 0.35, 0.5),
+    ),
+    "Plaster": (AS_IT_IS, (0.55, 0.85, 1.4), (1.1, 0.7, 0.75), (0.6, 0.95, 0.95), (1.3, 1.45, 1.9)),
+    "Mahogany, Mahogany x": (
+        AS_IT_IS,
+        (3.0, 5.0, 5.5),
+        (0.35, 0.6, 0.8),
+        (4.5, 12.0, 22.0),
+        (0.5, 2.2, 3.2),
+    ),
+    "Cream tile": (AS_IT_IS, (1.05, 0.6, 0.45), (0.6, 0.85, 1.15), (0.3, 0.33, 0.4)),
+    "Black tile": (AS_IT_IS, (9.0, 1.5, 1.0), (1.5, 5.0, 9.0), (3.0, 8.0, 5.0), (14.0, 13.0, 12.0)),
+    "Green glaze 0, Green glaze 1, Green glaze 2": (
+        AS_IT_IS,
+        (14.0, 0.5, 0.5),
+        (1.2, 0.9, 5.0),
+        (25.0, 4.2, 0.8),
+        (1.0, 0.25, 0.4),
+        (32.0, 7.0, 9.0),
+    ),
+    "Cream glaze 0, Cream glaze 1, Cream glaze 2": (
+        AS_IT_IS,
+        (0.7, 0.95, 1.3),
+        (1.1, 0.8, 0.75),
+        (0.7, 0.9, 0.75),
+        (1.15, 1.2, 1.35),
+    ),
+    "Oxblood, Tan": (
+        AS_IT_IS,
+        (0.25, 2.0, 3.0),
+        (0.2, 0.7, 6.0),
+        (3.2, 22.0, 18.0),
+        (0.1, 0.8, 0.9),
+    ),
+    "Tin": (AS_IT_IS, (0.9, 0.6, 0.4), (0.5, 0.6, 0.75), (1.3, 1.4, 1.7)),
+    "Marble": (AS_IT_IS, (0.15, 0.16, 0.18), (0.9, 0.65, 0.55), (0.45, 0.65, 0.5)),
+    "Rug red": (AS_IT_IS, (0.15, 3.0, 5.0), (1.2, 6.0, 1.5), (0.5, 2.5, 1.5)),
+    "Rug navy": (AS_IT_IS, (8.0, 2.0, 0.5), (1.0, 1.5, 0.5)),
+    "Brick": (AS_IT_IS, (1.8, 2.6, 3.2), (0.6, 0.9, 1.1)),
+    "Brass, Gilt": (AS_IT_IS, (1.1, 1.7, 4.5), (1.1, 0.8, 1.3)),
+    "White towel": (AS_IT_IS, (0.2, 0.5, 0.6), (1.0, 0.7, 0.5)),
+    "Iron": (AS_IT_IS, (15.0, 14.0, 12.0), (2.0, 8.0, 6.0)),
+}
+# What may be left out, and how often it is there.
+PROBABILITIES: Mapping[str, float] = {
+    "wall_lettering": 0.6,
+    "beam": 0.6,
+    "palmette": 0.6,
+    "medallion": 0.6,
+    "rug": 0.6,
+    "hair_clippings": 0.6,
+    "fan_blade": 0.8,
+    "wall_lamp": 0.7,
+    "floor_drain": 0.6,
+    "entrance_mat": 0.7,
+    "window_letters": 0.7,
+    "door_sign": 0.7,
+    "valance": 0.6,
+    "street_lamp": 0.7,
+    "ashtray": 0.6,
+    "magazines": 0.7,
+    "hat_box": 0.6,
+    "radio": 0.7,
+    "towel_steamer": 0.7,
+    "coats": 0.6,
+    "umbrella_stand": 0.7,
+    "fedora": 0.6,
+    "bowler_hat": 0.6,
+    "pictures": 0.75,
+    "clock": 0.8,
+    "barber_pole": 0.7,
+    "broom": 0.7,
+    "dustpan": 0.6,
+    "waste_bins": 0.7,
+    "telephone": 0.7,
+    "card_box": 0.6,
+    "desk_bell": 0.6,
+    "till": 0.8,
+    "stool": 0.7,
+}
+# These are nothing without what they belong to.
+TOGETHER = {
+    "umbrella_stand": ("umbrellas",),
+    "fan_blade": ("fan_motor",),
+}
+# What belongs to the walls, the floor and the ceiling, or is built in, and takes their size.
+STRETCHED = frozenset(
+    [
+        "walls",
+        "wall_lettering",
+        "grout",
+        "beam",
+        "picture_rail",
+        "palmette",
+        "tiles",
+        "metro_tiles",
+        "wainscot",
+        "ceiling",
+        "window_frame",
+        "window_pane",
+        "window_letters",
+        "door_frame",
+        "door",
+        "door_pane",
+        "transom_pane",
+        "staff_door_frame",
+        "staff_door",
+        "valance",
+        "street",
+        "reception_desk",
+        "waiting_bench",
+        "display_cabinet",
+        "back_cupboard",
+        "low_table",
+        "lights",
+        "counter_drawers",
+        "counter_doors",
+        "counter_top",
+        "bulb_strip",
+        "mirror_tube",
+        "tool_mat",
+        "towel_rail",
+        "mirrors",
+        "towel_shelves",
+        "radiator_section",
+        "radiator_pipes",
+    ]
+)
+# Sky, its colour, sun and daylight in watts, the colour of both, and the lamps' factor.
+Hour = tuple[float, Color, float, float, Color, float]
+HOURS: tuple[Hour, ...] = (
+    (1.6, (0.72, 0.86, 1.0), 260, 45, (1.0, 0.86, 0.66), 1.0),
+    (1.8, (0.80, 0.90, 1.0), 420, 80, (1.0, 0.95, 0.86), 0.45),
+    (1.1, (0.85, 0.90, 0.95), 0, 70, (0.9, 0.95, 1.0), 0.8),
+    (0.9, (1.0, 0.62, 0.40), 300, 30, (1.0, 0.55, 0.28), 0.7),
+    (0.06, (0.25, 0.38, 0.8), 0, 3, (0.5, 0.65, 1.0), 1.1),
+    (0.015, (0.3, 0.4, 0.7), 0, 1, (1.0, 0.7, 0.4), 0.6),
+)
+LAMP_COLORS: tuple[Color, ...] = (WARM, (1.0, 0.68, 0.40), (1.0, 0.92, 0.82), (0.85, 0.95, 1.0))
+
+
+def drawn(place: int) -> Barbershop:
+    """The plan of a place. Its rooms are never narrower than the rigs need."""
+    draw = Draw(place)
+    absent = draw.absent(PROBABILITIES)
+    absent |= {name for owner in absent for name in TOGETHER.get(owner, ())}
+    sky, sky_color, sun, daylight, color, lamps = draw.choice("hour", HOURS)
+    return Barbershop(
+        absent=absent,
+        tints=draw.tints(TINTS),
+        stretch=(draw.uniform("width", 1.0, 1.16), draw.uniform("length", 1.0, 1.2)),
+        stretched=STRETCHED,
+        chair_turns=tuple(draw.uniform(f"chair {number}", 30, 150) for number in range(3)),
+        light=Light(
+            sky=round(sky * draw.uniform("sky", 0.8, 1.2), 4),
+            sky_color=sky_color,
+            sun=round(sun * draw.uniform("sun", 0.7, 1.3), 4),
+            sun_color=color,
+            sun_x=draw.uniform("sun x", -3.5, 2.5),
+            daylight=daylight,
+            daylight_color=color if sun else sky_color,
+            lamps=round(lamps * draw.uniform("lamps", 0.75, 1.3), 4),
+            lamp_color=draw.choice("lamp color", LAMP_COLORS),
+        ),
+    )

@@ -1,0 +1,170 @@
+"""Places: a number draws a scene's layout, materials and light. Without it nothing changes."""
+
+import shutil
+from importlib import import_module
+
+import bpy
+import numpy as np
+import pytest
+
+from lightfield.dataset import keys, names
+from lightfield.dataset.config import SceneSource
+from lightfield.dataset.job_settings import BuildSettings
+from lightfield.dataset.keys import scene_fingerprint
+from scenes.library.variation import Draw
+
+# Each builder with the modules that draw its places and that hold its original.
+DRAWING = {
+    "barbershop": ("place", "plan"),
+    "garden": ("place", "plan"),
+    "lone_monk": ("place", "plan"),
+    "rooms": ("place", None),
+    "still_life": ("plan", "plan"),
+}
+PLACES = range(40)
+
+
+def drawn(builder, place):
+    return import_module(f"scenes.{builder}.{DRAWING[builder][0]}").drawn(place)
+
+
+def build(builder, **parameters):
+    """Build a scene from an empty file."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    parameters = {"seed": 1, "detail": 0.02} | parameters
+    import_module(f"scenes.{builder}").build(parameters)
+    return {obj.name: np.array(obj.matrix_world) for obj in bpy.data.objects}
+
+
+def element_names(builder):
+    return {element.__name__ for element in import_module(f"scenes.{builder}").ELEMENTS}
+
+
+@pytest.mark.parametrize("builder", DRAWING)
+def test_a_place_is_drawn_the_same_each_time_and_no_two_are_equal(builder):
+    plans = [repr(drawn(builder, place)) for place in PLACES]
+    assert plans[3] == repr(drawn(builder, 3))
+    assert len(set(plans)) == len(plans)
+
+
+@pytest.mark.parametrize("builder", DRAWING)
+def test_a_place_names_elements_that_the_scene_has(builder):
+    for place in PLACES:
+        plan = drawn(builder, place)
+        assert {*plan.absent, *plan.moves} <= element_names(builder)
+
+
+@pytest.mark.parametrize("builder", [name for name, (_, original) in DRAWING.items() if original])
+def test_the_original_moves_omits_and_tints_nothing(builder):
+    original = import_module(f"scenes.{builder}.plan").ORIGINAL
+    assert not (original.absent or original.moves or original.tints)
+
+
+def test_a_scene_without_a_place_keeps_its_settings_and_a_place_is_another_scene():
+    def settings(**parameters):
+        source = SceneSource(builder="garden", parameters=parameters)
+        job = BuildSettings(builder="garden", parameters=source.parameters)
+        return job.as_json()["parameters"], scene_fingerprint(source)
+
+    without, identity = settings(seed=1)
+    assert without == {"seed": 1, "detail": 1.0}
+    assert settings(seed=1, place=7)[1] != identity
+
+
+def test_the_pieces_of_a_still_life_stand_apart_on_the_board():
+    still_life = import_module("scenes.still_life.plan")
+    for place in PLACES:
+        plan = still_life.drawn(place)
+        standing = []
+        for piece in still_life.PIECES:
+            if piece.elements[0] in plan.moves:
+                move = plan.moves[piece.elements[0]]
+                angle = np.radians(move.turned)
+                turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+                middle, reach = np.array(piece.discs[0][:2]), piece.discs[0][2]
+                at = move.scale * turn @ middle + move.end
+                standing.append((at, move.scale * reach))
+        for number, (at, reach) in enumerate(standing):
+            assert np.hypot(*at) + reach < still_life.RADIUS
+            for other, other_reach in standing[:number]:
+                assert np.hypot(*(at - other)) > reach + other_reach
+
+
+def corners(piece, rooms):
+    """The rectangle of a piece at a wall: x0, y0, x1, y1."""
+    return rooms.turned_rectangle(
+        rooms.AT_WALLS[piece.name][:4], piece.x, piece.y, round(piece.turned / 90)
+    )
+
+
+def test_the_pieces_of_a_room_stand_apart_within_it_and_leave_the_rigs_free():
+    rooms = import_module("scenes.rooms.place")
+    for place in PLACES:
+        room = rooms.drawn(place)
+        taken = [(-0.6, -0.6, 0.6, 0.6)]
+        for piece in room.furniture:
+            if piece.name not in rooms.AT_WALLS or piece.turned % 90:
+                continue
+            x0, y0, x1, y1 = corners(piece, rooms)
+            assert all(x0 > x3 or x2 > x1 or y0 > y3 or y2 > y1 for x2, y2, x3, y3 in taken)
+            taken.append((x0, y0, x1, y1))
+            half = np.array(room.size[:2]) / 2 + 0.01
+            assert (np.abs(np.subtract((x0, y0), room.center)) < half).all()
+            assert (np.abs(np.subtract((x1, y1), room.center)) < half).all()
+
+
+def test_the_rigs_of_a_garden_stand_free_in_its_court():
+    for place in PLACES:
+        plan = drawn("garden", place)
+        for x, y, radius in [*plan.rock_islands, (*plan.fire, 0.45), (*plan.maple, 0.3)]:
+            assert np.hypot(x, y) - radius > 1.42  # from the middle to a corner of the rigs
+        assert plan.court_distance(*plan.fire) < 0
+        assert all(plan.pond_distance(x, y) > 0.3 for x, y in plan.pines)
+
+
+def test_the_rigs_of_a_cloister_stand_free_in_its_court():
+    for place in PLACES:
+        plan = drawn("lone_monk", place)
+        x, y = np.abs(plan.center)
+        assert max(x, y) + 2 < plan.front - 1  # the arcades
+        assert max(x, y) - 2 > 0.8  # the well
+        monk = np.add(plan.monk[:2], plan.center)
+        assert np.abs(monk).max() > 2.3
+
+
+def test_a_value_is_equal_whatever_else_is_drawn():
+    first, second = Draw(7), Draw(7)
+    second.choice("another", "abc")
+    assert first.uniform("width", 0, 1) == second.uniform("width", 0, 1)
+    assert first.uniform("width", 0, 1) != Draw(8).uniform("width", 0, 1)
+    assert Draw(7).uniform("width", 0, 1) == 0.18
+
+
+def test_a_rooms_identity_changes_with_the_scenes_whose_pieces_it_borrows(tmp_path, monkeypatch):
+    builders = tmp_path / "scenes"
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(names.BUILDERS, builders, ignore=ignored)
+    monkeypatch.setattr(keys, "BUILDERS", builders)
+    source = SceneSource(builder="rooms")
+    before = keys.scene_fingerprint(source)
+    with (builders / "lone_monk" / "furniture.py").open("a") as text:
+        text.write("# changed\n")
+    assert keys.scene_fingerprint(source) != before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("builder", ["still_life", "rooms"])
+def test_a_place_builds_with_its_own_layout(builder):
+    first, again, other = (build(builder, place=place) for place in (3, 3, 4))
+    assert first.keys() == again.keys()
+    assert all(np.array_equal(first[name], again[name]) for name in first)
+    shared = first.keys() & other.keys()
+    assert first.keys() != other.keys() or any(
+        not np.allclose(first[name], other[name]) for name in shared
+    )
+
+
+@pytest.mark.slow
+def test_the_original_is_built_without_a_place():
+    names_of_original = build("still_life").keys()
+    assert {"Kettle", "Carafe", "Bowl", "Knife", "Chick"} <= names_of_original
