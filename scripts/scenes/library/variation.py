@@ -73,10 +73,9 @@ class Move:
     end: tuple[float, float] = (0.0, 0.0)
     turned: float = 0.0
     scale: float = 1.0
-    rise: float = 0.0
 
     def matrix(self) -> Matrix:
-        there = Matrix.Translation((*self.end, self.rise))
+        there = Matrix.Translation((*self.end, 0.0))
         turn = Matrix.Rotation(np.radians(self.turned), 4, "Z") @ Matrix.Scale(self.scale, 4)
         return there @ turn @ Matrix.Translation((-self.start[0], -self.start[1], 0.0))
 
