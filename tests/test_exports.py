@@ -897,6 +897,18 @@ def test_equal_ncore_sequences_have_equal_bytes(dataset, tmp_path):
     ).read_bytes()
 
 
+@pytest.mark.parametrize("beside", ["lightfield.json", "exr/view_0000f.exr"])
+def test_the_surface_of_a_dataset_without_its_list_may_be_replaced(beside, tmp_path):
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    (folder / "objects.json").write_text("{}")
+    assert not export.is_mesh_of_dataset(folder)
+    (tmp_path / beside).parent.mkdir(exist_ok=True)
+    (tmp_path / beside).write_text("")
+    assert export.is_mesh_of_dataset(folder)
+    assert not export.is_mesh_of_dataset(tmp_path / "other")
+
+
 def test_an_ncore_sequence_needs_two_views(tmp_path):
     rig = RIG | {"cameras": [1, 1]}
     write_views(tmp_path / "dataset", LENSES["wide"], rig)

@@ -79,8 +79,12 @@ def replace_folder(
 
 
 def is_mesh_of_dataset(folder: Path) -> bool:
-    """Return whether ``folder`` is the one for the surface of a dataset."""
-    return folder.name == MESH and (folder.parent / NAME).is_file()
+    """Return whether ``folder`` is the one for the surface of a dataset.
+
+    While lightfield.json is made again, the folder of the views tells.
+    """
+    has_views = (folder.parent / "exr").is_dir()
+    return folder.name == MESH and (has_views or (folder.parent / NAME).is_file())
 
 
 def _check_replaceable(folder: Path) -> None:
