@@ -17,6 +17,8 @@ from lightfield.geometry.lenses import Array
 DISTANCE = np.float32(0.1)
 # Added to the penalty: an angle in radians that is hardly worse than none.
 SHARP = np.float32(0.05)
+# A view counts by how many times nearer than the target it is, but not more than so many times.
+CLOSEST = np.float32(4)
 # On a plane the inverse distance changes evenly. So a large step between neighbours is a surface
 # too, if the steps before and after it differ from it by less than this part.
 EVEN = np.float32(0.5)
@@ -154,7 +156,8 @@ def look(
         values[n, 0] = inverse[n] / length
         for c in range(4):
             values[n, c + 1] = shade[n, c]
-        values[n, 5] = 1 / penalty((x, y, z), ray) ** 2
+        # The unit of `length` is the view's distance, so a near view counts more: it sees more.
+        values[n, 5] = (min(length, CLOSEST) / penalty((x, y, z), ray)) ** 2
 
 
 @kernel

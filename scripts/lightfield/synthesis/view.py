@@ -30,11 +30,13 @@ DIRECTIONS = 12
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent.
 STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
-TORN_WEIGHT = 0.1
+TORN_WEIGHT = 0.17
+# What a mirror shows is elsewhere from another place. It counts this much if it is drawn unmoved.
+UNMOVED_WEIGHT = 0.1
 # A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
 RIM = 12
 # Sharpens a view's colours by this amount, because interpolation will blur them.
-SHARPENED = 0.7
+SHARPENED = 0.8
 # Samples across and down a pixel.
 SAMPLES = 2
 
@@ -70,11 +72,13 @@ class Synthesised:
 class Surface:
     """A view as a surface with a vertex for each pixel.
 
-    - ``inverse`` (h, w): 1 / distance. Reflections are as far away as they seem to be.
+    - ``inverse`` (h, w): 1 / distance.
     - ``shade`` (h, w, 4): the sharpened root of the colour, and how much each vertex counts.
     - ``right``, ``down`` (h, w): whether the right and the lower neighbour are on the same surface.
     - ``torn`` (h, w): the vertices beside a tear.
     - ``corners`` (n, 4, 3): the rays of the corners of the n torn pixels.
+    - ``mirror`` (h, w): the vertices that show a reflection, or something behind glass.
+    - ``seeming`` (h, w): like ``inverse``, but reflections are as far away as they seem to be.
     """
 
     inverse: Array
@@ -83,6 +87,8 @@ class Surface:
     down: Array
     torn: Array
     corners: Array
+    mirror: Array
+    seeming: Array
 
 
 Reader = Callable[[View], tuple[Array, Array]]
@@ -169,10 +175,6 @@ class Sources:
         inverse = apparent.inverse_of(colour, distance)
         right, down, torn = _links(inverse, self.lens)
         steps = self._steps(index)
-        if steps.any():
-            part_surfaces(steps, right, down)
-            torn = _torn(inverse, right, down)
-            inverse *= apparent.factors(steps)
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
         kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
@@ -185,7 +187,8 @@ class Sources:
         corners = corners.astype(np.float32)
         certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
         shade = np.dstack([sharp, certainty]).astype(np.float32)
-        return Surface(inverse, shade, right, down, torn, corners)
+        seeming = inverse * apparent.factors(steps)
+        return Surface(inverse, shade, right, down, torn, corners, steps > 0, seeming)
 
     @cached_property
     def _to_rim(self) -> Array:
@@ -287,12 +290,24 @@ class Sources:
             return points, values
 
         rays, shade = self.rays.reshape(-1, 3), surface.shade.reshape(-1, 4)
+        counts = np.where(surface.mirror, np.float32(UNMOVED_WEIGHT), 1).ravel()
         vertices = placed(rays, surface.inverse.ravel(), shade)
+        vertices[1][:, 5] *= counts
         kernels.draw(*vertices, surface.right, surface.down, wraps, inverse, drawn)
         # Each pixel beside a tear is as far away everywhere as in its middle.
         torn = np.repeat(np.flatnonzero(surface.torn), 4)
         corners = placed(surface.corners.reshape(-1, 3), surface.inverse.ravel()[torn], shade[torn])
+        corners[1][:, 5] *= counts[torn]
         kernels.draw_pixels(*corners, wraps, inverse, drawn)
+        if surface.mirror.any():
+            links = _mirror_links(surface)
+            mirrors = np.full(inverse.shape, -1, np.float32)
+            kernels.draw(*vertices, *links, wraps, mirrors, np.empty_like(drawn))
+            is_shown = (mirrors >= 0) & (mirrors == inverse)
+            # A reflection is drawn only on the mirror. Nothing is nearer than infinitely near.
+            seeming = np.where(is_shown, -1, np.inf).astype(np.float32)
+            reflections = placed(rays, surface.seeming.ravel(), shade)
+            kernels.draw(*reflections, *links, wraps, seeming, drawn)
 
 
 def fill(colour: Array, inverse: Array, coverage: Array, wraps: bool) -> None:
@@ -338,11 +353,14 @@ def seeming_farther(lens: Lens, colours: Array, distances: Array, matrices: Arra
     )
 
 
-def part_surfaces(steps: Array, right: Array, down: Array) -> None:
-    """Tear surfaces (h, w) at the edges of reflections, in place. ``steps`` are `farther`'s."""
-    is_matte = steps == 0
-    right[:, :-1] &= is_matte[:, 1:] == is_matte[:, :-1]
-    down[:-1] &= is_matte[1:] == is_matte[:-1]
+def _mirror_links(surface: Surface) -> tuple[Array, Array]:
+    """Return which vertices (h, w) of mirrors share a surface with their right and lower one."""
+    mirror = surface.mirror
+    right = surface.right & mirror
+    down = surface.down & mirror
+    right[:, :-1] &= mirror[:, 1:]
+    down[:-1] &= mirror[1:]
+    return right, down
 
 
 def _links(inverse: Array, lens: Lens) -> tuple[Array, Array, Array]:
