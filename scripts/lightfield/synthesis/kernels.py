@@ -123,6 +123,7 @@ def look(
     rays: Array,
     inverse: Array,
     shade: Array,
+    counts: Array,
     turns: Array,
     offset: Array,
     least_cosine: np.float32,
@@ -132,6 +133,7 @@ def look(
     """Look from a target at the points at 1 / ``inverse`` (n,) along a view's ``rays`` (n, 3).
 
     - ``shade`` (n, 4): the points' R, G, B and certainty.
+    - ``counts`` (n,): how much the points count.
     - ``turns`` (2, 3, 3): turn row vectors from the view into the world, and into the target.
     - ``offset`` (3,): from the target to the view, in the world.
     - ``least_cosine``: points at a larger angle from the target's axis are skipped.
@@ -157,7 +159,8 @@ def look(
         for c in range(4):
             values[n, c + 1] = shade[n, c]
         # The unit of `length` is the view's distance, so a near view counts more: it sees more.
-        values[n, 5] = (min(length, CLOSEST) / penalty((x, y, z), ray)) ** 2
+        worth = min(length, CLOSEST) / penalty((x, y, z), ray)
+        values[n, 5] = counts[n] * worth * worth
 
 
 @kernel

@@ -280,24 +280,23 @@ class Sources:
         turns = np.stack([_turn(here), target[:3, :3].astype(np.float32)])
         offset = (here[:3, 3] - target[:3, 3]).astype(np.float32)
 
-        def placed(rays: Array, inverse: Array, shade: Array) -> tuple[Array, Array]:
+        def placed(rays: Array, inverse: Array, shade: Array, counts: Array) -> tuple[Array, Array]:
             seen = np.empty((inverse.size, 3), np.float32)
             values = np.empty((inverse.size, 6), np.float32)
-            kernels.look(rays, inverse, shade, turns, offset, least_cosine, seen, values)
+            kernels.look(rays, inverse, shade, counts, turns, offset, least_cosine, seen, values)
             is_near = np.isfinite(seen[:, 0])
             points = np.full((inverse.size, 2), np.nan, np.float32)
             points[is_near] = lens.pixels(seen[is_near])
             return points, values
 
         rays, shade = self.rays.reshape(-1, 3), surface.shade.reshape(-1, 4)
-        counts = np.where(surface.mirror, np.float32(UNMOVED_WEIGHT), 1).ravel()
-        vertices = placed(rays, surface.inverse.ravel(), shade)
-        vertices[1][:, 5] *= counts
+        true = surface.inverse.ravel()
+        counts = np.where(surface.mirror, UNMOVED_WEIGHT, 1).astype(np.float32).ravel()
+        vertices = placed(rays, true, shade, counts)
         kernels.draw(*vertices, surface.right, surface.down, wraps, inverse, drawn)
         # Each pixel beside a tear is as far away everywhere as in its middle.
         torn = np.repeat(np.flatnonzero(surface.torn), 4)
-        corners = placed(surface.corners.reshape(-1, 3), surface.inverse.ravel()[torn], shade[torn])
-        corners[1][:, 5] *= counts[torn]
+        corners = placed(surface.corners.reshape(-1, 3), true[torn], shade[torn], counts[torn])
         kernels.draw_pixels(*corners, wraps, inverse, drawn)
         if surface.mirror.any():
             links = _mirror_links(surface)
@@ -306,7 +305,7 @@ class Sources:
             is_shown = (mirrors >= 0) & (mirrors == inverse)
             # A reflection is drawn only on the mirror. Nothing is nearer than infinitely near.
             seeming = np.where(is_shown, -1, np.inf).astype(np.float32)
-            reflections = placed(rays, surface.seeming.ravel(), shade)
+            reflections = placed(rays, surface.seeming.ravel(), shade, np.ones_like(counts))
             kernels.draw(*reflections, *links, wraps, seeming, drawn)
 
 
