@@ -278,7 +278,7 @@ def test_slow_pictures_in_motion_use_few_views(tab):
         if len(counts := opened.evaluate("window.counts")) == 2:
             break
         opened.wait_for_timeout(100)
-    assert counts == [3, VIEWS]
+    assert counts == [2, VIEWS]
 
 
 @pytest.mark.parametrize("mode", ["depth", "holes", "sources"])
