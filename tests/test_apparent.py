@@ -44,3 +44,25 @@ def psnr_of_synthesis(pattern):
 @pytest.mark.parametrize("behind", [0.0, BEHIND], ids=["paint", "mirror"])
 def test_a_wall_shows_what_is_painted_on_it_and_what_it_reflects(behind):
     assert psnr_of_synthesis(WALL + behind) > 30
+
+
+def see_framed_mirror(lens, matrix):
+    """Return what a camera sees of the wall: a mirror between x = −0.5 and 0.5, else paint."""
+    reflection, distance = see(lens, matrix, WALL + BEHIND)
+    paint, _ = see(lens, matrix, WALL)
+    points = matrix[:3, 3] + (lens.pixel_rays() @ matrix[:3, :3].T) * distance[..., None]
+    is_mirror = np.abs(points[..., [0]]) < 0.5
+    return np.where(is_mirror, reflection, paint), distance
+
+
+def test_a_reflection_stays_on_its_mirror_and_z_is_that_of_the_mirror():
+    lens = lenses.from_camera(CAMERA)
+    views = [View.placed(f"view_{n:04}f", placed(place)) for n, place in enumerate(PLACES)]
+    field = Sources(lens, views, lambda view: see_framed_mirror(lens, view.matrix))
+    target = placed((0.14, 0.1, -0.16))
+    made = field.synthesise(target, lens)
+    colour, distance = see_framed_mirror(lens, target)
+    middle = (slice(16, -16), slice(16, -16))
+    error = encode_srgb(made.colour[middle]) - encode_srgb(colour[middle])
+    assert -10 * np.log10((error**2).mean()) > 30
+    np.testing.assert_allclose(made.distance[middle], distance[middle], rtol=0.01)

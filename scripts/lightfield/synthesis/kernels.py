@@ -13,6 +13,12 @@ import numpy as np
 from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
+# The weight of a view's distance from the surface in its penalty. Its angle has the weight 1.
+DISTANCE = np.float32(0.1)
+# Added to the penalty: an angle in radians that is hardly worse than none.
+SHARP = np.float32(0.05)
+# A view counts by how many times nearer than the target it is, but not more than so many times.
+CLOSEST = np.float32(4)
 # On a plane the inverse distance changes evenly. So a large step between neighbours is a surface
 # too, if the steps before and after it differ from it by less than this part.
 EVEN = np.float32(0.5)
@@ -71,6 +77,93 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 
 
 @kernel
+def penalty(from_target: Any, from_view: Any) -> Any:
+    """Return how differently a target and a view see a point. Less is better.
+
+    The vectors (x, y, z) lead from the target's and from the view's camera to the point, in the
+    same unit.
+    """
+    x, y, z = from_target
+    u, v, w = from_view
+    target_distance = math.sqrt(x * x + y * y + z * z)
+    view_distance = math.sqrt(u * u + v * v + w * w)
+    cosine = (x * u + y * v + z * w) / (target_distance * view_distance)
+    # The chord between both directions.
+    angle = math.sqrt(max(2 - 2 * cosine, 0))
+    return angle + DISTANCE * max(view_distance / target_distance - 1, 0) + SHARP
+
+
+@kernel
+def qualities(from_target: Array, from_view: Array, is_seen: Array, quality: Array) -> None:
+    """Write how well a view sees points: 1 / penalty, 0 for points that it does not see.
+
+    The vectors (n, 3) are as in `penalty`.
+    """
+    for n in range(len(is_seen)):
+        quality[n] = 0
+        if is_seen[n]:
+            quality[n] = 1 / penalty(
+                (from_target[n, 0], from_target[n, 1], from_target[n, 2]),
+                (from_view[n, 0], from_view[n, 1], from_view[n, 2]),
+            )
+
+
+@kernel
+def _turned(matrix: Array, x: Any, y: Any, z: Any) -> Any:
+    """Return the product of a vector and a ``matrix`` (3, 3)."""
+    return (
+        x * matrix[0, 0] + y * matrix[1, 0] + z * matrix[2, 0],
+        x * matrix[0, 1] + y * matrix[1, 1] + z * matrix[2, 1],
+        x * matrix[0, 2] + y * matrix[1, 2] + z * matrix[2, 2],
+    )
+
+
+@kernel
+def look(
+    rays: Array,
+    inverse: Array,
+    shade: Array,
+    counts: Array,
+    turns: Array,
+    offset: Array,
+    least_cosine: np.float32,
+    seen: Array,
+    values: Array,
+) -> None:
+    """Look from a target at the points at 1 / ``inverse`` (n,) along a view's ``rays`` (n, 3).
+
+    - ``shade`` (n, 4): the points' R, G, B and certainty.
+    - ``counts`` (n,): how much the points count.
+    - ``turns`` (2, 3, 3): turn row vectors from the view into the world, and into the target.
+    - ``offset`` (3,): from the target to the view, in the world.
+    - ``least_cosine``: points at a larger angle from the target's axis are skipped.
+    - ``seen`` (n, 3): gets the vectors from the target to the points in its own axes. Their unit is
+      the point's distance from the view, so that infinitely far points need no special case. Those
+      of skipped points are NaN.
+    - ``values`` (n, 6): gets what `_draw_triangle` needs.
+    """
+    for n in range(len(inverse)):
+        ray = _turned(turns[0], rays[n, 0], rays[n, 1], rays[n, 2])
+        x = ray[0] + inverse[n] * offset[0]
+        y = ray[1] + inverse[n] * offset[1]
+        z = ray[2] + inverse[n] * offset[2]
+        length = math.sqrt(x * x + y * y + z * z)
+        point = _turned(turns[1], x, y, z)
+        # Comparisons with NaN, where there is no ray, are false.
+        if not -point[2] >= least_cosine * length:
+            seen[n] = np.nan
+            continue
+        for c in range(3):
+            seen[n, c] = point[c]
+        values[n, 0] = inverse[n] / length
+        for c in range(4):
+            values[n, c + 1] = shade[n, c]
+        # The unit of `length` is the view's distance, so a near view counts more: it sees more.
+        worth = min(length, CLOSEST) / penalty((x, y, z), ray)
+        values[n, 5] = counts[n] * worth * worth
+
+
+@kernel
 def _signed_weight(certainty: Any, worth: Any) -> Any:
     """Return the weight of a drawn pixel. It is negative if the pixel hides nothing behind it."""
     weight = certainty * worth
@@ -78,7 +171,9 @@ def _signed_weight(certainty: Any, worth: Any) -> Any:
 
 
 @kernel
-def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
+def _draw_pole(
+    top: Any, bottom: Any, values: Array, corners: Any, inverse: Array, drawn: Array
+) -> None:
     """Draw a triangle around a panorama's pole in one colour, where nothing is drawn yet."""
     height, width = inverse.shape
     first = 0
@@ -86,35 +181,39 @@ def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Arra
     if top + bottom > height:
         first = max(int(top), 0)
         end = height
+    mean = np.zeros(6, np.float32)
+    for corner in corners:
+        mean += values[corner] / np.float32(3)
     for i in range(first, end):
         for j in range(width):
             if inverse[i, j] < 0:
-                inverse[i, j] = np.mean(values[:, 0])
-                for c in range(3):
-                    drawn[i, j, c] = np.mean(values[:, c + 1])
-                drawn[i, j, 3] = _signed_weight(np.mean(values[:, 4]), np.mean(values[:, 5]))
+                inverse[i, j] = mean[0]
+                drawn[i, j, :3] = mean[1:4]
+                drawn[i, j, 3] = _signed_weight(mean[4], mean[5])
 
 
 @kernel
 def _draw_triangle(
-    corners: Array, values: Array, wraps: bool, inverse: Array, drawn: Array
+    points: Array, values: Array, corners: Any, wraps: bool, inverse: Array, drawn: Array
 ) -> None:
     """Draw a triangle where nothing nearer is drawn yet.
 
-    ``corners`` (3, 2) are in pixels. ``values`` (3, 6) are inverse, R, G, B, certainty and worth.
+    ``corners`` are three vertices. ``points`` (n, 2) are the vertices' places in pixels. Their
+    ``values`` (n, 6) are inverse, R, G, B, certainty and worth.
     """
     height, width = inverse.shape
-    zero, half = np.float32(0), np.float32(0.5)
-    x0, y0 = corners[0, 0], corners[0, 1]
-    x1, y1 = corners[1, 0], corners[1, 1]
-    x2, y2 = corners[2, 0], corners[2, 1]
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    a, b, c = corners
+    x0, y0 = points[a, 0], points[a, 1]
+    x1, y1 = points[b, 0], points[b, 1]
+    x2, y2 = points[c, 0], points[c, 1]
     if wraps:
         # Take the shorter of the two ways around.
         turn = np.float32(width)
         x1 -= turn * np.rint((x1 - x0) / turn)
         x2 -= turn * np.rint((x2 - x0) / turn)
         if abs(x2 - x1) > half * turn:
-            _draw_pole(min(y0, y1, y2), max(y0, y1, y2), values, inverse, drawn)
+            _draw_pole(min(y0, y1, y2), max(y0, y1, y2), values, corners, inverse, drawn)
             return
     area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
     # Skip triangles seen from behind: they turn the other way round.
@@ -125,40 +224,44 @@ def _draw_triangle(
     if right - left > LARGEST * width or bottom - top > LARGEST * height:
         return
     # A centre on an edge that two triangles share must lie in at least one of them.
-    rounding = ROUNDING * (right - left) * (bottom - top)
+    rounding = -ROUNDING * (right - left) * (bottom - top)
     first = math.ceil(left - half)
     last = math.floor(right - half)
     if not wraps:
         first = max(first, 0)
         last = min(last, width - 1)
+    start = np.float32(first) + half
     for i in range(max(math.ceil(top - half), 0), min(int(bottom - half), height - 1) + 1):
         y = np.float32(i) + half
+        # Twice the areas of the triangles that the centre and two corners make.
+        row0 = (x1 - start) * (y2 - y) - (x2 - start) * (y1 - y)
+        row1 = (x2 - start) * (y0 - y) - (x0 - start) * (y2 - y)
         for column in range(first, last + 1):
-            x = np.float32(column) + half
-            w0 = (x1 - x) * (y2 - y) - (x2 - x) * (y1 - y)
-            w1 = (x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)
+            step = np.float32(column - first)
+            w0 = row0 - step * (y2 - y1)
+            w1 = row1 - step * (y0 - y2)
             w2 = area - w0 - w1
-            if min(w0, w1, w2) < -rounding:
+            if w0 < rounding or w1 < rounding or w2 < rounding:
                 continue
             w0, w1, w2 = max(w0, zero), max(w1, zero), max(w2, zero)
-            total = w0 + w1 + w2
-            w0, w1, w2 = w0 / total, w1 / total, w2 / total
+            part = one / (w0 + w1 + w2)
+            w0, w1, w2 = w0 * part, w1 * part, w2 * part
             j = column % width if wraps else column
-            nearness = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
+            nearness = w0 * values[a, 0] + w1 * values[b, 0] + w2 * values[c, 0]
             if nearness > inverse[i, j]:
                 inverse[i, j] = nearness
-                for c in range(3):
-                    drawn[i, j, c] = (
-                        w0 * values[0, c + 1] + w1 * values[1, c + 1] + w2 * values[2, c + 1]
+                for k in range(3):
+                    drawn[i, j, k] = (
+                        w0 * values[a, k + 1] + w1 * values[b, k + 1] + w2 * values[c, k + 1]
                     )
-                certainty = w0 * values[0, 4] + w1 * values[1, 4] + w2 * values[2, 4]
-                worth = w0 * values[0, 5] + w1 * values[1, 5] + w2 * values[2, 5]
+                certainty = w0 * values[a, 4] + w1 * values[b, 4] + w2 * values[c, 4]
+                worth = w0 * values[a, 5] + w1 * values[b, 5] + w2 * values[c, 5]
                 drawn[i, j, 3] = _signed_weight(certainty, worth)
 
 
 @kernel
 def draw(
-    pixels: Array,
+    points: Array,
     values: Array,
     right: Array,
     down: Array,
@@ -166,52 +269,40 @@ def draw(
     inverse: Array,
     drawn: Array,
 ) -> None:
-    """Draw a surface whose vertices (h, w) fall on ``pixels`` (h, w, 2).
+    """Draw a surface with a vertex for each pixel of a view (h, w), row by row.
 
-    - ``values`` (h, w, 6): as in `_draw_triangle`.
+    - ``points`` (h · w, 2): where the vertices are, in pixels.
+    - ``values`` (h · w, 6): as in `_draw_triangle`.
     - ``right``, ``down`` (h, w): as `link` marks them.
     - ``wraps``: whether the picture's left edge continues its right one.
     - ``inverse`` (H, W): that of what is drawn, −1 where nothing is drawn yet.
     - ``drawn`` (H, W, 4): R, G, B and the weight, which is certainty times worth. The weight is
       negative if the pixel hides nothing behind it.
     """
-    height, width = pixels.shape[:2]
-    corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 6), np.float32)
+    height, width = right.shape
     for i in range(height - 1):
         for j in range(width - 1):
-            for lower in range(2):
-                # A quad has an upper left and a lower right triangle.
-                if lower:
-                    is_joined = right[i + 1, j] and down[i, j + 1]
-                    places = ((i, j + 1), (i + 1, j + 1), (i + 1, j))
-                else:
-                    is_joined = right[i, j] and down[i, j]
-                    places = ((i, j), (i, j + 1), (i + 1, j))
-                if not is_joined:
-                    continue
-                for k in range(3):
-                    row, column = places[k]
-                    corners[k] = pixels[row, column]
-                    corner_values[k] = values[row, column]
-                _draw_triangle(corners, corner_values, wraps, inverse, drawn)
+            # A quad has an upper left and a lower right triangle.
+            corner = i * width + j
+            below = corner + width
+            if right[i, j] and down[i, j]:
+                _draw_triangle(points, values, (corner, corner + 1, below), wraps, inverse, drawn)
+            if right[i + 1, j] and down[i, j + 1]:
+                _draw_triangle(
+                    points, values, (corner + 1, below + 1, below), wraps, inverse, drawn
+                )
 
 
 @kernel
-def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
-    """Draw single pixels of a view. Their corners (n, 4, 2) run clockwise from the upper left.
+def draw_pixels(points: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
+    """Draw single pixels of a view. Each has four corners, clockwise from the upper left.
 
-    ``values`` (n, 6) are as in `_draw_triangle`, the other arguments as in `draw`.
+    ``points`` (4n, 2) and ``values`` (4n, 6) are those of the corners, and the other arguments as
+    in `draw`.
     """
-    corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 6), np.float32)
-    for n in range(len(pixels)):
-        corner_values[:] = values[n]
-        for second in range(2):
-            corners[0] = pixels[n, 0]
-            corners[1] = pixels[n, 1 + second]
-            corners[2] = pixels[n, 2 + second]
-            _draw_triangle(corners, corner_values, wraps, inverse, drawn)
+    for first in range(0, len(points), 4):
+        _draw_triangle(points, values, (first, first + 1, first + 2), wraps, inverse, drawn)
+        _draw_triangle(points, values, (first, first + 2, first + 3), wraps, inverse, drawn)
 
 
 @kernel
@@ -263,8 +354,8 @@ def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: A
     for k in range(count):
         nearness = inverses[k, row, column]
         nearest = max(nearest, nearness)
-        if drawn[k, row, column, 3] > 0:
-            front = max(front, nearness)
+        if nearness > front and drawn[k, row, column, 3] > 0:
+            front = nearness
     if nearest < 0:
         return nearest
     total = red = green = blue = np.float32(0)

@@ -27,18 +27,16 @@ from lightfield.synthesis.defaults import BEST
 # Views are chosen by how well they see points in this many directions across and down the picture,
 # at two distances that are typical of the scene.
 DIRECTIONS = 12
-# The weight of a view's distance from the surface in its penalty. Its angle has the weight 1.
-DISTANCE = 0.1
-# Added to the penalty: an angle in radians that is hardly worse than none.
-SHARP = 0.05
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent.
 STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
-TORN_WEIGHT = 0.1
+TORN_WEIGHT = 0.17
+# What a mirror shows is elsewhere from another place. It counts this much if it is drawn unmoved.
+UNMOVED_WEIGHT = 0.1
 # A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
 RIM = 12
 # Sharpens a view's colours by this amount, because interpolation will blur them.
-SHARPENED = 0.7
+SHARPENED = 0.8
 # Samples across and down a pixel.
 SAMPLES = 2
 
@@ -74,21 +72,23 @@ class Synthesised:
 class Surface:
     """A view as a surface with a vertex for each pixel.
 
-    - ``inverse`` (h, w): 1 / distance. Reflections are as far away as they seem to be.
-    - ``root`` (h, w, 3): the sharpened root of the colour.
-    - ``certainty`` (h, w): how much each vertex counts.
+    - ``inverse`` (h, w): 1 / distance.
+    - ``shade`` (h, w, 4): the sharpened root of the colour, and how much each vertex counts.
     - ``right``, ``down`` (h, w): whether the right and the lower neighbour are on the same surface.
     - ``torn`` (h, w): the vertices beside a tear.
     - ``corners`` (n, 4, 3): the rays of the corners of the n torn pixels.
+    - ``mirror`` (h, w): the vertices that show a reflection, or something behind glass.
+    - ``seeming`` (h, w): like ``inverse``, but reflections are as far away as they seem to be.
     """
 
     inverse: Array
-    root: Array
-    certainty: Array
+    shade: Array
     right: Array
     down: Array
     torn: Array
     corners: Array
+    mirror: Array
+    seeming: Array
 
 
 Reader = Callable[[View], tuple[Array, Array]]
@@ -134,6 +134,7 @@ class Sources:
         self.matrices: Array = np.array([view.matrix for view in views])
         self._held: OrderedDict[int, Surface] = OrderedDict()
         self._pictures: OrderedDict[int, apparent.Picture] = OrderedDict()
+        self._latest_layers: tuple[Array, Array] | None = None
 
     @cached_property
     def rays(self) -> Array:
@@ -174,11 +175,6 @@ class Sources:
         inverse = apparent.inverse_of(colour, distance)
         right, down, torn = _links(inverse, self.lens)
         steps = self._steps(index)
-        if steps.any():
-            part_surfaces(steps, right, down)
-            torn = _torn(inverse, right, down)
-            inverse *= apparent.factors(steps)
-        certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
         kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
@@ -189,7 +185,10 @@ class Sources:
             column[:, None] + np.array([0.0, 1, 1, 0]), row[:, None] + np.array([0.0, 0, 1, 1])
         )
         corners = corners.astype(np.float32)
-        return Surface(inverse, sharp, certainty.astype(np.float32), right, down, torn, corners)
+        certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
+        shade = np.dstack([sharp, certainty]).astype(np.float32)
+        seeming = inverse * apparent.factors(steps)
+        return Surface(inverse, shade, right, down, torn, corners, steps > 0, seeming)
 
     @cached_property
     def _to_rim(self) -> Array:
@@ -212,7 +211,7 @@ class Sources:
         for index, matrix in enumerate(self.matrices):
             offset = points - matrix[:3, 3]
             _, _, is_seen = pixel_indices(self.lens, offset @ matrix[:3, :3])
-            quality[index] = np.where(is_seen, 1 / penalty(away, offset), 0)
+            kernels.qualities(away, offset, is_seen, quality[index])
         chosen: list[int] = []
         worth = np.zeros(len(points))
         for _ in range(min(count, len(self.views))):
@@ -229,12 +228,10 @@ class Sources:
     def blended(self, target: Array, lens: Lens, chosen: Sequence[int]) -> Synthesised:
         """Return the picture of a camera at ``target`` (4, 4), made of the ``chosen`` views."""
         fine = lens.resized(SAMPLES * lens.width, SAMPLES * lens.height)
-        shape = (len(chosen), fine.height, fine.width)
-        inverses = np.full(shape, -1, np.float32)
-        drawn = np.zeros((*shape, 4), np.float32)
+        least_cosine = _least_cosine(fine)
+        inverses, drawn = self._layers((len(chosen), fine.height, fine.width))
         for place, index in enumerate(chosen):
-            surface = self.surface(index)
-            self._draw(surface, self.matrices[index], target, fine, inverses[place], drawn[place])
+            self._draw(index, target, fine, least_cosine, inverses[place], drawn[place])
         colour = np.empty((lens.height, lens.width, 3), np.float32)
         inverse = np.empty((lens.height, lens.width), np.float32)
         coverage = np.empty((lens.height, lens.width), np.float32)
@@ -252,43 +249,64 @@ class Sources:
         colour[outside] = np.nan
         return Synthesised(colour, distance, holes)
 
+    def _layers(self, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """Return empty arrays for `kernels.draw` of this ``shape`` (n, h, w).
+
+        The latest ones are used again, because fresh memory takes as long as a drawing.
+        """
+        if self._latest_layers is None or self._latest_layers[0].shape != shape:
+            self._latest_layers = np.empty(shape, np.float32), np.empty((*shape, 4), np.float32)
+        inverses, drawn = self._latest_layers
+        inverses.fill(-1)
+        return inverses, drawn
+
     def _draw(
         self,
-        surface: Surface,
-        here: Array,
+        index: int,
         target: Array,
         lens: Lens,
+        least_cosine: np.float32,
         inverse: Array,
         drawn: Array,
     ) -> None:
-        """Draw the surface of a view with the pose ``here`` (4, 4), seen from ``target`` (4, 4).
+        """Draw a view's surface as seen from ``target`` (4, 4).
 
-        Writes ``inverse`` and ``drawn`` as `kernels.draw` does.
+        ``least_cosine`` is that of `_least_cosine`. Writes ``inverse`` and ``drawn`` as
+        `kernels.draw` does.
         """
+        surface = self.surface(index)
+        here = self.matrices[index]
         wraps = _wraps(lens)
-        pixels, offsets = self._projected(self.rays, surface.inverse, here, target, lens)
-        length = np.sqrt(_dot(offsets, offsets))
-        worth = 1 / penalty(offsets, self.rays @ _turn(here)) ** 2
-        values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
-        values = values.astype(np.float32, copy=False)
-        kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)
-        corners, _ = self._projected(
-            surface.corners, surface.inverse[surface.torn][:, None], here, target, lens
-        )
-        kernels.draw_pixels(corners, values[surface.torn], wraps, inverse, drawn)
-
-    def _projected(
-        self, rays: Array, inverse: Array, here: Array, target: Array, lens: Lens
-    ) -> tuple[Array, Array]:
-        """Return the pixels (..., 2) of points at 1 / ``inverse`` (...) along ``rays`` (..., 3).
-
-        Also returns the vectors from the target to the points. Their unit is the point's distance
-        from ``here``, so that infinitely far points need no special case.
-        """
+        turns = np.stack([_turn(here), target[:3, :3].astype(np.float32)])
         offset = (here[:3, 3] - target[:3, 3]).astype(np.float32)
-        offsets = rays @ _turn(here) + inverse[..., None] * offset
-        pixels: Array = lens.pixels(offsets @ _turn(target).T)
-        return pixels.astype(np.float32, copy=False), offsets
+
+        def placed(rays: Array, inverse: Array, shade: Array, counts: Array) -> tuple[Array, Array]:
+            seen = np.empty((inverse.size, 3), np.float32)
+            values = np.empty((inverse.size, 6), np.float32)
+            kernels.look(rays, inverse, shade, counts, turns, offset, least_cosine, seen, values)
+            is_near = np.isfinite(seen[:, 0])
+            points = np.full((inverse.size, 2), np.nan, np.float32)
+            points[is_near] = lens.pixels(seen[is_near])
+            return points, values
+
+        rays, shade = self.rays.reshape(-1, 3), surface.shade.reshape(-1, 4)
+        true = surface.inverse.ravel()
+        counts = np.where(surface.mirror, UNMOVED_WEIGHT, 1).astype(np.float32).ravel()
+        vertices = placed(rays, true, shade, counts)
+        kernels.draw(*vertices, surface.right, surface.down, wraps, inverse, drawn)
+        # Each pixel beside a tear is as far away everywhere as in its middle.
+        torn = np.repeat(np.flatnonzero(surface.torn), 4)
+        corners = placed(surface.corners.reshape(-1, 3), true[torn], shade[torn], counts[torn])
+        kernels.draw_pixels(*corners, wraps, inverse, drawn)
+        if surface.mirror.any():
+            links = _mirror_links(surface)
+            mirrors = np.full(inverse.shape, -1, np.float32)
+            kernels.draw(*vertices, *links, wraps, mirrors, np.empty_like(drawn))
+            is_shown = (mirrors >= 0) & (mirrors == inverse)
+            # A reflection is drawn only on the mirror. Nothing is nearer than infinitely near.
+            seeming = np.where(is_shown, -1, np.inf).astype(np.float32)
+            reflections = placed(rays, surface.seeming.ravel(), shade, np.ones_like(counts))
+            kernels.draw(*reflections, *links, wraps, seeming, drawn)
 
 
 def fill(colour: Array, inverse: Array, coverage: Array, wraps: bool) -> None:
@@ -334,11 +352,14 @@ def seeming_farther(lens: Lens, colours: Array, distances: Array, matrices: Arra
     )
 
 
-def part_surfaces(steps: Array, right: Array, down: Array) -> None:
-    """Tear surfaces (h, w) at the edges of reflections, in place. ``steps`` are `farther`'s."""
-    is_matte = steps == 0
-    right[:, :-1] &= is_matte[:, 1:] == is_matte[:, :-1]
-    down[:-1] &= is_matte[1:] == is_matte[:-1]
+def _mirror_links(surface: Surface) -> tuple[Array, Array]:
+    """Return which vertices (h, w) of mirrors share a surface with their right and lower one."""
+    mirror = surface.mirror
+    right = surface.right & mirror
+    down = surface.down & mirror
+    right[:, :-1] &= mirror[:, 1:]
+    down[:-1] &= mirror[1:]
+    return right, down
 
 
 def _links(inverse: Array, lens: Lens) -> tuple[Array, Array, Array]:
@@ -387,27 +408,16 @@ def steepest(lens: Lens) -> np.float32:
     return np.float32(STEEPEST * pixel_angle(lens))
 
 
-def penalty(from_target: Array, from_view: Array) -> Array:
-    """Return how differently (...) a target and a view see a point. Less is better.
+def _least_cosine(lens: Lens) -> np.float32:
+    """Return the cosine of the largest angle from the lens's axis at which vertices can matter.
 
-    The vectors (..., 3) lead from the target's and from the view's camera to the point, in the same
-    unit.
+    `kernels.draw` draws no triangle that reaches farther than LARGEST beyond the picture.
     """
-    target_distance = np.sqrt(_dot(from_target, from_target))
-    view_distance = np.sqrt(_dot(from_view, from_view))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = _dot(from_target, from_view) / (target_distance * view_distance)
-        # The chord between both directions.
-        angle = np.sqrt(np.maximum(2 - 2 * cosine, 0))
-        farther: Array = np.maximum(view_distance / target_distance - 1, 0)
-    sum_of_penalties: Array = angle + DISTANCE * farther + SHARP
-    return sum_of_penalties
-
-
-def _dot(first: Array, second: Array) -> Array:
-    """Return the scalar products (...) of vectors (..., 3)."""
-    product: Array = np.einsum("...i,...i->...", first, second)
-    return product
+    beyond = float(kernels.LARGEST)
+    steps = np.linspace(-beyond, 1 + beyond, 33)
+    x, y = np.meshgrid(lens.width * steps, lens.height * steps)
+    cosine = -lens.rays(x, y)[..., 2]
+    return np.float32(cosine.min() - 1e-3 if np.isfinite(cosine).all() else -1)
 
 
 def _wraps(lens: Lens) -> bool:

@@ -10,11 +10,11 @@ import { MOST_SOURCES, walk } from "./state.js";
 
 // If a full picture takes more milliseconds than this, a picture in motion uses few sources.
 const SLOW = 100;
-export const FEW = Math.min(2, MOST_SOURCES);
+const FEW = Math.min(2, MOST_SOURCES);
 // A still picture has this many samples across and down a pixel.
 const FINE = 2;
 // A picture in motion has this part of the pixels across and down. The browser enlarges it.
-const COARSE = 0.4;
+const COARSE = 0.36;
 // The picture counts as still this many milliseconds after the last motion.
 const REST = 200;
 

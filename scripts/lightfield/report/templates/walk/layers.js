@@ -45,11 +45,11 @@ function createLayers(width, height) {
   const inverses = array(gl.R32F, gl.RED, gl.FLOAT);
   const depth = gl.createRenderbuffer();
   gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
-  gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT32F, width, height);
+  gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH24_STENCIL8, width, height);
   const framebuffers = Array.from({ length: MOST_SOURCES }, (_, layer) => framebufferOf(() => {
     gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, colours, 0, layer);
     gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, inverses, 0, layer);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_STENCIL_ATTACHMENT, gl.RENDERBUFFER, depth);
   }));
   return { width, height, colours, inverses, depth, framebuffers };
 }
@@ -89,8 +89,9 @@ function stageOf(width, height, samples) {
   return stage;
 }
 
-// Draw a part of a source into the bound layer of this width: its surface or its torn pixels.
-function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width, kind = walk.gl.TRIANGLES) {
+// Draw a part of a source into the bound layer of this width: its surface or its torn pixels. `isSeeming` draws reflections
+// where they seem to be.
+function drawPart({ linked, uniforms }, { vertices, count, kind }, source, eye, width, isSeeming = false) {
   const { gl } = walk;
   const { view } = source;
   const [right, up, back] = eye.axes;
@@ -109,10 +110,29 @@ function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width,
   gl.uniform1f(uniforms.near, NEAR);
   gl.uniform1f(uniforms.spread, WALK.distance);
   gl.uniform1f(uniforms.sharp, WALK.sharp);
+  gl.uniform1f(uniforms.closest, WALK.closest);
+  gl.uniform1f(uniforms.unmoved, WALK.unmoved);
+  gl.uniform1i(uniforms.isSeeming, isSeeming);
   gl.uniform1f(uniforms.certain, WALK.certain);
   gl.bindVertexArray(vertices);
   gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
   gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
+}
+
+// Draw a source's mirrors. Then draw what they reflect where it seems to be, but only on the mirrors.
+function drawMirrors(source, eye, width) {
+  const { gl } = walk;
+  gl.enable(gl.STENCIL_TEST);
+  gl.stencilFunc(gl.ALWAYS, 1, 1);
+  gl.stencilOp(gl.KEEP, gl.KEEP, gl.REPLACE);
+  drawPart(walk.surface, source.mirrors, source, eye, width);
+  gl.stencilFunc(gl.EQUAL, 1, 1);
+  gl.clearBufferfv(gl.DEPTH, 0, [1]);
+  // The inverse distances stay those of the mirror.
+  gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
+  drawPart(walk.surface, source.mirrors, source, eye, width, true);
+  gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+  gl.disable(gl.STENCIL_TEST);
 }
 
 function drawSources(layers, eye, isCoarse) {
@@ -126,13 +146,14 @@ function drawSources(layers, eye, isCoarse) {
     gl.bindFramebuffer(gl.FRAMEBUFFER, layers.framebuffers[layer]);
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.COLOR, 1, [-1, 0, 0, 0]);
-    gl.clearBufferfv(gl.DEPTH, 0, [1]);
+    gl.clearBufferfi(gl.DEPTH_STENCIL, 0, 1, 0);
     if (isCoarse) {
-      drawPart(walk.coarse, source.coarse, source, eye, layers.width);
-      drawPart(walk.surface, source.points, source, eye, layers.width, gl.POINTS);
+      drawPart(walk.coarse, source.coarse, source, eye, layers.width, true);
+      drawPart(walk.surface, source.points, source, eye, layers.width, true);
     } else {
       drawPart(walk.surface, source.surface, source, eye, layers.width);
       drawPart(walk.pixels, source.pixels, source, eye, layers.width);
+      if (source.mirrors.count) drawMirrors(source, eye, layers.width);
     }
   });
   gl.bindVertexArray(null);

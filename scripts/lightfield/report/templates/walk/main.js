@@ -7,7 +7,7 @@ import { bytesOf, decoded, depthOf } from "../page/packing.js";
 import { minus } from "../page/vectors.js";
 import { bestViews, missing } from "./choice.js";
 import { listen } from "./controls.js";
-import { FEW, drawWalkSoon } from "./drawing.js";
+import { drawWalkSoon } from "./drawing.js";
 import { axes, scales } from "./eye.js";
 import { goHome, restorePlace } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
@@ -24,13 +24,16 @@ import { unfolded, upload } from "./sources.js";
 import { WALK, walk } from "./state.js";
 import { program, texture } from "./webgl.js";
 
+// The walk begins with this many sources.
+const FIRST = 2;
+
 // Load all sources one after the other, first those that the eye wants. Call `begin` as soon as a few are loaded.
 async function loadSources(begin) {
   for (let number = 0; number < walk.order.length; number++) {
     const source = missing() || walk.order.find((other) => !other.isLoaded);
     const { light, depth } = source.entry;
     upload(source, ...(await Promise.all([decoded(light), decoded(depth)])));
-    if (number + 1 === Math.min(FEW, walk.order.length)) begin();
+    if (number + 1 === Math.min(FIRST, walk.order.length)) begin();
     if (walk.wanted.includes(source) && !missing()) drawWalkSoon();
   }
 }

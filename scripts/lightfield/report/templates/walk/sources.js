@@ -3,7 +3,7 @@
 import { DATA } from "../page/data.js";
 import { LIGHT, depthCode } from "../page/packing.js";
 import { WALK, walk } from "./state.js";
-import { texture, triangles } from "./webgl.js";
+import { drawable, texture } from "./webgl.js";
 
 // This many vertex numbers stay unused after each row. A software renderer caches vertices by their number modulo 64.
 // Without the gap, a vertex would often replace the one above it there.
@@ -49,9 +49,8 @@ function inverseDistances(depth) {
   return inverses;
 }
 
-// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below. Surfaces tear at
-// the edges of reflections.
-function joins(inverses, steps) {
+// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below.
+function joins(inverses) {
   const [width, height] = DATA.size;
   const at = (i, j) => (i < 0 || j < 0 || i >= height || j >= width ? NaN : inverses[i * width + j]);
   const right = new Uint8Array(width * height);
@@ -59,38 +58,53 @@ function joins(inverses, steps) {
   for (let i = 0; i < height; i++) {
     for (let j = 0; j < width; j++) {
       const pixel = i * width + j;
-      const isMatte = steps[pixel] === 0;
-      right[pixel] = isMatte === (steps[pixel + 1] === 0) &&
-        isOneSurface(at(i, j - 1), at(i, j), at(i, j + 1), at(i, j + 2));
-      down[pixel] = isMatte === (steps[pixel + width] === 0) &&
-        isOneSurface(at(i - 1, j), at(i, j), at(i + 1, j), at(i + 2, j));
+      right[pixel] = isOneSurface(at(i, j - 1), at(i, j), at(i, j + 1), at(i, j + 2));
+      down[pixel] = isOneSurface(at(i - 1, j), at(i, j), at(i + 1, j), at(i + 2, j));
     }
   }
   return { right, down };
 }
 
+// Return the same `joins`, torn at the edges of mirrors.
+function tornAtMirrors({ right, down }, steps) {
+  const width = DATA.size[0];
+  const isMirror = (pixel) => steps[pixel] > 0;
+  return {
+    right: right.map((joined, pixel) => joined && isMirror(pixel) === isMirror(pixel + 1)),
+    down: down.map((joined, pixel) => joined && isMirror(pixel) === isMirror(pixel + width)),
+  };
+}
+
 // Return the number of a pixel's vertex.
 const vertexOf = (i, j) => i * (DATA.size[0] + ROW_GAP) + j;
 
-// Return the corners of the triangles between pixels on one surface.
-function surfaceTriangles({ right, down }) {
+// Return the corners of the triangles between pixels on one surface: those of mirrors, and all others.
+function surfaceTriangles({ right, down }, steps) {
   const [width, height] = DATA.size;
-  const corners = new Uint32Array(6 * width * height);
+  const matte = new Uint32Array(6 * width * height);
+  const mirrors = [];
   let count = 0;
-  const add = (...vertices) => {
-    corners.set(vertices, count);
-    count += 3;
+  const add = (isMirror, a, b, c) => {
+    if (isMirror) mirrors.push(a, b, c);
+    else {
+      matte[count] = a;
+      matte[count + 1] = b;
+      matte[count + 2] = c;
+      count += 3;
+    }
   };
+  const areMirrors = (a, b, c) => steps[a] > 0 && steps[b] > 0 && steps[c] > 0;
   for (let i = 0; i + 1 < height; i++) {
     for (let j = 0; j + 1 < width; j++) {
       const pixel = i * width + j;
+      const lower = pixel + width;
       const [vertex, next] = [vertexOf(i, j), vertexOf(i, j + 1)];
       const [below, diagonal] = [vertexOf(i + 1, j), vertexOf(i + 1, j + 1)];
-      if (right[pixel] && down[pixel]) add(vertex, next, below);
-      if (right[pixel + width] && down[pixel + 1]) add(next, diagonal, below);
+      if (right[pixel] && down[pixel]) add(areMirrors(pixel, pixel + 1, lower), vertex, next, below);
+      if (right[lower] && down[pixel + 1]) add(areMirrors(pixel + 1, lower + 1, lower), next, diagonal, below);
     }
   }
-  return corners.subarray(0, count);
+  return { matte: matte.subarray(0, count), mirrors: Uint32Array.from(mirrors) };
 }
 
 // Return whether all quads of a block are complete, and the block is flat enough for two triangles.
@@ -139,6 +153,22 @@ function coarseTriangles(inverses, { right, down }) {
   return Uint32Array.from(corners);
 }
 
+// Return the pixels without any triangle around them. In motion, only they are drawn one by one.
+function lonePixels(inverses, { right, down }) {
+  const [width, height] = DATA.size;
+  const upper = (i, j) => i >= 0 && j >= 0 && right[i * width + j] && down[i * width + j];
+  const lower = (i, j) => i >= 0 && j >= 0 && right[(i + 1) * width + j] && down[i * width + j + 1];
+  const lone = [];
+  for (let i = 0; i < height; i++) {
+    for (let j = 0; j < width; j++) {
+      const hasTriangle =
+        upper(i, j) || lower(i - 1, j - 1) || upper(i, j - 1) || lower(i, j - 1) || upper(i - 1, j) || lower(i - 1, j);
+      if (!hasTriangle && !Number.isNaN(inverses[i * width + j])) lone.push(i * width + j);
+    }
+  }
+  return lone;
+}
+
 // Return the pixels without all of the triangles that fit into the picture around them. They are drawn one by one.
 function tornPixels(inverses, { right, down }) {
   const [width, height] = DATA.size;
@@ -167,6 +197,12 @@ function pixelTriangles(pixels) {
     const first = 4 * vertexOf(Math.floor(pixel / width), pixel % width);
     return [first, first + 1, first + 2, first + 2, first + 1, first + 3];
   }));
+}
+
+// Return the vertices of these pixels.
+function pixelVertices(pixels) {
+  const width = DATA.size[0];
+  return Uint32Array.from(pixels, (pixel) => vertexOf(Math.floor(pixel / width), pixel % width));
 }
 
 // Return the roots of a picture's colours, sharpened as by `sharpen` in synthesis/kernels.py. The fourth number is the
@@ -200,12 +236,20 @@ function sharpRoots(light, { right, down }, torn) {
 // Bring a source onto the graphics card: colours, inverse distances and triangles.
 export function upload(source, light, depth) {
   const { gl } = walk;
-  const onSurface = inverseDistances(depth);
+  const inverses = inverseDistances(depth);
   const steps = stepsFarther(depth);
-  const joined = joins(onSurface, steps);
-  const inverses = onSurface.map((value, pixel) => value * (1 - steps[pixel] / WALK.steps));
+  const joined = joins(inverses);
   const torn = tornPixels(inverses, joined);
-  const marked = inverses.map((value) => (Number.isNaN(value) ? -1 : value));
+  const seeming = inverses.map((value, pixel) => value * (1 - steps[pixel] / WALK.steps));
+  const parted = tornAtMirrors(joined, steps);
+  const pairs = new Float32Array(2 * inverses.length);
+  inverses.forEach((value, pixel) => {
+    const isHit = !Number.isNaN(value);
+    pairs[2 * pixel] = isHit ? value : -1;
+    pairs[2 * pixel + 1] = isHit ? seeming[pixel] : -1;
+  });
+  const { matte, mirrors } = surfaceTriangles(joined, steps);
+  const shapes = (corners) => drawable(gl, gl.TRIANGLES, corners);
   const image = (format, layout, values) =>
     texture(gl, gl.TEXTURE_2D, format, ...DATA.size, 0, layout, gl.FLOAT, values);
   const roots = image(gl.RGBA16F, gl.RGBA, sharpRoots(light, joined, torn));
@@ -213,11 +257,12 @@ export function upload(source, light, depth) {
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   Object.assign(source, {
     light: roots,
-    inverses: image(gl.R32F, gl.RED, marked),
-    surface: triangles(gl, surfaceTriangles(joined)),
-    coarse: triangles(gl, coarseTriangles(inverses, joined)),
-    pixels: triangles(gl, pixelTriangles(torn)),
-    points: triangles(gl, Uint32Array.from(torn, (pixel) => vertexOf(Math.floor(pixel / DATA.size[0]), pixel % DATA.size[0]))),
+    inverses: image(gl.RG32F, gl.RG, pairs),
+    surface: shapes(matte),
+    mirrors: shapes(mirrors),
+    pixels: shapes(pixelTriangles(torn)),
+    coarse: shapes(coarseTriangles(seeming, parted)),
+    points: drawable(gl, gl.POINTS, pixelVertices(lonePixels(seeming, parted))),
     isLoaded: true,
   });
 }

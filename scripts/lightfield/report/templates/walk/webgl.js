@@ -32,14 +32,14 @@ export function texture(gl, kind, ...image) {
   return created;
 }
 
-// Return triangles without attributes. A shader looks everything up by a vertex's number.
-export function triangles(gl, corners) {
+// Return triangles or points without attributes. A shader looks everything up by a vertex's number.
+export function drawable(gl, kind, corners) {
   const vertices = gl.createVertexArray();
   gl.bindVertexArray(vertices);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
   gl.bindVertexArray(null);
-  return { vertices, count: corners.length };
+  return { vertices, count: corners.length, kind };
 }
 
 // Bind a program's textures. `textures` has the kind and the texture by the uniform's name.

@@ -4,14 +4,18 @@
 precision highp float;
 precision highp int;
 precision highp sampler2D;
-uniform sampler2D rays, inverses;
+uniform sampler2D rays;
+// Inverse distances: of the surface, and of where a reflection on it seems to be.
+uniform sampler2D inverses;
+// Whether reflections are drawn where they seem to be.
+uniform bool isSeeming;
 // The roots of colours; alpha is the certainty of a pixel.
 uniform sampler2D light;
 uniform int stride;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
-uniform float near, spread, sharp;
+uniform float near, spread, sharp, closest, unmoved;
 // The width of a source's pixel at the distance 1, in pixels of the picture.
 uniform float pointSize;
 out vec4 shade;
@@ -20,7 +24,8 @@ out float towards;
 out float nearness;
 
 void place(ivec2 pixel, vec3 ray) {
-  float inverse = texelFetch(inverses, pixel, 0).r;
+  vec2 distances = texelFetch(inverses, pixel, 0).rg;
+  float inverse = isSeeming ? distances.g : distances.r;
   vec3 direction = turn * ray;
   vec3 seen = direction + inverse * offset;
   vec3 eye = back * seen;
@@ -32,6 +37,8 @@ void place(ivec2 pixel, vec3 ray) {
   shade = texelFetch(light, pixel, 0);
   nearness = inverse / here;
   spot = (vec2(pixel) + 0.5) / vec2(textureSize(rays, 0));
-  towards = 1.0 / (penalty * penalty);
+  // The unit of `here` is the source's distance, so a near source counts more: it sees more.
+  float worth = min(here, closest) / penalty;
+  towards = worth * worth * (!isSeeming && distances.r != distances.g ? unmoved : 1.0);
 }
 
