@@ -1,7 +1,8 @@
 """Check every byte of datasets against the checksums of their files.
 
 Prints a line for each damaged file, with what is wrong. The exit status is then 1. For a copy of a
-dataset, DATASET is enough. --work also checks the files that the dataset was made from.
+dataset, DATASET is enough. --work also checks the files that the dataset was made from. The folder
+of a family stands for its corpus: its page, its shards, and all datasets of its members.
 """
 
 import argparse
@@ -23,6 +24,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.dataset.corpus import CORPUS
+    from lightfield.validation.corpus_integrity import corpus_faults
     from lightfield.validation.integrity import Integrity
 
     if arguments.mend and not arguments.work:
@@ -32,6 +35,11 @@ def main() -> None:
     for folder in arguments.dataset:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
+        if (folder / CORPUS).is_file():
+            for fault in corpus_faults(folder):
+                problems[fault.path] = fault.problem
+                print(fault, flush=True)
+            continue
         integrity = Integrity(folder, arguments.work)
         # All datasets of a scene share its files. Name them once.
         faults = [fault for fault in integrity.faults() if fault.path not in problems]

@@ -1,0 +1,52 @@
+"""Checks that all files of a corpus are as they were written, down to the views of its members.
+
+The sums over a corpus have the sum of each dataset's own list of sums.
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from lightfield.core.files import broken, read_json
+from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
+from lightfield.validation.files import SUMS, read_sums
+from lightfield.validation.integrity import Fault, Integrity, file_problem
+
+
+def corpus_faults(folder: Path) -> Iterator[Fault]:
+    """Yield every fault of the corpus in the family's ``folder``, one for each file."""
+    path = folder / SUMS
+    problem = broken(path) if path.exists() else "is missing; the next run makes it"
+    if problem:
+        yield Fault(path, problem)
+        return
+    try:
+        sums = read_sums(path)
+    except UnicodeDecodeError:
+        yield Fault(path, "is not text in UTF-8")
+        return
+    faulty = set()
+    for name, digest in sums.items():
+        problem = file_problem(folder / name, digest, str(path))
+        if problem:
+            faulty.add(name)
+            yield Fault(folder / name, problem)
+    for name in sums:
+        if name.endswith(f"/{SUMS}") and name not in faulty:
+            yield from Integrity((folder / name).parent).faults()
+    for name in sorted(_required(folder, sums) - sums.keys() - faulty):
+        yield Fault(folder / name, f"has no checksum in {path}")
+    for pattern in (f"{THUMBNAILS}/*", f"{SHARDS}/*/*"):
+        for extra in sorted(folder.glob(pattern)):
+            if extra.relative_to(folder).as_posix() not in sums:
+                yield Fault(extra, "is not a file of this corpus, or has no checksum")
+
+
+def _required(folder: Path, sums: Mapping[str, str]) -> set[str]:
+    """Return corpus.json and, if its checksum holds, the lists of sums of the datasets in it."""
+    if file_problem(folder / CORPUS, sums.get(CORPUS, ""), SUMS):
+        return {CORPUS}
+    members = read_json(folder / CORPUS)["members"]
+    lists = {
+        f"{member['name']}/{rig}/{SUMS}" for member in members for rig in member.get("datasets", {})
+    }
+    return {CORPUS, *lists}
