@@ -74,6 +74,7 @@ include: "rules/flow.smk"
 include: "rules/mesh.smk"
 include: "rules/export.smk"
 include: "rules/validate.smk"
+include: "rules/family.smk"
 include: "rules/report.smk"
 include: "rules/costs.smk"
 include: "rules/package.smk"
@@ -107,6 +108,7 @@ onsuccess:
     end_display()
     end_notes()
     print_pages()
+    print_families()
 
 
 onerror:
@@ -125,7 +127,8 @@ rule all:
     default_target: True
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
-        f"{RESULTS}/index.html",
+        f"{RESULTS}/index.html" if CHOSEN else [],
+        family_targets(),
 
 
 rule report_html:

@@ -263,6 +263,13 @@ def print_pages():
         print(f"valid: {page}", file=sys.stderr)
 
 
+def print_families():
+    """Print how many members of each family are built, if this run has counted them."""
+    for job in needed_jobs():
+        if job.rule.name == COUNT_MEMBERS:
+            print(Path(job.log[0]).read_text().strip(), file=sys.stderr)
+
+
 def dataset_name_of(job):
     """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
     wildcards = job.wildcards
