@@ -127,7 +127,7 @@ rule all:
     default_target: True
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
-        f"{RESULTS}/index.html" if CHOSEN else [],
+        f"{RESULTS}/index.html",
         family_targets(),
 
 

@@ -30,11 +30,33 @@ rule build_members:
         " --record {output} > {log} 2>&1"
 
 
-# It fails if a member has failed, after all others are built.
+rule corpus:
+    input:
+        settings=corpus_settings,
+        records=batch_records,
+    output:
+        [f"{RESULTS}/{{family}}/{name}" for name in CORPUS_FILES],
+    log:
+        log_of("{family}/corpus"),
+    benchmark:
+        times_of("{family}/corpus")
+    localrule: True
+    params:
+        folder=f"{RESULTS}/{{family}}",
+        cache=f"{WORK}/{{family}}/looks.json",
+    message:
+        "Collecting the members of {wildcards.family}"
+    shell:
+        f"python {SCRIPTS}/corpus.py"
+        " {params.folder} --settings {input.settings} --cache {params.cache} > {log} 2>&1"
+
+
+# It fails if a member has failed, after all others are built and collected.
 rule count_members:
     input:
         settings=count_settings,
         records=batch_records,
+        corpus=ancient(f"{RESULTS}/{{family}}/corpus.json"),
     output:
         f"{WORK}/{{family}}/members.json",
     log:

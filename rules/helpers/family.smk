@@ -1,5 +1,6 @@
 # Functions for the rules of family.smk.
 from lightfield.dataset import keys
+from lightfield.dataset.corpus import CORPUS_FILES, CorpusSettings
 from lightfield.dataset.family import outdated_members
 from lightfield.dataset.job_settings import BatchSettings, CountSettings
 
@@ -78,6 +79,15 @@ def count_settings(wildcards):
     )
 
 
+def corpus_settings(wildcards):
+    """Return the settings file of a family's corpus. It names all members."""
+    folder = wildcards.family
+    options = FAMILIES[FAMILY_FOLDERS[folder]].corpus
+    members = [member.name for batch in batches_of(folder).values() for member in batch]
+    settings = CorpusSettings(**dict(options), family=folder, members=sorted(members))
+    return settings_file(f"{WORK}/{folder}/settings/corpus.json", settings.as_json())
+
+
 def batch_threads(wildcards):
     """Return the cores of each batch: one, or more if there are fewer batches than cores."""
     count = sum(len(batches_of(folder)) for folder in FAMILY_FOLDERS)
@@ -86,4 +96,13 @@ def batch_threads(wildcards):
 
 def family_targets():
     """Return the files that a run with families makes."""
-    return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS]
+    return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS] + corpora()
+
+
+def corpora():
+    """Return the files of the chosen families' corpora."""
+    return [
+        f"{RESULTS}/{folder}/{name}"
+        for folder in FAMILY_FOLDERS
+        for name in CORPUS_FILES
+    ]

@@ -21,6 +21,7 @@ from pydantic import Field, model_validator
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE
 from lightfield.core.settings import Settings, as_list, pattern
+from lightfield.dataset.corpus import CorpusOptions
 from lightfield.dataset.names import MODELS
 
 # Planning more members would take minutes.
@@ -106,6 +107,9 @@ class Family(Settings):
         32,
         description="How many members one job builds, at most about.",
         json_schema_extra={"unit": "members"},
+    )
+    corpus: CorpusOptions = Field(
+        CorpusOptions(), description="How the members become one corpus: splits, and shards."
     )
 
     @model_validator(mode="after")

@@ -8,14 +8,9 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset.corpus import (
-    CORPUS,
-    RECORD,
-    THUMBNAILS,
-    CorpusSettings,
-    Member,
-    read_members,
-)
+from lightfield.dataset.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
+from lightfield.dataset.family import RECORD
+from lightfield.dataset.member_record import MemberRecord, read_members
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import corpus_looks, corpus_page, corpus_shards
 from lightfield.report.corpus_looks import Look
@@ -45,7 +40,7 @@ def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]
 
 
 def describe(
-    settings: CorpusSettings, members: Sequence[Member], looks: Mapping[str, Look]
+    settings: CorpusSettings, members: Sequence[MemberRecord], looks: Mapping[str, Look]
 ) -> dict[str, Any]:
     """Return the content of corpus.json."""
     entries = [_entry(settings, member, looks.get(member.name, {})) for member in members]
@@ -68,7 +63,7 @@ def describe(
     }
 
 
-def _entry(settings: CorpusSettings, member: Member, look: Look) -> dict[str, Any]:
+def _entry(settings: CorpusSettings, member: MemberRecord, look: Look) -> dict[str, Any]:
     """Return what corpus.json says of a member."""
     entry: dict[str, Any] = {"name": member.name}
     entry |= member.model_dump(include={"seed", "model"}, exclude_none=True)
@@ -87,7 +82,9 @@ def _entry(settings: CorpusSettings, member: Member, look: Look) -> dict[str, An
     return entry
 
 
-def _statistics(members: Sequence[Member], valid: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _statistics(
+    members: Sequence[MemberRecord], valid: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     """Return the statistics of the members, those of pictures and values over ``valid`` ones."""
     keys = sorted({key for entry in valid for key in entry["values"]})
     depths = [entry["depth"] for entry in valid if entry.get("depth")]
@@ -137,15 +134,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def write_sums(folder: Path, members: Iterable[Member], looks: Mapping[str, Look]) -> None:
+def write_sums(folder: Path, members: Iterable[MemberRecord], looks: Mapping[str, Look]) -> None:
     """Write the sums over a corpus, those of its members' datasets by their own lists of sums.
 
     Raises `UserError` for a dataset whose list is not as the member's record says.
     """
-    sums = {
-        name: sha256(folder / name)
-        for name in (CORPUS, corpus_page.PAGE, *corpus_shards.files(folder))
-    }
+    sums = {name: sha256(folder / name) for name in (CORPUS, PAGE, *corpus_shards.files(folder))}
     for member in members:
         sums[f"{member.name}/{RECORD}"] = sha256(folder / member.name / RECORD)
         if member.name in looks:
@@ -165,7 +159,7 @@ def summary(content: Mapping[str, Any], folder: Path) -> str:
     """Return in one line what a corpus has."""
     numbers = content["statistics"]
     text = (
-        f"{folder / corpus_page.PAGE}: {numbers['valid']:,} of {numbers['members']:,} members, "
+        f"{folder / PAGE}: {numbers['valid']:,} of {numbers['members']:,} members, "
         f"{numbers['views']:,} views, {numbers['bytes'] / 1e9:.3g} GB"
     )
     return f"{text}; {numbers['failed']:,} failed" if numbers["failed"] else text

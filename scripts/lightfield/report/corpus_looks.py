@@ -16,8 +16,9 @@ from PIL import Image
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.corpus import THUMBNAILS, Member
+from lightfield.dataset.corpus import THUMBNAILS
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.member_record import MemberRecord
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging import images, pictures
 from lightfield.validation.files import IMAGES
@@ -37,7 +38,7 @@ Array = pictures.Array
 Look = Mapping[str, Any]
 
 
-def looks(folder: Path, members: Sequence[Member], cache: Path) -> dict[str, Look]:
+def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[str, Look]:
     """Return the look of each valid member by its name, and write the missing thumbnails.
 
     Removes the thumbnails of others. ``folder`` is the family's. Raises `UserError` if a view is
@@ -79,14 +80,14 @@ def _read(cache: Path) -> dict[str, dict[str, Any]]:
     return content if isinstance(content, dict) else {}
 
 
-def _made_of(member: Member) -> str:
+def _made_of(member: MemberRecord) -> str:
     """Return what changes with any byte of a member's datasets, and with how they are shown."""
     sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
     made_of = repr([sums, VIEWS, THUMBNAIL, QUALITY, BACKGROUND])
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 
-def _holds(folder: Path, member: Member, cached: Mapping[str, dict[str, Any]]) -> bool:
+def _holds(folder: Path, member: MemberRecord, cached: Mapping[str, dict[str, Any]]) -> bool:
     """Return whether the cache knows a member as it is, and its thumbnail is whole."""
     entry = cached.get(member.name, {})
     path = thumbnail(folder, member.name)
@@ -97,7 +98,7 @@ def _holds(folder: Path, member: Member, cached: Mapping[str, dict[str, Any]]) -
     )
 
 
-def _look(folder: Path, member: Member) -> dict[str, Any]:
+def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
     """Read views of a member, and write its thumbnail. Return what the views show.
 
     - ``depth``: the least and the largest distance in metres, or null without any surface.

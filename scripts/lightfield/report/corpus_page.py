@@ -12,11 +12,11 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
+from lightfield.dataset.corpus import PAGE
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import page
 from lightfield.validation.files import REPORT
 
-PAGE = "index.html"
 # The size of a histogram in units of its SVG.
 WIDTH = 240
 HEIGHT = 80

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.dataset.corpus import SHARDS, CorpusSettings, Member
+from lightfield.dataset.corpus import SHARDS, CorpusSettings
+from lightfield.dataset.member_record import MemberRecord
 from lightfield.geometry.rigs.split_setting import PARTS, Part
 from lightfield.report import shards
 
 
-def write(folder: Path, settings: CorpusSettings, members: Sequence[Member]) -> None:
+def write(folder: Path, settings: CorpusSettings, members: Sequence[MemberRecord]) -> None:
     """Write the shards of the valid members, if the settings ask for them. Remove all others."""
     written = set()
     keys: set[str] = set()
@@ -46,7 +47,7 @@ def _check_keys(folder: Path, samples: Sequence[shards.Sample], keys: set[str]) 
         keys.add(sample.key)
 
 
-def _samples(folder: Path, members: Sequence[Member], part: Part) -> Iterator[shards.Sample]:
+def _samples(folder: Path, members: Sequence[MemberRecord], part: Part) -> Iterator[shards.Sample]:
     """Yield the samples of members, one member after the other: there may be very many."""
     for member in members:
         for rig in sorted(member.datasets):
