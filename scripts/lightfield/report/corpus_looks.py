@@ -28,8 +28,6 @@ VIEWS = 4
 # Pixels of a thumbnail's longer side.
 THUMBNAIL = 160
 QUALITY = 75
-# Behind what transparent views show, in sRGB.
-BACKGROUND = 0.5
 # The cache is written each time after so many members, because a kill may come.
 STEP = 200
 
@@ -83,7 +81,7 @@ def _read(cache: Path) -> dict[str, dict[str, Any]]:
 def _made_of(member: MemberRecord) -> str:
     """Return what changes with any byte of a member's datasets, and with how they are shown."""
     sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
-    made_of = repr([sums, VIEWS, THUMBNAIL, QUALITY, BACKGROUND])
+    made_of = repr([sums, VIEWS, THUMBNAIL, QUALITY])
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 
@@ -163,10 +161,12 @@ def _webp(image: Array) -> bytes:
     height, width = image.shape[:2]
     scale = min(1.0, THUMBNAIL / max(width, height))
     small = pictures.shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
-    colour = small[..., :3]
-    developed = pictures.develop(colour, pictures.exposure_for(colour))
-    behind = 255 * BACKGROUND * (1 - small[..., 3:].clip(0, 1))
-    pixels = np.rint(np.clip(developed + behind, 0, 255)).astype(np.uint8)
+    exposure = pictures.exposure_for(small[..., :3])
+    # Behind what transparent views show is a middle grey.
+    grey = pictures.MIDDLE_GREY / 2**exposure
+    colour = small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1))
     file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "WEBP", quality=QUALITY, method=4)
+    Image.fromarray(pictures.develop(colour, exposure)).save(
+        file, "WEBP", quality=QUALITY, method=4
+    )
     return file.getvalue()

@@ -105,8 +105,11 @@ def _drawn(title: str, distribution: Mapping[str, Any]) -> Markup:
     """Return a distribution as an SVG: the histogram of numbers, or a bar for each other value."""
     if "histogram" in distribution:
         bars = distribution["histogram"]
-        names = [page.number(distribution[key]) for key in ("least", "median", "largest")]
-        label = f"{title}: from {names[0]} to {names[2]}, half of them up to {names[1]}"
+        least, median, largest = (
+            page.number(distribution[key]) for key in ("least", "median", "largest")
+        )
+        names = [least, f"median {median}", largest]
+        label = f"{title}: from {least} to {largest}, median {median}"
     else:
         counts = _most_frequent(distribution["counts"])
         bars = [count for _, count in counts]
