@@ -162,6 +162,7 @@ CHECK_BLEND = rule_name("check_blend")
 INVENTORY = rule_name("inventory")
 IMPORT_VIEWS = rule_name("import_views")
 MEASURE_LEARNING = rule_name("measure_learning")
+BUILD_MEMBERS = rule_name("build_members")
 COUNT_MEMBERS = rule_name("count_members")
 
 

@@ -109,6 +109,8 @@ def estimated_seconds(job):
         return calibration_seconds(target, min(dataset.rig.camera.resolution), most)
     if phase_of(job) in UNKNOWN_PHASES:
         return None
+    if name == BUILD_MEMBERS:
+        return START_UP_SECONDS + batch_seconds(wildcards)
     if name in BLENDER_RULES:
         return START_UP_SECONDS
     if not is_of_dataset(job):
@@ -283,8 +285,12 @@ def dataset_name_of(job):
 
 def work_of(job):
     """Return a job's part of the forecast."""
-    views = rendered_views(job)
-    size = views * dataset_of(job.wildcards).estimate.all_view_bytes if views else 0.0
+    if job.rule.name == BUILD_MEMBERS:
+        views, size = batch_views(job.wildcards)
+    else:
+        views = rendered_views(job)
+        estimate = dataset_of(job.wildcards).estimate if views else None
+        size = views * estimate.all_view_bytes if estimate else 0.0
     seconds = estimated_seconds(job) or 0.0
     return Work(phase_of(job), dataset_name_of(job), views, seconds, size)
 

@@ -1,9 +1,11 @@
 # Functions for the rules of family.smk.
 from lightfield.dataset import keys
 from lightfield.dataset.corpus import CORPUS_FILES, CorpusSettings
-from lightfield.dataset.family import outdated_members
+from lightfield.dataset.family import RECORD, outdated_members
 from lightfield.dataset.job_settings import BatchSettings, CountSettings
 
+# The CPU seconds of a member beside its views, and those of the checks.
+MEMBER_SECONDS = 0.5
 # The names of the chosen families, by their folders.
 FAMILY_FOLDERS = {family_folder(name, SETTINGS): name for name in FAMILIES}
 
@@ -92,6 +94,43 @@ def batch_threads(wildcards):
     """Return the cores of each batch: one, or more if there are fewer batches than cores."""
     count = sum(len(batches_of(folder)) for folder in FAMILY_FOLDERS)
     return max(1, (workflow.cores or 1) // count)
+
+
+@cache
+def member_datasets(folder):
+    """Return the datasets of a member that stands for all members of a family."""
+    limits = SETTINGS.presets[SETTINGS.preset]
+    return scene_datasets(FAMILY_FOLDERS[folder], SETTINGS.preset, limits, SETTINGS)
+
+
+def missing_members(wildcards):
+    """Return how many members of a batch have no record yet."""
+    folder = wildcards.family
+    names = [member.name for member in batches_of(folder)[wildcards.batch]]
+    return sum(
+        not os.path.exists(f"{RESULTS}/{folder}/{name}/{RECORD}") for name in names
+    )
+
+
+def batch_views(wildcards):
+    """Return how many views the missing members of a batch have, and their bytes."""
+    datasets = member_datasets(wildcards.family)
+    views = sum(dataset.view_count for dataset in datasets)
+    size = sum(d.view_count * d.estimate.all_view_bytes for d in datasets)
+    members = missing_members(wildcards)
+    return members * views, members * size
+
+
+def batch_seconds(wildcards):
+    """Return the estimated CPU seconds of the missing members of a batch."""
+    seconds = 0.0
+    for dataset in member_datasets(wildcards.family):
+        estimate = dataset.estimate
+        view_seconds = estimate.view_seconds + sum(
+            map(estimate.reprojection_seconds, dataset.reprojections)
+        )
+        seconds += dataset.view_count * view_seconds + estimate.check_seconds
+    return missing_members(wildcards) * (seconds + MEMBER_SECONDS)
 
 
 def family_targets():

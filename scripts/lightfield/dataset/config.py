@@ -862,17 +862,6 @@ class Scene(Credits):
 
     @model_validator(mode="before")
     @classmethod
-    def _values_of_members(cls, content: Any) -> Any:
-        """Give a family the values of a stand-in, so that mistakes in them are found."""
-        match content:
-            case {"family": dict()}:
-                # The field's own check reports a wrong block.
-                with suppress(ValidationError, TypeError):
-                    return stand_in(content)
-        return content
-
-    @model_validator(mode="before")
-    @classmethod
     def _rigs_of_dataset(cls, content: Any) -> Any:
         match content:
             case {"scene": {"dataset": str(dataset)}}:
@@ -1263,7 +1252,12 @@ def check_member(content: Any, name: str) -> Scene:
 def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
-    return checked(_SCENE, read_yaml(path, file), file)
+    content = read_yaml(path, file)
+    if isinstance(content, dict) and "family" in content:
+        # The check below reports a block `family` that is wrong itself.
+        with suppress(ValidationError, TypeError):
+            content = stand_in(content)
+    return checked(_SCENE, content, file)
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:

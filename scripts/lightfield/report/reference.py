@@ -16,6 +16,7 @@ from pydantic import BaseModel, TypeAdapter
 from lightfield.core.settings import MEANINGS
 from lightfield.dataset import (
     config,
+    corpus,
     exports,
     family,
     job_settings,
@@ -122,10 +123,13 @@ KEY_PAGES: dict[str, Page] = {
         [
             Section("family", family.Family),
             Section("family: values", family.Draw),
+            Section("family: corpus", corpus.CorpusOptions),
+            Section("family: corpus: splits", corpus.Shares),
             # The settings files of its jobs.
             Section("The settings file of build_members.py", job_settings.BatchSettings),
             Section("The settings file of build_members.py: members", family.Member),
             Section("The settings file of count_members.py", job_settings.CountSettings),
+            Section("The settings file of corpus.py", corpus.CorpusSettings),
         ],
     ),
     "render-keys.md": Page(
@@ -257,8 +261,8 @@ PROGRAM_PAGES = {
     ),
     "programs-family.md": (
         "Programs that build families",
-        "These programs build the members of families of scenes, and count them.",
-        ["build_members", "count_members"],
+        "These programs build the members of families of scenes, collect them, and count them.",
+        ["build_members", "corpus", "count_members"],
     ),
     "programs-render.md": (
         "Programs that render",
