@@ -132,7 +132,8 @@ def _refusal(path: Path, message: str) -> str:
     if "Traceback" in message:
         # Blender adds the place of the operator's call.
         lines = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)][-1:] or lines
-    reason = lines[0].removeprefix("Error: ").rstrip(".")
+    # Messages must be the same in every folder: the record of a family's member has them.
+    reason = lines[0].removeprefix("Error: ").rstrip(".").replace(str(path.absolute()), str(path))
     return (
         f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; export the model "
         "again"
