@@ -25,7 +25,7 @@ def main() -> None:
 
     # Only now, so that --help need not wait for these.
     from lightfield.dataset.corpus import CORPUS
-    from lightfield.validation.corpus_integrity import corpus_faults
+    from lightfield.validation.corpus_integrity import corpus_faults, mend
     from lightfield.validation.integrity import Integrity
 
     if arguments.mend and not arguments.work:
@@ -36,9 +36,11 @@ def main() -> None:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
         if (folder / CORPUS).is_file():
-            for fault in corpus_faults(folder):
+            for fault in [*corpus_faults(folder)]:
                 problems[fault.path] = fault.problem
                 print(fault, flush=True)
+                if arguments.mend:
+                    mend(folder, fault, arguments.work)
             continue
         integrity = Integrity(folder, arguments.work)
         # All datasets of a scene share its files. Name them once.

@@ -323,6 +323,32 @@ def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, 
     assert result.stderr.splitlines()[-1].startswith("error: 1 faults")
 
 
+@pytest.mark.parametrize(
+    ("name", "renewed"),
+    [
+        ("0001/plane/exr/view_0000f.exr", {"0001/plane/sha256sums.txt"}),
+        ("0002/plane/sha256sums.txt", set()),
+        ("0003/member.json", set()),
+        ("thumbnails/0001.webp", set()),
+        ("corpus.json", set()),
+    ],
+)
+def test_mending_sets_aside_what_the_next_run_must_make_again(
+    built, tmp_path, monkeypatch, run_program, name, renewed
+):
+    monkeypatch.chdir(tmp_path)
+    folder = shutil.copytree(built, tmp_path / "results/chairs")
+    before = files(folder)
+    (folder / name).write_bytes(b"damaged")
+    arguments = ("results/chairs", "--work", "work", "--mend")
+    result = run_program("verify.py", *arguments, check=False, cwd=tmp_path)
+    assert result.returncode == 1
+    assert "the next run makes them again" in result.stderr
+    removed = {name, "sha256sums.txt"} | renewed
+    assert before.keys() - files(folder).keys() == removed
+    assert files(tmp_path / "work/removed/results/chairs").keys() == removed
+
+
 # ---- the page --------------------------------------------------------------------------------
 
 

@@ -138,6 +138,11 @@ def family_targets():
     return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS] + corpora()
 
 
+def family_folders():
+    """Return the folders of the chosen families' corpora."""
+    return [f"{RESULTS}/{folder}" for folder in FAMILY_FOLDERS]
+
+
 def corpora():
     """Return the files of the chosen families' corpora."""
     return [

@@ -3,10 +3,11 @@
 The sums over a corpus have the sum of each dataset's own list of sums.
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from lightfield.core.files import broken, read_json
+from lightfield.core.files import broken, read_json, set_aside
 from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
 from lightfield.validation.files import SUMS, read_sums
 from lightfield.validation.integrity import Fault, Integrity, file_problem
@@ -39,6 +40,20 @@ def corpus_faults(folder: Path) -> Iterator[Fault]:
         for extra in sorted(folder.glob(pattern)):
             if extra.relative_to(folder).as_posix() not in sums:
                 yield Fault(extra, "is not a file of this corpus, or has no checksum")
+
+
+def mend(folder: Path, fault: Fault, work: Path) -> None:
+    """Set a faulty file of a corpus aside, with the lists of sums that the next run must renew.
+
+    A batch of members runs again if a list of sums or a record of its members is missing.
+    """
+    parts = Path(os.path.relpath(fault.path, folder)).parts
+    lists = [folder / SUMS]
+    if len(parts) > 2 and parts[0] not in (THUMBNAILS, SHARDS):
+        lists.append(folder / parts[0] / parts[1] / SUMS)
+    for path in (fault.path, *lists):
+        if os.path.lexists(path):
+            set_aside(path, work / "removed")
 
 
 def _required(folder: Path, sums: Mapping[str, str]) -> set[str]:
