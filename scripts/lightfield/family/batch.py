@@ -120,21 +120,14 @@ def _build_members(
 
 
 def _content(builds: Mapping[str, MemberBuild]) -> dict[str, Any]:
-    """Return the content of a batch's record: each member's state, and the models' files.
+    """Return the content of a batch's record: each member's record, and the models' files.
 
     The plan of a run compares the models' files, to know which batches are outdated.
     """
     members = {}
     sources: dict[str, list[int] | None] = {}
     for name, build in builds.items():
-        record = read_json(build.record)
-        members[name] = {"state": record["state"], "key": record["key"]}
-        if record["state"] == "failed":
-            members[name]["failure"] = record["failure"]
-        else:
-            members[name]["datasets"] = {
-                rig: entry["sha256sums"] for rig, entry in record["datasets"].items()
-            }
+        members[name] = read_json(build.record)
         home = Path(build.member.model or "").parent
         for source in build.sources():
             path = Path(os.path.normpath(home / source))
