@@ -13,7 +13,7 @@ rule build_members:
         log_of("{family}/batches/{batch}"),
     benchmark:
         times_of("{family}/batches/{batch}")
-    # With a store a user's files lie where Snakemake runs.
+    # With a store, model files lie where Snakemake runs.
     localrule: bool(STORE) and any(family.models for family in FAMILIES.values())
     threads: batch_threads
     resources:

@@ -214,14 +214,15 @@ def test_the_journal_says_at_which_member_a_run_died():
     assert member_at_hand([*DIED, {"failed": "0002"}]) is None
 
 
-def test_a_member_has_failed_when_two_runs_died_at_it_and_not_before():
+def test_a_member_has_failed_when_three_runs_died_at_it_and_not_before():
     again = [{"started": 5}, {"member": "0002", "began": 6}]
     assert deadly_member(DIED) is None
-    assert deadly_member([*DIED, *again]) == "0002"
+    assert deadly_member([*DIED, *again]) is None
+    assert deadly_member([*DIED, *again, *again]) == "0002"
     elsewhere = [{"started": 5}, {"member": "0003", "began": 6}]
-    assert deadly_member([*DIED, *elsewhere]) is None
+    assert deadly_member([*DIED, *again, *elsewhere]) is None
     # Another worker of the same run went on.
-    assert deadly_member([*DIED, {"failed": "0002"}, *again]) is None
+    assert deadly_member([*DIED, {"failed": "0002"}, *again, *again]) is None
 
 
 def count(folder, *states):

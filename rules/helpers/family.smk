@@ -53,8 +53,9 @@ def batch_settings(wildcards):
     settings = BatchSettings.of(members=members, **common_settings(folder))
     if IS_MAIN_PROCESS:
         mark_noted_files()
+        # With a storage, the members are not here.
         record = batch_record(folder, wildcards.batch)
-        if outdated_members(Path(record), Path(RESULTS, folder)):
+        if not STORE and outdated_members(Path(record), Path(RESULTS, folder)):
             rerun([record])
     path = f"{WORK}/{folder}/settings/batches/{wildcards.batch}.json"
     return settings_file(path, settings.as_json())

@@ -3,7 +3,8 @@
 A worker process builds the members. If a signal ends it, as when memory runs out or Blender
 crashes, the member at hand has failed, and another worker goes on with the next. A journal beside
 the batch's record says what each process did. So if this process dies as well, the next run knows
-which member was at hand. A member at which two runs have died has failed.
+which member was at hand, and builds it last: a user may have killed the run, or the member may have
+taken all memory. A member at which three runs in a row have died has failed.
 """
 
 import os
@@ -15,6 +16,8 @@ from collections.abc import Mapping, Sequence
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
@@ -29,7 +32,7 @@ from lightfield.family.member import MemberBuild
 # These signals stop a run. They are no fault of the member at hand.
 STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 # A member at which so many runs died has failed.
-MOST_DEATHS = 2
+MOST_DEATHS = 3
 
 
 def run(settings: BatchSettings, record: Path, device: str, threads: int) -> None:
@@ -41,7 +44,9 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
     builds = {member.name: MemberBuild(settings, member) for member in settings.members}
     leftovers.remove()
     failed: list[str] = []
-    if name := deadly_member(read_json_lines(journal) if journal.exists() else []):
+    lines = list(read_json_lines(journal)) if journal.exists() else []
+    last = member_at_hand(lines)
+    if name := deadly_member(lines):
         if name in builds:
             builds[name].fail(
                 builds[name].last_stage(),
@@ -51,7 +56,7 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
         append_json_line(journal, {"failed": name})
     started = {"started": round(time.time(), 3), "host": socket.gethostname(), "pid": os.getpid()}
     append_json_line(journal, started)
-    while signal_number := _work(settings, journal, failed, device, threads):
+    while signal_number := _work(settings, journal, failed, last, device, threads):
         name = member_at_hand(read_json_lines(journal))
         if name is None or signal_number in STOPS:
             raise UserError(f"killed by {signal.Signals(signal_number).name}")
@@ -63,10 +68,19 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
 
 
 def _work(
-    settings: BatchSettings, journal: Path, failed: Sequence[str], device: str, threads: int
+    settings: BatchSettings,
+    journal: Path,
+    failed: Sequence[str],
+    last: str | None,
+    device: str,
+    threads: int,
 ) -> int:
-    """Let a worker build the members but for ``failed``. Return the signal that ended it, or 0."""
+    """Let a worker build the members but for ``failed``, and the ``last`` one at the end.
+
+    Returns the signal that ended the worker, or 0.
+    """
     members = [member for member in settings.members if member.name not in failed]
+    members.sort(key=lambda member: member.name == last)
     arguments = (settings, members, journal, device, threads)
     worker = get_context("spawn").Process(target=build_members, args=arguments)
     worker.start()
@@ -107,6 +121,7 @@ def _build_members(
                 "state": record["state"],
                 "finished": round(time.time(), 3),
                 "cpu_seconds": round(time.process_time() - began, 3),
+                "memory_bytes": psutil.Process().memory_info().rss,
             },
         )
         if record["state"] == "failed":
@@ -120,21 +135,14 @@ def _build_members(
 
 
 def _content(builds: Mapping[str, MemberBuild]) -> dict[str, Any]:
-    """Return the content of a batch's record: each member's state, and the models' files.
+    """Return the content of a batch's record: each member's record, and the models' files.
 
     The plan of a run compares the models' files, to know which batches are outdated.
     """
     members = {}
     sources: dict[str, list[int] | None] = {}
     for name, build in builds.items():
-        record = read_json(build.record)
-        members[name] = {"state": record["state"], "key": record["key"]}
-        if record["state"] == "failed":
-            members[name]["failure"] = record["failure"]
-        else:
-            members[name]["datasets"] = {
-                rig: entry["sha256sums"] for rig, entry in record["datasets"].items()
-            }
+        members[name] = read_json(build.record)
         home = Path(build.member.model or "").parent
         for source in build.sources():
             path = Path(os.path.normpath(home / source))

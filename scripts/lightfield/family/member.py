@@ -22,8 +22,11 @@ from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.family import FORMAT, RECORD, Member, drawn, member_content
 from lightfield.dataset.job_settings import BatchSettings
 from lightfield.dataset.loading import datasets_of
+from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
 
+# The file that only a valid dataset has.
+SUMS = "sha256sums.txt"
 # Raise this number when the stages make something else of equal settings.
 VERSION = 1
 # What a member is made of does not depend on these keys of a scene YAML.
@@ -43,6 +46,7 @@ class MemberBuild:
         self.record = self.folder / RECORD
         self.log = self.work / "member.log"
         self.values = drawn(settings.values, member)
+        self.store = ViewStore.configured()
         self.content = member_content(settings.scene, member, self.values)
 
     def _written(self) -> Scene:
@@ -96,17 +100,35 @@ class MemberBuild:
         return sorted({Path(os.path.relpath(file, path.parent)).as_posix() for file in files})
 
     def is_finished(self) -> bool:
-        """Return whether the member is valid, of the present settings, and has its bytes."""
+        """Return whether the member is valid, of the present settings, and has its bytes.
+
+        Of files in a storage, only the checksums and the names are compared.
+        """
+        if self.store:
+            self.store.bring(str(self.record))
         try:
             record = read_json(self.record)
             if record["state"] != "valid" or record["key"] != self.key():
                 return False
+            has_bytes = self._has_stored_files if self.store else _has_its_bytes
             return all(
-                _has_its_bytes(self.folder / rig, entry["sha256sums"])
+                has_bytes(self.folder / rig, entry["sha256sums"])
                 for rig, entry in record["datasets"].items()
             )
         except (UserError, OSError, *DAMAGE):
             return False
+
+    def _has_stored_files(self, folder: Path, digest: str) -> bool:
+        """Return whether the storage has a dataset's checksums, and all files that they name."""
+        assert self.store
+        sums = folder / SUMS
+        if not self.store.bring(str(sums)) or sha256(sums) != digest:
+            return False
+        names: dict[str, set[str]] = {}
+        for name in _read_sums(sums):
+            path = folder / name
+            names.setdefault(str(path.parent), set()).add(path.name)
+        return all(expected <= {*self.store.names(path)} for path, expected in names.items())
 
     def build(self, device: str, threads: int) -> dict[str, Any]:
         """Make the member's datasets, and return and write its record.
@@ -116,6 +138,9 @@ class MemberBuild:
         """
         # From now on the member is neither valid nor failed.
         self.record.unlink(missing_ok=True)
+        (self.work / "model.json").unlink(missing_ok=True)
+        if self.store:
+            self.store.remove(str(self.record))
         # Only now, because the process that starts workers needs no Blender.
         from lightfield.family.stages import Stages
 
@@ -141,7 +166,7 @@ class MemberBuild:
     def _remove_sums(self, datasets: list[Dataset]) -> None:
         """Remove the checksums of earlier datasets. A dataset without them is not valid."""
         for dataset in datasets:
-            Path(dataset.folder, "sha256sums.txt").unlink(missing_ok=True)
+            Path(dataset.folder, SUMS).unlink(missing_ok=True)
 
     def fail(self, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member. Removes what is half-written of it."""
@@ -160,7 +185,19 @@ class MemberBuild:
             record["model"] = member.model
         record |= {"values": self.values, **outcome}
         write_json(self.record, record)
+        if self.store:
+            self._send(record)
         return record
+
+    def _send(self, record: Mapping[str, Any]) -> None:
+        """Put the member's files into the storage, each under its path, and the record last."""
+        assert self.store
+        for rig in record["datasets"]:
+            sums = self.folder / rig / SUMS
+            for name in _read_sums(sums):
+                self.store.send(str(self.folder / rig / name))
+            self.store.send(str(sums))
+        self.store.send(str(self.record))
 
     def last_stage(self) -> str:
         """Return the stage at which a process was that died, by the member's log."""
@@ -174,7 +211,7 @@ class MemberBuild:
 def _listing(dataset: Dataset) -> dict[str, Any]:
     """Return what the record of a member says of a valid dataset."""
     folder = Path(dataset.folder)
-    sums = folder / "sha256sums.txt"
+    sums = folder / SUMS
     split = dataset.rig.split
     size = sum((folder / name).stat().st_size for name in _read_sums(sums))
     return {
@@ -193,7 +230,7 @@ def _read_sums(path: Path) -> Mapping[str, str]:
 
 def _has_its_bytes(folder: Path, digest: str) -> bool:
     """Return whether a dataset's checksums have this SHA-256, and its files these checksums."""
-    sums = folder / "sha256sums.txt"
+    sums = folder / SUMS
     if sha256(sums) != digest:
         return False
     return all(sha256(folder / name) == expected for name, expected in _read_sums(sums).items())
