@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import tarfile
+from pathlib import Path
 
 import accessibility
 import families
@@ -247,6 +248,38 @@ def test_two_members_with_the_same_key_in_shards_are_named(family):
         path.write_text(json.dumps(read_json(path) | {"name": name}))
     with pytest.raises(UserError, match="rename the member"):
         make(family, shards=True, splits={"validation": 0, "test": 0})
+
+
+# ---- without a shared folder --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shards", [False, True])
+def test_members_in_a_storage_become_the_same_corpus(members, tmp_path, monkeypatch, shards):
+    names = sorted(path.parent.name for path in members.glob("*/member.json"))
+    expected = shutil.copytree(members, tmp_path / "shared/results/chairs")
+    make(expected, members=names, shards=shards)
+    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
+    folder = Path("results/chairs")
+    make(folder, members=names, shards=shards)
+    made = ("corpus.json", "index.html", "sha256sums.txt")
+    assert [(folder / name).read_bytes() for name in made] == [
+        (expected / name).read_bytes() for name in made
+    ]
+    # Snakemake stores the files that are outputs, and the program all others.
+    sent = {*files(expected)} - {*files(members)} - {*made}
+    assert sent <= files(stored).keys()
+
+
+def test_a_view_that_the_storage_lacks_is_named(members, tmp_path, monkeypatch):
+    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
+    (stored / "0003/plane/exr/view_0001f.exr").unlink()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
+    with pytest.raises(UserError, match=r"0003/plane/exr/view_0001f\.exr: is missing"):
+        make(Path("results/chairs"), members=["0003"])
 
 
 # ---- sums ------------------------------------------------------------------------------------

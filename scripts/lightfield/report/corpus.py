@@ -11,8 +11,9 @@ from lightfield.core.files import sha256, write_json, write_text
 from lightfield.dataset.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
 from lightfield.dataset.family import RECORD
 from lightfield.dataset.member_record import MemberRecord, read_members
+from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.report import corpus_looks, corpus_page, corpus_shards
+from lightfield.report import corpus_looks, corpus_page, corpus_shards, corpus_store
 from lightfield.report.corpus_looks import Look
 from lightfield.validation.files import SUMS
 
@@ -29,6 +30,9 @@ def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]
     member whose files are missing or damaged.
     """
     (folder / SUMS).unlink(missing_ok=True)
+    store = ViewStore.configured()
+    if store:
+        corpus_store.bring(folder, settings, store)
     members = read_members(folder, settings.members)
     looks = corpus_looks.looks(folder, members, cache)
     content = describe(settings, members, looks)
@@ -36,6 +40,8 @@ def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]
     corpus_page.write(folder, content)
     corpus_shards.write(folder, settings, members)
     write_sums(folder, members, looks)
+    if store:
+        corpus_store.send(folder, store)
     return content
 
 

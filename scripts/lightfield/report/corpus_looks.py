@@ -106,7 +106,7 @@ def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
     - ``thumbnail``: the SHA-256 of the thumbnail.
     """
     datasets = [folder / member.name / rig for rig in sorted(member.datasets)]
-    views = [view for dataset in datasets for view in _chosen_views(dataset)]
+    views = [view for dataset in datasets for view in _measured_views(dataset)]
     opacity = sum(view["opacity"] for view in views)
     depths = [depth for view in views for depth in view["depth"]]
     content = _webp(views[len(views) // 2]["image"])
@@ -124,15 +124,20 @@ def _share(part: float, whole: float) -> float:
     return round(part / whole, 4) if whole else 0.0
 
 
-def _chosen_views(dataset: Path) -> Iterator[dict[str, Any]]:
-    """Yield what `_measured` returns for views that are evenly spread over a dataset."""
+def chosen_views(dataset: Path) -> list[Path]:
+    """Return the files of the views of a dataset that are read, evenly spread over it."""
+    names = [view.name for view in LightField.read(dataset / NAME).views]
+    count = min(VIEWS, len(names))
+    numbers = [(2 * step + 1) * len(names) // (2 * count) for step in range(count)]
+    return [dataset / IMAGES / f"{names[number]}.exr" for number in numbers]
+
+
+def _measured_views(dataset: Path) -> Iterator[dict[str, Any]]:
+    """Yield what `_measured` returns for each of the `chosen_views`."""
     lightfield = LightField.read(dataset / NAME)
     rays = lightfield.lens.pixel_rays()
-    names = [view.name for view in lightfield.views]
-    count = min(VIEWS, len(names))
-    for step in range(count):
-        name = names[(2 * step + 1) * len(names) // (2 * count)]
-        yield _measured(dataset / IMAGES / f"{name}.exr", rays, lightfield.depth)
+    for path in chosen_views(dataset):
+        yield _measured(path, rays, lightfield.depth)
 
 
 def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
