@@ -56,7 +56,7 @@ rule count_members:
     input:
         settings=count_settings,
         records=batch_records,
-        corpus=ancient(f"{RESULTS}/{{family}}/corpus.json"),
+        corpus=f"{RESULTS}/{{family}}/corpus.json",
     output:
         f"{WORK}/{{family}}/members.json",
     log:
