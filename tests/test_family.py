@@ -324,6 +324,10 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     view = members / "0001/LFPlane/exr/view_0000f.exr"
     content = view.read_bytes()
     view.write_bytes(content[:-1])
+    verify = [sys.executable, ROOT / "scripts/verify.py", "results/rooms"]
+    found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
+    assert found.returncode == 1
+    assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in found.stdout
     run = snakemake(folder, *choice)
     assert "5 of 5 members of rooms built" in run.stderr
     assert times == {name: (members / name / "member.json").stat().st_mtime_ns for name in times}

@@ -134,14 +134,15 @@ def batch_seconds(wildcards):
     return missing_members(wildcards) * (seconds + MEMBER_SECONDS)
 
 
+def family_results():
+    """Return the folders of the chosen families that have members."""
+    folders = [f"{RESULTS}/{folder}" for folder in FAMILY_FOLDERS]
+    return [folder for folder in folders if any(Path(folder).glob(f"*/{RECORD}"))]
+
+
 def family_targets():
     """Return the files that a run with families makes."""
     return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS] + corpora()
-
-
-def family_folders():
-    """Return the folders of the chosen families' corpora."""
-    return [f"{RESULTS}/{folder}" for folder in FAMILY_FOLDERS]
 
 
 def corpora():

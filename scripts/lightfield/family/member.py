@@ -24,9 +24,8 @@ from lightfield.dataset.job_settings import BatchSettings
 from lightfield.dataset.loading import datasets_of
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
+from lightfield.validation.files import SUMS, read_sums
 
-# The file that only a valid dataset has.
-SUMS = "sha256sums.txt"
 # Raise this number when the stages make something else of equal settings.
 VERSION = 1
 # What a member is made of does not depend on these keys of a scene YAML.
@@ -125,7 +124,7 @@ class MemberBuild:
         if not self.store.bring(str(sums)) or sha256(sums) != digest:
             return False
         names: dict[str, set[str]] = {}
-        for name in _read_sums(sums):
+        for name in read_sums(sums):
             path = folder / name
             names.setdefault(str(path.parent), set()).add(path.name)
         return all(expected <= {*self.store.names(path)} for path, expected in names.items())
@@ -194,7 +193,7 @@ class MemberBuild:
         assert self.store
         for rig in record["datasets"]:
             sums = self.folder / rig / SUMS
-            for name in _read_sums(sums):
+            for name in read_sums(sums):
                 self.store.send(str(self.folder / rig / name))
             self.store.send(str(sums))
         self.store.send(str(self.record))
@@ -213,7 +212,7 @@ def _listing(dataset: Dataset) -> dict[str, Any]:
     folder = Path(dataset.folder)
     sums = folder / SUMS
     split = dataset.rig.split
-    size = sum((folder / name).stat().st_size for name in _read_sums(sums))
+    size = sum((folder / name).stat().st_size for name in read_sums(sums))
     return {
         "views": dataset.view_count,
         "bytes": size + sums.stat().st_size,
@@ -222,18 +221,12 @@ def _listing(dataset: Dataset) -> dict[str, Any]:
     }
 
 
-def _read_sums(path: Path) -> Mapping[str, str]:
-    """Return the SHA-256 of the files in a sha256sums.txt, by their paths in the dataset."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
-
-
 def _has_its_bytes(folder: Path, digest: str) -> bool:
     """Return whether a dataset's checksums have this SHA-256, and its files these checksums."""
     sums = folder / SUMS
     if sha256(sums) != digest:
         return False
-    return all(sha256(folder / name) == expected for name, expected in _read_sums(sums).items())
+    return all(sha256(folder / name) == expected for name, expected in read_sums(sums).items())
 
 
 def _cause(error: BaseException) -> str:

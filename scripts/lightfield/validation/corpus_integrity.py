@@ -9,8 +9,15 @@ from pathlib import Path
 
 from lightfield.core.files import broken, read_json, set_aside
 from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
+from lightfield.dataset.family import RECORD
 from lightfield.validation.files import SUMS, read_sums
 from lightfield.validation.integrity import Fault, Integrity, file_problem
+
+
+def is_corpus(folder: Path) -> bool:
+    """Return whether a folder is that of a family with a corpus, which may lack a file."""
+    names = (CORPUS, SUMS)
+    return any((folder / name).exists() for name in names) and any(folder.glob(f"*/{RECORD}"))
 
 
 def corpus_faults(folder: Path) -> Iterator[Fault]:
