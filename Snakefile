@@ -73,6 +73,7 @@ include: "rules/reproject.smk"
 include: "rules/flow.smk"
 include: "rules/mesh.smk"
 include: "rules/export.smk"
+include: "rules/family.smk"
 include: "rules/validate.smk"
 include: "rules/report.smk"
 include: "rules/costs.smk"
@@ -107,6 +108,7 @@ onsuccess:
     end_display()
     end_notes()
     print_pages()
+    print_families()
 
 
 onerror:
@@ -126,6 +128,7 @@ rule all:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
         f"{RESULTS}/index.html",
+        family_targets(),
 
 
 rule report_html:

@@ -35,6 +35,7 @@ from lightfield.dataset.config import (
     accept_blend,
     load_config,
     load_scene,
+    scene_content,
     scene_path,
 )
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
@@ -54,7 +55,13 @@ from lightfield.dataset.job_settings import (
     SynthesisSettings,
     ValidationSettings,
 )
-from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
+from lightfield.dataset.loading import (
+    chosen_families,
+    family_folder,
+    load_datasets,
+    rendered_frames,
+    scene_datasets,
+)
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
@@ -89,6 +96,7 @@ CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
 try:
     SETTINGS = load_config(config)
     CHOSEN = load_datasets(SETTINGS, CLUSTER)
+    FAMILIES = chosen_families(SETTINGS)
     if IS_MAIN_PROCESS:
         for dataset in CHOSEN:
             presence.check_presence(dataset)
@@ -154,6 +162,8 @@ CHECK_BLEND = rule_name("check_blend")
 INVENTORY = rule_name("inventory")
 IMPORT_VIEWS = rule_name("import_views")
 MEASURE_LEARNING = rule_name("measure_learning")
+BUILD_MEMBERS = rule_name("build_members")
+COUNT_MEMBERS = rule_name("count_members")
 
 
 def log_of(job):

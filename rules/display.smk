@@ -109,6 +109,8 @@ def estimated_seconds(job):
         return calibration_seconds(target, min(dataset.rig.camera.resolution), most)
     if phase_of(job) in UNKNOWN_PHASES:
         return None
+    if name == BUILD_MEMBERS:
+        return START_UP_SECONDS + batch_seconds(wildcards)
     if name in BLENDER_RULES:
         return START_UP_SECONDS
     if not is_of_dataset(job):
@@ -263,6 +265,13 @@ def print_pages():
         print(f"valid: {page}", file=sys.stderr)
 
 
+def print_families():
+    """Print how many members of each family are built, if this run has counted them."""
+    for job in needed_jobs():
+        if job.rule.name == COUNT_MEMBERS:
+            print(Path(job.log[0]).read_text().strip(), file=sys.stderr)
+
+
 def dataset_name_of(job):
     """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
     wildcards = job.wildcards
@@ -276,8 +285,12 @@ def dataset_name_of(job):
 
 def work_of(job):
     """Return a job's part of the forecast."""
-    views = rendered_views(job)
-    size = views * dataset_of(job.wildcards).estimate.all_view_bytes if views else 0.0
+    if job.rule.name == BUILD_MEMBERS:
+        views, size = batch_views(job.wildcards)
+    else:
+        views = rendered_views(job)
+        estimate = dataset_of(job.wildcards).estimate if views else None
+        size = views * estimate.all_view_bytes if estimate else 0.0
     seconds = estimated_seconds(job) or 0.0
     return Work(phase_of(job), dataset_name_of(job), views, seconds, size)
 

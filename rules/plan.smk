@@ -7,7 +7,7 @@ include: "helpers/plan.smk"
 # It has no output: its log is printed.
 rule rig_tables:
     input:
-        [os.path.relpath(scene_path(name)) for name in CHOSEN_SCENES],
+        [os.path.relpath(scene_path(name)) for name in [*CHOSEN_SCENES, *FAMILIES]],
     log:
         log_of("rig_tables"),
     localrule: True

@@ -126,6 +126,7 @@ rule index:
             f"{WORK}/settings/index.json", {"pages": [d.page for d in CHOSEN]}
         ),
         pages=[dataset.page for dataset in CHOSEN],
+        corpora=corpora(),
     output:
         f"{RESULTS}/index.html",
     log:

@@ -45,6 +45,10 @@ def check_disk_space():
         views = presence.missing_views(dataset)
         size = views * dataset.estimate.all_view_bytes
         needs.append(disk_space.Need(Path(RESULTS), size, views))
+    batches = [job.wildcards for job in jobs if job.rule.name == BUILD_MEMBERS]
+    for wildcards in batches:
+        views, size = batch_views(wildcards)
+        needs.append(disk_space.Need(Path(RESULTS), size, views))
     # A built scene takes at most 100 MB.
     for _ in {dataset.scene_name for dataset in datasets.values()}:
         needs.append(disk_space.Need(Path(WORK), 1e8))

@@ -70,7 +70,7 @@ rule verify:
     log:
         log_of("verify"),
     params:
-        folders=shlex.join(dataset.folder for dataset in CHOSEN),
+        folders=shlex.join([*(dataset.folder for dataset in CHOSEN), *family_results()]),
         work=WORK,
     message:
         "Checking every byte of the chosen datasets"

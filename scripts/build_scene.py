@@ -4,11 +4,9 @@ A settings file is JSON: {"builder": "garden", "parameters": {"seed": 0, "detail
 """
 
 import argparse
-import importlib
 from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
-from lightfield.core.files import atomic_path
 from lightfield.dataset.names import builders
 
 
@@ -27,7 +25,7 @@ def main() -> None:
 
     from lightfield.core.settings import checked, read_settings
     from lightfield.dataset.job_settings import BuildSettings
-    from lightfield.rendering import blend_file
+    from lightfield.rendering import built_scene
 
     if arguments.settings:
         settings = read_settings(BuildSettings, arguments.settings)
@@ -37,11 +35,7 @@ def main() -> None:
             parameters["place"] = arguments.place
         content = {"builder": arguments.builder, "parameters": parameters}
         settings = checked(TypeAdapter(BuildSettings), content, "flags")
-    builder = importlib.import_module(f"scenes.{settings.builder}")
-    blend_file.new_scene()
-    builder.build(settings.parameters.model_dump())
-    with atomic_path(arguments.output) as temporary:
-        blend_file.save_scene(temporary)
+    built_scene.write(settings, arguments.output)
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
-from lightfield.dataset.names import EXPORTS, SEQUENCE_EXPORTS, VIEWS
+from lightfield.dataset.names import EXPORTS, VIEWS
 
 
 def main() -> None:
@@ -34,8 +34,6 @@ def main() -> None:
     from lightfield import export
     from lightfield.core.settings import checked, read_settings
     from lightfield.dataset.exports import export_settings_of
-    from lightfield.export.sequence import SourceSequence
-    from lightfield.export.source import SourceDataset
 
     model = export_settings_of(arguments.format)
     if arguments.settings:
@@ -43,18 +41,8 @@ def main() -> None:
     else:
         content = {"options": {"sources": [arguments.source]}, "suffix": arguments.suffix}
         settings = checked(TypeAdapter(model), content, "flags")
-    options = settings.options
-    development = {
-        key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
-    }
-    test_folders = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
-    views = (settings.source, settings.suffix, test_folders)
-    if arguments.format in SEQUENCE_EXPORTS:
-        folders = settings.frames or [path.name for path in arguments.dataset.glob("f[0-9]*")]
-        source = SourceSequence.of_folders(arguments.dataset, folders, *views, **development)
-    else:
-        source = SourceDataset(arguments.dataset, *views, **development)
-    files = export.run(arguments.format, source, options, arguments.output)
+    source = export.source_of(arguments.format, settings, arguments.dataset)
+    files = export.run(arguments.format, source, settings.options, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
 
 

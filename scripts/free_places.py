@@ -9,7 +9,6 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import write_json
 
 
 def main() -> None:
@@ -25,25 +24,12 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    import bpy
-
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.config import FILE
-    from lightfield.dataset.inventory import read_inventory
     from lightfield.dataset.job_settings import FreePlacesSettings
-    from lightfield.rendering import blend_file, clearance
+    from lightfield.rendering import camera_files
 
     settings = read_settings(FreePlacesSettings, arguments.settings)
-    rig = settings.rig
-    path = arguments.inventory
-    inventory = path and read_inventory(path, "external_files")
-    blend_file.open_scene(arguments.blend, settings.model_dump(), inventory)
-    if settings.frame != FILE:
-        bpy.context.scene.frame_set(settings.frame)
-    clearance.show_what_is_rendered()
-    places = clearance.free_places(rig)
-    write_json(arguments.output, {"box": rig.box, "places": places.tolist()})
-    print(f"{len(places)} cameras, each with {rig.clearance:g} m around it")
+    camera_files.write_places(arguments.blend, settings, arguments.inventory, arguments.output)
 
 
 if __name__ == "__main__":

@@ -27,10 +27,9 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from pydantic import TypeAdapter
 
-    from lightfield.core.files import atomic_path, write_json
     from lightfield.core.settings import checked, read_settings
     from lightfield.dataset.job_settings import ImportSettings
-    from lightfield.rendering import blend_file, model
+    from lightfield.rendering import model
 
     if arguments.settings:
         settings = read_settings(ImportSettings, arguments.settings)
@@ -39,10 +38,7 @@ def main() -> None:
         content = {name: getattr(arguments, name) for name in names}
         settings = checked(TypeAdapter(ImportSettings), content, "flags")
     keep_apart("--record", arguments.record, Path(settings.model))
-    record = model.make_scene(settings, arguments.output.parent)
-    with atomic_path(arguments.output) as temporary:
-        blend_file.save_scene(temporary)
-    write_json(arguments.record, record)
+    record = model.write(settings, arguments.output, arguments.record)
     print(f"{settings.model}: {model.summary(record)}")
 
 

@@ -4,16 +4,11 @@ The checksums of an invalid dataset are removed, so that the next run validates 
 """
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_bytes
-
-# So many failed checks are named, each with its first problem.
-CAUSES = 3
 
 
 def main() -> None:
@@ -26,6 +21,9 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="sha256sums.txt to write")
     arguments = parser.parse_args()
 
+    # Only now, so that --help need not wait for it.
+    from lightfield.validation.result import causes
+
     validation = read_keys(arguments.validation, "validate.py", "valid", "dataset", "checks")
     if not validation["valid"]:
         arguments.sums.unlink()
@@ -33,16 +31,6 @@ def main() -> None:
             f"{validation['dataset']} is not valid: {causes(validation)}: see {arguments.page}"
         )
     write_bytes(arguments.output, arguments.sums.read_bytes())
-
-
-def causes(validation: Mapping[str, Any]) -> str:
-    """Return the first problem of the first failed checks, and the number of other problems."""
-    failed_checks = [check for check in validation["checks"] if check["passed"] is False]
-    parts = [f"{check['name']}: {check['problems'][0]}" for check in failed_checks[:CAUSES]]
-    other_problems = sum(len(check["problems"]) for check in failed_checks) - len(parts)
-    if other_problems:
-        parts.append(f"and {other_problems} more")
-    return "; ".join(parts)
 
 
 if __name__ == "__main__":

@@ -436,6 +436,76 @@ REFUSED = [
 
 # Wrong settings of a scene YAML, and the message after the file's name.
 EXPLAINED = [
+    ("family", {}, "family: must have one of seeds and models"),
+    ("family", {"seeds": "0-9", "models": "*.glb"}, "family: must have one of seeds and models"),
+    ("family", {"seeds": "9"}, 'family.seeds: is "9"; must be the first and the last seed'),
+    ("family", {"seeds": 9}, "family.seeds: is 9; must be a text"),
+    ("family", {"seeds": "9-0"}, "family.seeds: is '9-0'; must have the smaller seed first"),
+    ("family", {"seeds": "0-999999"}, "family.seeds: is '0-999999'; must be at most 100000 seeds"),
+    ("family", {"seeds": "0-9", "batch": 0}, "family.batch: is 0; must be a whole number at least"),
+    (
+        "family",
+        {"seeds": "0-9", "corpus": {"splits": {"test": 2}}},
+        "family.corpus.splits.test: is 2; must be a number at most 1",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "corpus": {"splits": {"test": 0.6, "validation": 0.5}}},
+        "family.corpus.splits: validation and test are 0.5 and 0.6; their sum must be at most 1",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "corpus": {"splits": {"train": 0.9}}},
+        "family.corpus.splits.train: unknown key",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "corpus": {"shards": 2}},
+        "family.corpus.shards: is 2; must be true or false",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "corpus": {"shard_gigabytes": 0}},
+        "family.corpus.shard_gigabytes: is 0; must be a number above 0",
+    ),
+    ("family", {"seed": "0-9"}, "family.seed: unknown key; did you mean seeds?"),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"samples": {"uniform": [0, 1]}}},
+        "family.values: 'samples' is not a key with dots",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"scene.parameters.seed": {"integers": [0, 1]}}},
+        "family.values: scene.parameters.seed is the members' own",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"render.samples": {"integers": [9, 1]}}},
+        "family.values.render.samples.integers: is [9, 1]; must have the smaller bound first",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"render.samples": {"log_uniform": [0, 1]}}},
+        "log_uniform: is [0.0, 1.0]; must be above 0",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"render.samples": {}}},
+        "must have one of uniform, log_uniform, integers and choice",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"scene.parameters.detial": {"uniform": [0.5, 1]}}},
+        "scene.parameters.detial: unknown key; did you mean detail?",
+    ),
+    (
+        "family",
+        {"seeds": "0-9", "values": {"render.samples": {"integers": [0, 4]}}},
+        "render.samples: is 0; must be a whole number at least 1",
+    ),
+    ("family", {"models": "*.glb"}, "scene: must have one of builder, blend, model and dataset"),
+    ("family", None, "family: is null"),
     ("render.samples", REMOVE, "render: is missing the key samples"),
     (
         "render",

@@ -95,11 +95,27 @@ render: {{samples: 4}}
 rigs:
   LFPlane: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}}}
 """
+# A family, of two batches.
+MANY = f"""
+scene: {{builder: room}}
+render: {{samples: 4}}
+rigs:
+  LFPlane: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}}}
+family:
+  seeds: 0-2
+  batch: 2
+  values: {{scene.parameters.detail: {{uniform: [0.5, 1]}}}}
+"""
 TARGETS = [
     *("all", "package", "plan", "advise", "error_vs_time", "reprojection_benchmark", "stability"),
     *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
 ]
-CHOSEN = ["--config", "scenes=[built,brought,imported,modelled,moved]", "rigs=all", "preset=full"]
+CHOSEN = [
+    "--config",
+    "scenes=[built,brought,imported,modelled,moved,many]",
+    "rigs=all",
+    "preset=full",
+]
 # Rules without output: a target is read or always runs, or only asks for other targets.
 WITHOUT_OUTPUT = {
     *("all", "smoke", "report_html", "package", "error_vs_time", "gpu_check", "synthesis"),
@@ -116,6 +132,7 @@ work = json.loads(Path("work_to_do.json").read_text())
 )
 inputs = {{name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in job["input"]}}
 content = {{"frames": [], "external_files": [], "cost_samples": 4, "inputs": inputs}}
+content |= {{"sources": {{}}, "members": {{}}}}
 content["command"] = sys.argv
 listing = {{"files": {{}}}}
 for name in job["output"]:
@@ -131,7 +148,7 @@ class Build:
 
     def __init__(self, folder):
         scenes = {"built": BUILT, "brought": BROUGHT, "imported": IMPORTED, "modelled": MODELLED}
-        scenes["moved"] = MOVED
+        scenes |= {"moved": MOVED, "many": MANY}
         self.folder = checkout(folder, **scenes)
         for name in ("model.obj", "other.obj"):
             (folder / name).write_text("# stands in for a model\n")
@@ -281,7 +298,7 @@ def assert_made_from_present_inputs(build, jobs):
         assert line["files"][first_output][0] == build.sha256(first_output)
 
 
-NAMES = ("built", "brought", "imported", "modelled", "moved")
+NAMES = ("built", "brought", "imported", "modelled", "moved", "many")
 SCENES = {name: f"configs/scenes/{name}.yaml" for name in NAMES}
 ROOM = "scripts/scenes/room/__init__.py"
 OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
@@ -311,6 +328,7 @@ ROUNDS = {
     },
     "samples, and what may be missing": {
         "built": ("samples: 4", "samples: 5", CAMERAS),
+        "many": ("samples: 4", "samples: 5", {"build_members"}),
         "brought": ("allow_missing: true", "allow_missing: false", {"inventory"}),
         "config.yaml": ("device:", "package_gigabytes: 1\ndevice:", {"pack", "publish"}),
     },
@@ -325,7 +343,11 @@ ROUNDS = {
     },
     # Nothing limits the samples of imported views.
     "the samples of a preset": {
-        "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
+        "config.yaml": (
+            "  full: {}",
+            "  full: {samples: 3}",
+            RENDERED_CAMERAS | {"build_members"},
+        ),
     },
     "the frame, and the scene": {
         "built": ("frame: 1", "frame: 2", {"inventory", "mesh"} | CAMERAS),
@@ -450,13 +472,20 @@ ROUNDS = {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)
     },
     "another text of the builder": {
-        ROOM: ('"""', '""" ', {f"built {rule}" for rule in {"build_scene"} | CAMERAS}),
+        ROOM: (
+            '"""',
+            '""" ',
+            {"build_members", *(f"built {rule}" for rule in {"build_scene"} | CAMERAS)},
+        ),
     },
     "the library of all builders": {
         "scripts/scenes/library/lights.py": (
             '"""',
             '""" ',
-            {f"{scene} {rule}" for scene in ("built", "moved") for rule in BUILDING},
+            {
+                "build_members",
+                *(f"{scene} {rule}" for scene in ("built", "moved") for rule in BUILDING),
+            },
         ),
     },
     "another model, and how it becomes a scene": {
@@ -468,6 +497,16 @@ ROUNDS = {
         ),
     },
     "another text of the model": {"model.obj": ("#", "# ", {"import_model"})},
+    "a seed more": {"many": ("0-2", "0-3", {"seeds_0002_0003 build_members", "corpus"})},
+    "other drawn values": {"many": ("[0.5, 1]", "[0.6, 1]", {"build_members"})},
+    "how members are split, and shards": {
+        "many": (
+            "batch: 2",
+            "batch: 2\n  corpus: {splits: {test: 0.2}, shards: true, shard_gigabytes: 2}",
+            {"corpus"},
+        ),
+    },
+    "larger batches": {"many": ("batch: 2", "batch: 3", {"count_members"})},
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
     "a sequence": {
         "built": (
@@ -514,6 +553,8 @@ CONSTANT |= {"probes.json scene", "panorama.json flow"}
 # The sequence is of rendered views, and no other rig tests it.
 CONSTANT |= {"dnerf.json suffix", "dnerf.json tested_by"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
+# The preset and the folders are another family's. A new seed changes the members of one batch.
+CONSTANT |= {"family", "preset", "results", "work", "seeds_0000_0001.json members"}
 
 
 def edit(build, changes):
@@ -569,6 +610,7 @@ WITH_FEWER_JOBS = {
     "development, and no flow",
     "a rig that is tested",
     "a rig less",
+    "larger batches",
 }
 # The settings that each round changes.
 CHANGED = {}

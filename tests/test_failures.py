@@ -59,12 +59,23 @@ rigs:
 exports:
   dnerf: {sources: [views], points: 9}
 """
+# A family.
+MANY = """
+scene: {builder: room}
+render: {samples: 4}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+family: {seeds: 0-1}
+"""
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "extremes", "render_overhead"),
     *("advise", "gpu_check", "synthesis", "learn", "verify"),
 ]
-CHOSEN = ["--config", "scenes=[brought,imported,modelled]", "rigs=all", "preset=full"]
+CHOSEN = ["--config", "scenes=[brought,imported,modelled,many]", "rigs=all", "preset=full"]
 RULES = [
     *("fetch_brought",),
     *(
@@ -94,7 +105,9 @@ class Failing:
     """A checkout whose programs fail. All files that jobs read or write exist."""
 
     def __init__(self, folder):
-        self.folder = checkout(folder, brought=BROUGHT, imported=IMPORTED, modelled=MODELLED)
+        self.folder = checkout(
+            folder, brought=BROUGHT, imported=IMPORTED, modelled=MODELLED, many=MANY
+        )
         (self.folder / "model.obj").write_text("# stands in for a model\n")
         plane = {"type": "plane", "cameras": [2, 1]}
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
@@ -155,7 +168,7 @@ class Failing:
         """Run the job of each rule alone. Return the terminal's output."""
         # This content and time are valid for a record, a calibration, and a checked .blend.
         content = {"files": {}, "cost_samples": 4, "bytes": 200, "mtime_ns": WHEN * 10**9}
-        content |= {"external_files": []}
+        content |= {"external_files": [], "sources": {}, "members": {}}
         for file in self.files:
             path = self.folder / file
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -238,12 +238,15 @@ def test_a_broken_model_is_refused_in_one_line(tmp_path, name, content, said):
 
 
 @pytest.mark.parametrize("name", ["glb", "gltf", "ply", "stl", "usda", "usdc", "usdz"])
-def test_half_a_model_is_refused_in_one_line(renders, tmp_path, name):
+def test_half_a_model_is_refused_in_one_line(renders, tmp_path, monkeypatch, name):
     """Half of an OBJ is a smaller OBJ: nothing in it says how much is missing."""
     content = (renders.folder / f"shape.{name}").read_bytes()
-    path = written(tmp_path / f"half.{name}", content[: len(content) // 2])
-    message = refusal(path, tmp_path)
-    assert message.startswith(f"{path}: ") and message.isprintable()
+    written(tmp_path / f"half.{name}", content[: len(content) // 2])
+    monkeypatch.chdir(tmp_path)
+    message = refusal(Path(f"half.{name}"), tmp_path)
+    assert message.startswith(f"half.{name}: ") and message.isprintable()
+    # The message is the same in every folder.
+    assert str(tmp_path) not in message
 
 
 @pytest.mark.parametrize("name", ["shape.gltf", "shape.obj", "shape.usda", "shape.usdc"])

@@ -171,3 +171,43 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     said, _ = build.start(*dry_run).communicate()
     assert {"inventory", "lightfield", "render"} <= set(said.split()), said
     assert not {"check_blend", "store_brought", "import_views"} & set(said.split())
+
+
+ROOMS = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    size: 0.5
+    center: [0, 0, 1.2]
+    camera: {lens: equidistant, fov: 180, resolution: [32, 32]}
+family: {seeds: 0-1}
+"""
+
+
+@pytest.mark.slow
+def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path):
+    folder = tmp_path / "store"
+    build = Cloud(tmp_path / "cloud", 2, str(folder))
+    (tmp_path / "cloud/configs/scenes/rooms.yaml").write_text(ROOMS)
+    run = build.start("--config", "scenes=rooms", "rigs=all", "preset=full")
+    first = folder / "results/rooms/0000/member.json"
+    wait_until(first.exists, run)
+    time = first.stat().st_mtime_ns
+    for group in build.running():
+        kill_group(group)
+    # The node is gone, with all that it had on its disk.
+    build.jobs.rename(tmp_path / "gone")
+    build.jobs.mkdir()
+    said, _ = run.communicate()
+    assert run.returncode == 0, said
+    assert "2 of 2 members of rooms built" in said
+    assert first.stat().st_mtime_ns == time
+    for member in ("0000", "0001"):
+        dataset = folder / "results/rooms" / member / "LFPlane"
+        lines = (dataset / "sha256sums.txt").read_text().splitlines()
+        sums = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+        assert {"exr/view_0000f.exr", "exr/view_0001f.exr", "validation.json"} <= sums.keys()
+        assert sums == {name: sha256(dataset / name) for name in sums}

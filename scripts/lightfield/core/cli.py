@@ -23,6 +23,11 @@ def run(main: Callable[[], None]) -> None:
     """
     _expect_little_garbage()
     sys.argv[1:] = map(_as_value, sys.argv[1:])
+    guarded(main)
+
+
+def guarded(main: Callable[[], None]) -> None:
+    """Run ``main``, and end as `run` does if it raises an exception."""
     try:
         main()
     except UserError as error:

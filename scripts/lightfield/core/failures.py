@@ -1,6 +1,7 @@
 """Says why a run failed, and which log has the details."""
 
 import itertools
+import signal
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -38,6 +39,13 @@ def cause(log: Path) -> str | None:
     last_line = errors[-1] if errors else lines[-1]
     likely_reason = _SIGNALS.get(last_line.removeprefix("error: killed by "))
     return f"{last_line}: {likely_reason}" if likely_reason else last_line
+
+
+def signal_cause(number: int) -> str:
+    """Return that a signal ended a process, and the likely reason."""
+    name = signal.Signals(number).name
+    reason = _SIGNALS.get(name)
+    return f"killed by {name}: {reason}" if reason else f"killed by {name}"
 
 
 def first_sentence(message: str) -> str:

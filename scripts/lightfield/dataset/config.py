@@ -9,6 +9,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -19,6 +20,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     TypeAdapter,
+    ValidationError,
     field_validator,
     model_validator,
 )
@@ -37,6 +39,7 @@ from lightfield.core.settings import (
 )
 from lightfield.dataset import light_groups, published
 from lightfield.dataset.exports import Export, Exports
+from lightfield.dataset.family import Family, stand_in
 from lightfield.dataset.names import LIGHTS, MESH, MODELS, SOFTBOXES, UP, VIEWS, builders
 from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES, in_order
 from lightfield.dataset.publication import PUBLISHED_FOLDER, SPDX, Publication
@@ -858,6 +861,9 @@ class Scene(Credits):
     )
     exports: Exports = Field(Exports(), description="Files for trainers.")
     report: Report = Field(Report(), description="The contents of a dataset's page.")
+    family: Family | None = Field(
+        None, description="Many scenes that differ by seed, model or drawn values."
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -918,7 +924,22 @@ class Scene(Credits):
         if self.flow and self.render and self.render.depth == "none":
             raise ValueError("flow: follows from depth, but render.depth is none")
         self._check_split_rigs()
+        if self.family:
+            self._check_family(self.family)
         return self
+
+    def _check_family(self, family: Family) -> None:
+        """Check that a job can build the members of a family one after the other."""
+        if family.seeds and not self.scene.builder:
+            raise ValueError("family.seeds: goes with scene.builder")
+        if self.render and self.render.target_error is not None:
+            raise ValueError("render.target_error: does not go with family; give samples")
+        for key in ("flow", "mesh"):
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key}: does not go with family")
+        for name, rig in self.rigs.items():
+            if rig.sequence:
+                raise ValueError(f"rigs.{name}.frames: does not go with family")
 
     @property
     def developments(self) -> dict[str, Reprojection]:
@@ -1230,10 +1251,30 @@ def scene_path(scene: str) -> Path:
     return SCENES / f"{scene}.yaml"
 
 
+def family_of(scene: str) -> Family | None:
+    """Return the block `family` of a scene YAML, if it has one. Raises `UserError`."""
+    return load_scene(scene).family
+
+
+def scene_content(scene: str) -> Any:
+    """Return the content of a scene YAML as it is written. Raises `UserError`."""
+    return read_yaml(scene_path(scene), f"{OWN_SCENES}/{scene}.yaml")
+
+
+def check_member(content: Any, name: str) -> Scene:
+    """Return the content of a member's scene YAML as settings. Errors begin with ``name``."""
+    return checked(_SCENE, content, name)
+
+
 def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
-    return checked(_SCENE, read_yaml(path, file), file)
+    content = read_yaml(path, file)
+    if isinstance(content, dict) and "family" in content:
+        # The check below reports a block `family` that is wrong itself.
+        with suppress(ValidationError, TypeError):
+            content = stand_in(content)
+    return checked(_SCENE, content, file)
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:

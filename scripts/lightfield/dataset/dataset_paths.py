@@ -29,6 +29,8 @@ class DatasetPaths(Description):
 
     @property
     def scene_work(self) -> str:
+        if self.member:
+            return f"{self.work_root}/{self.scene_folder}"
         return f"{self.work_root}/{self.scene_name}"
 
     @property

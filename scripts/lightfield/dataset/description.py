@@ -46,12 +46,15 @@ class Description(Capture):
     views_per_shard: int | Literal["auto"] = "auto"
     # None if this machine renders.
     cluster: Cluster | None = None
+    # The member of a family of scenes whose dataset this is.
+    member: str | None = None
 
     @property
     def scene_folder(self) -> str:
-        """The folder of the scene under its preset: garden, or garden_tiny."""
+        """The folder of the scene under its preset: garden, garden_tiny, or garden_tiny/0007."""
         is_full = self.preset == "full"
-        return self.scene_name if is_full else f"{self.scene_name}_{self.preset}"
+        folder = self.scene_name if is_full else f"{self.scene_name}_{self.preset}"
+        return f"{folder}/{self.member}" if self.member else folder
 
     @cached_property
     def view_count(self) -> int:

@@ -17,8 +17,10 @@ from lightfield.dataset.config import (
     ModelOptions,
     ModelPath,
     Parameters,
+    Preset,
     check_model,
 )
+from lightfield.dataset.family import Draw, Member
 from lightfield.dataset.names import builders
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
@@ -169,3 +171,29 @@ class SynthesisSettings(Settings):
         description="Views of each of these that are compared.",
         json_schema_extra={"unit": "views"},
     )
+
+
+class BatchSettings(Settings):
+    """The settings of scripts/build_members.py."""
+
+    family: str = Field(description="The name of the family's scene YAML.")
+    scene: dict[str, Any] = Field(
+        description="The content of the family's scene YAML, without the block `family`."
+    )
+    values: dict[str, Draw] = Field({}, description="As in the block `family`.")
+    members: list[Member] = Field(min_length=1, description="The members to build.")
+    preset: str = Field("full", description="The preset, whose name is in the folder's name.")
+    limits: Preset = Field(Preset(), description="The preset's limits.")
+    results: str = Field("results", description="Folder of the datasets.")
+    work: str = Field("work", description="Folder of intermediate files.")
+    fingerprint: str | None = Field(
+        None, description="Changes with the builder's text, so that the members are built again."
+    )
+    bpy: str | None = Field(None, description="The same for Blender's version.")
+
+
+class CountSettings(Settings):
+    """The settings of scripts/count_members.py."""
+
+    family: str = Field(description="The name of the family's scene YAML.")
+    records: list[str] = Field(min_length=1, description="The records of its batches.")

@@ -1,6 +1,6 @@
 """Resolves the datasets of a configuration and its scene YAMLs, within a preset's limits."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from lightfield.dataset.config import (
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import Exports
+from lightfield.dataset.family import Family
 from lightfield.dataset.names import VIEWS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -32,16 +33,42 @@ def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> li
 
     ``cluster`` is the cluster that renders them, if any. Raises `UserError` for a scene that is
     missing, wrong, or without the chosen rigs. Also raises it for two scenes with equal folders.
+    A family of scenes has no datasets here: `chosen_families` has them.
     """
     datasets: list[Dataset] = []
     limits = settings.presets[settings.preset]
+    scenes = []
     for scene in settings.scenes:
         _check_scene_folder(scene, settings)
-        datasets += scene_datasets(scene, settings.preset, limits, settings, cluster)
+        if config.family_of(scene) is None:
+            scenes.append(scene)
+            datasets += scene_datasets(scene, settings.preset, limits, settings, cluster)
     if settings.rigs == "all":
         return datasets
-    _check_chosen_rigs(settings.rigs, settings.scenes, datasets)
+    _check_chosen_rigs(settings.rigs, scenes, datasets)
     return [dataset for dataset in datasets if dataset.rig_name in settings.rigs]
+
+
+def chosen_families(settings: Configuration) -> dict[str, Family]:
+    """Return the families of scenes that a configuration chooses, by their names.
+
+    Raises `UserError` for a wrong scene YAML, and for a choice of rigs, which families lack.
+    """
+    families = {}
+    for scene in settings.scenes:
+        if family := config.family_of(scene):
+            if settings.rigs != "all":
+                raise UserError(
+                    f"config.yaml: rigs: must be all with {scene}, which is a family: all members "
+                    "have the same rigs"
+                )
+            families[scene] = family
+    return families
+
+
+def family_folder(scene: str, settings: Configuration) -> str:
+    """Return the folder of a family under its preset: chairs, or chairs_tiny."""
+    return scene if settings.preset == "full" else f"{scene}_{settings.preset}"
 
 
 def _check_scene_folder(scene: str, settings: Configuration) -> None:
@@ -93,8 +120,22 @@ def scene_datasets(
 
     Uses the folders and the length of shards of ``settings``. ``cluster`` renders the datasets.
     """
-    limits = limits or Preset()
     written = config.load_scene(scene)
+    places = _folders_and_shards(settings) | {"cluster": cluster}
+    return datasets_of(scene, written, preset, limits or Preset(), places)
+
+
+def datasets_of(
+    scene: str,
+    written: config.Scene,
+    preset: str,
+    limits: Preset,
+    places: Mapping[str, Any],
+) -> list[Dataset]:
+    """Resolve every dataset of a scene as it is ``written``, under the ``limits`` of a preset.
+
+    ``places`` are fields of `Description`: folders, shards, the cluster, and the member.
+    """
     source = written.scene
     if source.blend:
         checksum, _ = config.blend_sha256(scene, source)
@@ -118,8 +159,7 @@ def scene_datasets(
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
                 **_split_partners(rig, written, folder.removeprefix(name)),
-                **_folders_and_shards(settings),
-                cluster=cluster,
+                **places,
             )
             datasets.append(dataset)
     return datasets

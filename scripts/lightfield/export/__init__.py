@@ -14,19 +14,22 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.dataset.exports import MANIFEST, Export
+from lightfield.dataset.exports import MANIFEST, Export, ExportSettings
 from lightfield.dataset.lightfield import NAME
-from lightfield.dataset.names import MESH
+from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export import instant_ngp
+from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.validation.files import Manifest
+
+Source = SourceDataset | SourceSequence
 
 # The folder of a dataset that holds its exports.
 FOLDER = "exports"
 
 
-def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dict[str, str]:
+def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:
     """Write an export into ``folder``, and return the SHA-256 of its files by their names.
 
     Replaces an earlier export. Leaves no files behind if it fails. Raises `UserError` if the folder
@@ -43,6 +46,20 @@ def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dic
         lambda target: exporter.export(source, settings, target),
         is_own=folder.resolve() == (source.dataset / source.name / FOLDER / name).resolve(),
     )
+
+
+def source_of(name: str, settings: ExportSettings[Any], dataset: Path) -> Source:
+    """Return what an export of a ``dataset``'s folder reads. For a sequence, it is the rig's."""
+    options = settings.options
+    development = {
+        key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
+    }
+    test_folders = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
+    views = (settings.source, settings.suffix, test_folders)
+    if name not in SEQUENCE_EXPORTS:
+        return SourceDataset(dataset, *views, **development)
+    folders = settings.frames or [path.name for path in dataset.glob("f[0-9]*")]
+    return SourceSequence.of_folders(dataset, folders, *views, **development)
 
 
 def replace_folder(

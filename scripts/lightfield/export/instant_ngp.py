@@ -94,7 +94,11 @@ def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
 
 def export(arguments: argparse.Namespace) -> None:
     """Write a dataset's transforms.json, and the files that it names."""
-    settings = settings_from(arguments)
+    write(settings_from(arguments), arguments)
+
+
+def write(settings: ExportSettings[InstantNgp], arguments: argparse.Namespace) -> None:
+    """Write what the settings describe to the paths of ``arguments``, as `export` does."""
     options = settings.options
     lightfield = LightField.read(arguments.input_cfg)
     lightfield.require_centre()

@@ -35,9 +35,23 @@ def write(path: Path, scene: str | None, output: Path) -> None:
     cannot be rendered.
     """
     written = config.load_scene(scene) if scene else None
+    write_of_datasets(path, written, scene_datasets(scene) if scene else [], output)
+
+
+def write_of_datasets(
+    path: Path,
+    written: config.Scene | None,
+    datasets: Sequence[Dataset],
+    output: Path,
+    measures_memory: bool = True,
+) -> None:
+    """Write the inventory of the .blend of some ``datasets``, as `write` does.
+
+    ``written`` is their scene YAML. The measurement of memory starts a process of its own. Without
+    it, the inventory does not say how much the scene takes.
+    """
     chosen = written.scene.model_dump() if written else {}
     layers = blend_file.open_scene(path, chosen)
-    datasets = scene_datasets(scene) if scene else []
     saved_frame = bpy.context.scene.frame_current
     chosen_frames = rendered_frames(datasets) or [saved_frame]
     frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
@@ -67,7 +81,8 @@ def write(path: Path, scene: str | None, output: Path) -> None:
     contents["left_out"] = leave_out
     # Close the scene, because the measurement opens it again.
     blend_file.new_scene()
-    contents["memory_bytes"] = scene_memory.measure(path, contents, chosen)
+    if measures_memory:
+        contents["memory_bytes"] = scene_memory.measure(path, contents, chosen)
     write_json(output, contents)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)

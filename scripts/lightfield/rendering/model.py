@@ -12,6 +12,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, write_json
 from lightfield.core.settings import FARTHEST
 from lightfield.dataset.job_settings import ImportSettings
 from lightfield.dataset.keys import model_fingerprint
@@ -38,6 +39,18 @@ _SIDES = (1e-9, 1e12)
 
 # The least and the largest coordinates of all meshes, (2, 3).
 Box = NDArray[np.float64]
+
+
+def write(settings: ImportSettings, output: Path, record: Path) -> dict[str, Any]:
+    """Make a scene of a model, save it as a .blend, and write and return the import's record.
+
+    Raises `UserError` as `make_scene` does.
+    """
+    content = make_scene(settings, output.parent)
+    with atomic_path(output) as temporary:
+        blend_file.save_scene(temporary)
+    write_json(record, content)
+    return content
 
 
 def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
@@ -119,7 +132,8 @@ def _refusal(path: Path, message: str) -> str:
     if "Traceback" in message:
         # Blender adds the place of the operator's call.
         lines = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)][-1:] or lines
-    reason = lines[0].removeprefix("Error: ").rstrip(".")
+    # Messages must be the same in every folder: the record of a family's member has them.
+    reason = lines[0].removeprefix("Error: ").rstrip(".").replace(str(path.absolute()), str(path))
     return (
         f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; export the model "
         "again"

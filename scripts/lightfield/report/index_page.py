@@ -1,4 +1,4 @@
-"""The index of all datasets: a page that links the page of each."""
+"""The index of all datasets: a page that links the page of each, and of each corpus."""
 
 import sys
 from pathlib import Path
@@ -6,6 +6,8 @@ from typing import Any
 from urllib.parse import quote
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, reading
+from lightfield.dataset.corpus import CORPUS
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page, tables
 from lightfield.validation.files import REPORT
@@ -16,17 +18,39 @@ THUMBNAIL = 480
 def write(output: Path, results: Path) -> None:
     """Write the index of the datasets below ``results``.
 
-    Leaves out, with a warning, a dataset that cannot be read.
+    Leaves out, with a warning, a dataset that cannot be read. Raises `UserError` for a damaged
+    corpus.json.
     """
+    corpora = sorted(path.parent for path in results.glob(f"*/{CORPUS}"))
     pages = sorted(results.glob(f"*/**/{REPORT}/index.html"))
     datasets = []
     for path in pages:
+        # A family may have thousands of members. Its own page has them.
+        if any(path.is_relative_to(folder) for folder in corpora):
+            continue
         try:
             datasets.append(_entry(results, path))
         except UserError as error:
             # One broken dataset must not hide the others.
             print(f"warning: left out: {error}", file=sys.stderr)
-    page.write(output, "index.html.j2", datasets=datasets)
+    families = [_family(results, folder) for folder in corpora]
+    page.write(output, "index.html.j2", datasets=datasets, families=families)
+
+
+def _family(results: Path, folder: Path) -> dict[str, Any]:
+    """Return the index's entry for the corpus in a family's folder."""
+    content = read_json(folder / CORPUS)
+    with reading(folder / CORPUS, "corpus"):
+        numbers = content["statistics"]
+        pictures = [each["thumbnail"] for each in content["members"] if "thumbnail" in each]
+        return {
+            "name": content["name"],
+            "link": quote(f"{folder.relative_to(results).as_posix()}/index.html"),
+            "members": numbers["members"],
+            "views": numbers["views"],
+            "state": f"{numbers['failed']} failed" if numbers["failed"] else "valid",
+            "picture": page.photo(folder / pictures[0], THUMBNAIL) if pictures else None,
+        }
 
 
 def _entry(results: Path, path: Path) -> dict[str, Any]:

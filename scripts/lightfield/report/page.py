@@ -39,6 +39,7 @@ def write(output: Path, template: str, **content: Any) -> None:
     only_of_walk = [module for module in walk_modules if module not in page_modules]
     only_of_relight = [module for module in relight_modules if module not in page_modules]
     environment.globals |= {
+        "corpus_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "corpus/main.js"))),
         "index_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "index/main.js"))),
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
         "page_js": Markup(scripts.joined(page_modules)),

@@ -16,7 +16,9 @@ from pydantic import BaseModel, TypeAdapter
 from lightfield.core.settings import MEANINGS
 from lightfield.dataset import (
     config,
+    corpus,
     exports,
+    family,
     job_settings,
     publication,
     reprojections,
@@ -112,6 +114,22 @@ KEY_PAGES: dict[str, Page] = {
                 job_settings.ImportSettings,
                 config.ModelOptions,
             ),
+        ],
+    ),
+    "family-keys.md": Page(
+        "The keys of `family`",
+        "`family` in a scene YAML makes many scenes of it, which differ by seed, model or drawn "
+        "values. [Build a family](../how-to/build-a-family.md) shows how.",
+        [
+            Section("family", family.Family),
+            Section("family: values", family.Draw),
+            Section("family: corpus", corpus.CorpusOptions),
+            Section("family: corpus: splits", corpus.Shares),
+            # The settings files of its jobs.
+            Section("The settings file of build_members.py", job_settings.BatchSettings),
+            Section("The settings file of build_members.py: members", family.Member),
+            Section("The settings file of count_members.py", job_settings.CountSettings),
+            Section("The settings file of corpus.py", corpus.CorpusSettings),
         ],
     ),
     "render-keys.md": Page(
@@ -240,6 +258,11 @@ PROGRAM_PAGES = {
             "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
             "make_lightfield", "free_places", "check_cameras", "import_views",
         ],
+    ),
+    "programs-family.md": (
+        "Programs that build families",
+        "These programs build the members of families of scenes, collect them, and count them.",
+        ["build_members", "corpus", "count_members"],
     ),
     "programs-render.md": (
         "Programs that render",

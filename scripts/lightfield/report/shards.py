@@ -161,10 +161,10 @@ def write_shards(
     rows = []
     for split in dict.fromkeys(SPLIT_NAMES.values()):
         of_split = [sample for sample in samples if sample.split == split]
-        for number, part in enumerate(_parts(of_split, most)):
+        for number, part in enumerate(parts(of_split, most)):
             # mlcroissant takes tars with equal names for one, even of different datasets.
             path = output / f"{name}-{split}-{number:05}.tar"
-            _write(path, (member for sample in part for member in sample.members))
+            write_tar(path, (member for sample in part for member in sample.members))
             shards.setdefault(split, []).append(path)
             for sample in part:
                 rows.append(
@@ -184,11 +184,11 @@ def write_others(output: Path, name: str, datasets: Sequence[Dataset]) -> Path:
     """Write all files without a view as a tar that unpacks to the folder ``name``."""
     path = output / f"{OTHER_FILES}.tar"
     files = {inside: file for dataset in datasets for inside, file in dataset.others.items()}
-    _write(path, ((f"{name}/{inside}", files[inside]) for inside in sorted(files)))
+    write_tar(path, ((f"{name}/{inside}", files[inside]) for inside in sorted(files)))
     return path
 
 
-def _parts(samples: Iterable[Sample], most: float) -> Iterator[list[Sample]]:
+def parts(samples: Iterable[Sample], most: float) -> Iterator[list[Sample]]:
     """Yield runs of samples whose tar has at most ``most`` bytes."""
     part: list[Sample] = []
     size = float(tarfile.RECORDSIZE)
@@ -208,7 +208,8 @@ def _parts(samples: Iterable[Sample], most: float) -> Iterator[list[Sample]]:
         yield part
 
 
-def _write(path: Path, members: Iterable[tuple[str, Path | bytes]]) -> None:
+def write_tar(path: Path, members: Iterable[tuple[str, Path | bytes]]) -> None:
+    """Write a tar of members, atomically: their names, and their files or contents."""
     with atomic_path(path) as temporary, tarfile.open(temporary, "w") as archive:
         for name, content in members:
             add_entry(archive, name, content)

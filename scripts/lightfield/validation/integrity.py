@@ -46,6 +46,20 @@ class Fault:
         return f"{self.path}: {self.problem}"
 
 
+def file_problem(path: Path, digest: str, source: str) -> str | None:
+    """Return what is wrong with a file that must have a SHA-256. ``source`` is what says so."""
+    if not os.path.lexists(path):
+        return "is missing"
+    problem = broken(path)
+    if problem:
+        return problem
+    try:
+        actual = sha256(path)
+    except OSError as error:
+        return f"cannot be read: {read_problem(error)}"
+    return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
+
+
 class Integrity:
     """Checks the files of a dataset. With the folder ``work``, also those that it was made from."""
 
@@ -66,7 +80,7 @@ class Integrity:
         expected = self._expected
         if self.work:
             yield from self._ledger_faults(self.work / ledger.NAME)
-        problems = {path: self._problem(path, sums) for path, sums in expected.items()}
+        problems = {path: file_problem(path, *sums) for path, sums in expected.items()}
         for path, problem in problems.items():
             if problem:
                 yield Fault(path, problem)
@@ -124,7 +138,7 @@ class Integrity:
         entry = self._ledger.get(str(path))
         if entry is None:
             return not self._ledger
-        return self._problem(path, (entry, "the ledger")) is None
+        return file_problem(path, entry, "the ledger") is None
 
     def _is_noted(self, path: Path) -> bool:
         return str(path) in self._ledger
@@ -195,19 +209,6 @@ class Integrity:
         scene, _, name_in_scene = inside.partition("/")
         is_of_scene = "/" not in name_in_scene and f"{self._scene}_".startswith(f"{scene}_")
         return is_of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
-
-    def _problem(self, path: Path, expected: tuple[str, str]) -> str | None:
-        digest, source = expected
-        if not os.path.lexists(path):
-            return "is missing"
-        problem = broken(path)
-        if problem:
-            return problem
-        try:
-            actual = sha256(path)
-        except OSError as error:
-            return f"cannot be read: {read_problem(error)}"
-        return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files. Those of its report only with a ledger, which lists them."""

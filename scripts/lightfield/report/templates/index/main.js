@@ -1,7 +1,7 @@
 // Shows the datasets that match the search and the filters.
 
 const controls = document.getElementById("filters");
-const cards = [...document.querySelectorAll(".cards li")];
+const cards = [...document.querySelectorAll(".datasets li")];
 const count = document.getElementById("count");
 
 // Every word of the search must stand in the dataset's scene, rig or lens.

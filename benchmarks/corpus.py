@@ -1,0 +1,180 @@
+"""Build a family of 200 models, broken ones among them, kill the build, and check what comes out.
+
+The models are those of benchmarks/models.py. The build is killed some times, each time after a part
+of the members, and then finishes. The program fails if a model that can be rendered has failed, if
+a broken one has not, if a kill lost more than the members at hand, or if a byte is not as the sums
+over the corpus say. It prints a table, and the CPU seconds of each stage a member.
+"""
+
+import argparse
+import json
+import os
+import resource
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, read_json_lines, write_json, write_text
+from lightfield.core.progress import Progress
+from lightfield.dataset.config import ROOT
+from lightfield.validation.corpus_integrity import corpus_faults
+
+# Angle of view, distance and elevation are those of allenai/objaverse-rendering, and its samples,
+# adaptive sampling and denoiser are the default here.
+SCENE = """
+scene: {{unit: box}}
+render:
+  samples: {samples}
+  adaptive_threshold: 0.01
+  max_bounces: 1
+  denoise: {denoise}
+  transparent: true
+rigs:
+  ring:
+    type: ring
+    count: {views}
+    size: 2.4
+    elevation: 30
+    camera: {{lens: rectilinear, fov: 49.1, resolution: [{resolution}, {resolution}]}}
+family:
+  models: models/*.*
+  corpus: {{shards: true, shard_gigabytes: 0.05}}
+"""
+RESULTS = Path("results/chairs")
+
+
+class Build:
+    """A build of the family in a folder of its own."""
+
+    def __init__(self, root: Path, models: Path, cores: int, scene: str) -> None:
+        self.root = root
+        self.cores = cores
+        write_text(root / "configs/scenes/chairs.yaml", scene)
+        settings = {"scenes": ["chairs"], "rigs": "all", "preset": "full", "device": "cpu"}
+        write_json(root / "config.yaml", settings)
+        link = root / "models"
+        if not link.exists():
+            link.symlink_to(models.resolve(), target_is_directory=True)
+
+    def start(self, *arguments: str) -> subprocess.Popen[str]:
+        """Start Snakemake in a process group of its own."""
+        snakemake = str(Path(sys.executable).with_name("snakemake"))
+        command = [snakemake, "--snakefile", str(ROOT / "Snakefile"), "--cores", str(self.cores)]
+        return subprocess.Popen(
+            [*command, *arguments],
+            cwd=self.root,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+
+    def recorded(self) -> int:
+        """Return how many members have a record."""
+        return len([*self.root.glob(f"{RESULTS}/*/member.json")])
+
+    def begun(self) -> Counter[str]:
+        """Return how often each member was begun, from the journals of the batches."""
+        lines = [
+            line
+            for journal in self.root.glob("work/chairs/batches/*.journal.jsonl")
+            for line in read_json_lines(journal)
+        ]
+        return Counter(line["member"] for line in lines if "began" in line)
+
+    def kill_after(self, members: int) -> None:
+        """Build until so many members are recorded, then kill the build."""
+        process = self.start()
+        while self.recorded() < members:
+            if process.poll() is not None:
+                raise UserError(f"the build ended before the kill:\n{process.communicate()[0]}")
+            time.sleep(0.2)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        self.start("--unlock").communicate()
+
+    def finish(self) -> str:
+        """Build to the end. Return the last line, which counts the members."""
+        output, _ = self.start().communicate()
+        lines = [line for line in output.splitlines() if "members of chairs built" in line]
+        if not lines:
+            raise UserError(f"the build failed:\n{output}")
+        return lines[-1]
+
+
+def problems(build: Build, expected: dict[str, Any], kills: int) -> list[str]:
+    """Return what is wrong with a finished corpus."""
+    content = read_json(build.root / RESULTS / "corpus.json")
+    states = {Path(member["model"]).name: member["state"] for member in content["members"]}
+    found = [
+        f"{name}: is {states.get(name, 'missing')}, but it is {entry['kind']}"
+        for name, entry in expected.items()
+        if states.get(name) != ("valid" if entry["renders"] else "failed")
+    ]
+    valid = {member["name"] for member in content["members"] if member["state"] == "valid"}
+    # Failed members are tried again with their batch. They cost little.
+    repeated = [name for name, times in build.begun().items() if times > 1 and name in valid]
+    if len(repeated) > kills * build.cores:
+        found.append(f"built more than once: {', '.join(repeated)}")
+    return found + [str(fault) for fault in corpus_faults(build.root / RESULTS)]
+
+
+def stage_seconds(build: Build) -> dict[str, float]:
+    """Return the mean CPU seconds of each stage of the valid members."""
+    times = [read_json(path) for path in build.root.glob("work/chairs/*/cpu_seconds.json")]
+    stages = dict.fromkeys(stage for entry in times for stage in entry)
+    return {stage: statistics.fmean(entry.get(stage, 0.0) for entry in times) for stage in stages}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    add = parser.add_argument
+    add("--output", type=Path, required=True, help="folder to build in; it is kept")
+    add("--models", type=Path, help="folder of models.py (default: make them in --output)")
+    add("--views", type=int, default=12, help="views of each model (default: 12)")
+    add("--resolution", type=int, default=64, help="pixels of a view's side (default: 64)")
+    add("--samples", type=int, default=4, help="samples of a pixel (default: 4)")
+    add("--denoise", action="store_true", help="denoise the views")
+    add("--kills", type=int, default=2, help="how often the build is killed (default: 2)")
+    add("--cores", type=int, default=os.cpu_count() or 1, help="cores (default: all)")
+    arguments = parser.parse_args()
+    models = arguments.models or arguments.output / "made"
+    if not (models / "models.json").is_file():
+        program = Path(__file__).with_name("models.py")
+        subprocess.run([sys.executable, program, "--output", models], check=True)
+    expected = read_json(models / "models.json")
+    scene = SCENE.format(
+        samples=arguments.samples,
+        views=arguments.views,
+        resolution=arguments.resolution,
+        denoise=json.dumps(arguments.denoise),
+    )
+    build = Build(arguments.output, models, arguments.cores, scene)
+    progress = Progress(arguments.kills + 1, "corpus", "runs")
+    for number in range(1, arguments.kills + 1):
+        build.kill_after(len(expected) * number // (arguments.kills + 1))
+        progress.done()
+    last_line = build.finish()
+    progress.done()
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(last_line)
+    print("| stage | CPU seconds a member |\n| --- | ---: |")
+    for stage, seconds in stage_seconds(build).items():
+        print(f"| {stage} | {seconds:.3f} |")
+    print(f"\nall runs: {used.ru_utime + used.ru_stime:.0f} CPU seconds, with the killed ones")
+    if wrong := problems(build, expected, arguments.kills):
+        raise UserError("\n".join(wrong))
+    print("all members are as expected, and every byte as the sums say")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,154 @@
+# Functions for the rules of family.smk.
+from lightfield.dataset import keys
+from lightfield.dataset.corpus import CORPUS_FILES, CorpusSettings
+from lightfield.dataset.family import RECORD, outdated_members
+from lightfield.dataset.job_settings import BatchSettings, CountSettings
+
+# The CPU seconds of a member beside its views, and those of the checks.
+MEMBER_SECONDS = 0.5
+# The names of the chosen families, by their folders.
+FAMILY_FOLDERS = {family_folder(name, SETTINGS): name for name in FAMILIES}
+
+
+wildcard_constraints:
+    family="|".join(FAMILY_FOLDERS) or "(?!)",
+    batch=r"(seeds|models)_\d+_(of_)?\d+",
+
+
+@cache
+def batches_of(folder):
+    """Return the members of each batch of a family. Ends the run if there are none."""
+    name = FAMILY_FOLDERS[folder]
+    try:
+        return FAMILIES[name].batches()
+    except UserError as error:
+        sys.exit(f"error: {scene_path(name)}: {error}")
+
+
+@cache
+def common_settings(folder):
+    """Return the settings that all batches of a family have."""
+    name = FAMILY_FOLDERS[folder]
+    content = scene_content(name)
+    # New members must not change the settings of the others.
+    del content["family"]
+    source = load_scene(name).scene
+    return {
+        "family": name,
+        "scene": content,
+        "values": FAMILIES[name].values,
+        "preset": SETTINGS.preset,
+        "limits": SETTINGS.presets[SETTINGS.preset],
+        "results": RESULTS,
+        "work": WORK,
+        "fingerprint": keys.scene_fingerprint(source) if source.builder else None,
+        "bpy": version("bpy"),
+    }
+
+
+def batch_settings(wildcards):
+    """Return the settings file of a batch, and mark the batch if its members are outdated."""
+    folder = wildcards.family
+    members = one_of(batches_of(folder), wildcards.batch, WORK, "batch of it")
+    settings = BatchSettings.of(members=members, **common_settings(folder))
+    if IS_MAIN_PROCESS:
+        mark_noted_files()
+        # With a storage, the members are not here.
+        record = batch_record(folder, wildcards.batch)
+        if not STORE and outdated_members(Path(record), Path(RESULTS, folder)):
+            rerun([record])
+    path = f"{WORK}/{folder}/settings/batches/{wildcards.batch}.json"
+    return settings_file(path, settings.as_json())
+
+
+def batch_record(folder, batch):
+    """Return the record of a batch."""
+    return f"{WORK}/{folder}/batches/{batch}.json"
+
+
+def batch_records(wildcards):
+    """Return the records of all batches of a family."""
+    folder = wildcards.family
+    return [batch_record(folder, batch) for batch in batches_of(folder)]
+
+
+def count_settings(wildcards):
+    """Return the settings file of the count of a family's members."""
+    settings = CountSettings(
+        family=FAMILY_FOLDERS[wildcards.family], records=batch_records(wildcards)
+    )
+    return settings_file(
+        f"{WORK}/{wildcards.family}/settings/members.json", settings.as_json()
+    )
+
+
+def corpus_settings(wildcards):
+    """Return the settings file of a family's corpus. It names all members."""
+    folder = wildcards.family
+    options = FAMILIES[FAMILY_FOLDERS[folder]].corpus
+    members = [member.name for batch in batches_of(folder).values() for member in batch]
+    settings = CorpusSettings(**dict(options), family=folder, members=sorted(members))
+    return settings_file(f"{WORK}/{folder}/settings/corpus.json", settings.as_json())
+
+
+def batch_threads(wildcards):
+    """Return the cores of each batch: one, or more if there are fewer batches than cores."""
+    count = sum(len(batches_of(folder)) for folder in FAMILY_FOLDERS)
+    return max(1, (workflow.cores or 1) // count)
+
+
+@cache
+def member_datasets(folder):
+    """Return the datasets of a member that stands for all members of a family."""
+    limits = SETTINGS.presets[SETTINGS.preset]
+    return scene_datasets(FAMILY_FOLDERS[folder], SETTINGS.preset, limits, SETTINGS)
+
+
+def missing_members(wildcards):
+    """Return how many members of a batch have no record yet."""
+    folder = wildcards.family
+    names = [member.name for member in batches_of(folder)[wildcards.batch]]
+    return sum(
+        not os.path.exists(f"{RESULTS}/{folder}/{name}/{RECORD}") for name in names
+    )
+
+
+def batch_views(wildcards):
+    """Return how many views the missing members of a batch have, and their bytes."""
+    datasets = member_datasets(wildcards.family)
+    views = sum(dataset.view_count for dataset in datasets)
+    size = sum(d.view_count * d.estimate.all_view_bytes for d in datasets)
+    members = missing_members(wildcards)
+    return members * views, members * size
+
+
+def batch_seconds(wildcards):
+    """Return the estimated CPU seconds of the missing members of a batch."""
+    seconds = 0.0
+    for dataset in member_datasets(wildcards.family):
+        estimate = dataset.estimate
+        view_seconds = estimate.view_seconds + sum(
+            map(estimate.reprojection_seconds, dataset.reprojections)
+        )
+        seconds += dataset.view_count * view_seconds + estimate.check_seconds
+    return missing_members(wildcards) * (seconds + MEMBER_SECONDS)
+
+
+def family_results():
+    """Return the folders of the chosen families that have members."""
+    folders = [f"{RESULTS}/{folder}" for folder in FAMILY_FOLDERS]
+    return [folder for folder in folders if any(Path(folder).glob(f"*/{RECORD}"))]
+
+
+def family_targets():
+    """Return the files that a run with families makes."""
+    return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS] + corpora()
+
+
+def corpora():
+    """Return the files of the chosen families' corpora."""
+    return [
+        f"{RESULTS}/{folder}/{name}"
+        for folder in FAMILY_FOLDERS
+        for name in CORPUS_FILES
+    ]

@@ -1,0 +1,60 @@
+"""The settings of a family's corpus, and the split of its members."""
+
+import hashlib
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from lightfield.core.settings import Settings
+from lightfield.geometry.rigs.split_setting import Part
+
+CORPUS = "corpus.json"
+PAGE = "index.html"
+# The files of a corpus that every family has.
+CORPUS_FILES = (CORPUS, PAGE, "sha256sums.txt")
+# The folders of a corpus beside those of its members. No member may have such a name.
+THUMBNAILS = "thumbnails"
+SHARDS = "shards"
+
+
+class Shares(Settings):
+    """The shares of the members that validate and test. All others train."""
+
+    validation: float = Field(0.1, ge=0, le=1, description="Share of the members that validate.")
+    test: float = Field(0.1, ge=0, le=1, description="Share of the members that test.")
+
+    @model_validator(mode="after")
+    def _some_train(self) -> Self:
+        if self.validation + self.test > 1:
+            raise ValueError(
+                f"validation and test are {self.validation:g} and {self.test:g}; their sum must "
+                "be at most 1"
+            )
+        return self
+
+    def part_of(self, name: str) -> Part:
+        """Return the part of a member. It depends on the name alone, so new members change none."""
+        # Evenly spread from 0 to 1.
+        position = int.from_bytes(hashlib.sha256(name.encode()).digest()[:6]) / 2**48
+        if position < self.test:
+            return "test"
+        return "validation" if position < self.test + self.validation else "train"
+
+
+class CorpusOptions(Settings):
+    """The key `corpus` of a family."""
+
+    splits: Shares = Field(Shares(), description="How the members are split.")
+    shards: bool = Field(False, description="Whether to write the views as WebDataset shards too.")
+    shard_gigabytes: float = Field(
+        1, gt=0, description="Size of a shard, at most.", json_schema_extra={"unit": "GB"}
+    )
+
+
+class CorpusSettings(CorpusOptions):
+    """The settings of scripts/corpus.py."""
+
+    family: str = Field(description="The name of the corpus.")
+    members: list[str] | None = Field(
+        None, description="The family's members. Without this key, all that have a record."
+    )

@@ -1,0 +1,285 @@
+"""Families of scenes: one scene YAML stands for many, which differ by seed, model or values.
+
+A member's name and values follow from the member's own seed or path alone. So they are the same on
+every machine, and new members change none of the others.
+"""
+
+import copy
+import glob
+import hashlib
+import itertools
+import json
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import DAMAGE
+from lightfield.core.settings import Settings, as_list, pattern
+from lightfield.dataset.corpus import CorpusOptions
+from lightfield.dataset.names import MODELS
+
+# Planning more members would take minutes.
+MOST_MEMBERS = 100_000
+# The record of a member, in its folder.
+RECORD = "member.json"
+FORMAT = "plenoforge member"
+
+_Bounds = Annotated[tuple[float, float], as_list(2)]
+
+
+class Draw(Settings):
+    """How a value is drawn for each member."""
+
+    uniform: _Bounds | None = Field(None, description="A number between two bounds.")
+    log_uniform: _Bounds | None = Field(
+        None, description="A number between two bounds above 0, with a uniform logarithm."
+    )
+    integers: Annotated[tuple[int, int], as_list(2)] | None = Field(
+        None, description="A whole number from the first bound to the last."
+    )
+    choice: list[Any] | None = Field(None, min_length=1, description="One of the listed values.")
+
+    @model_validator(mode="after")
+    def _one_of_four(self) -> Self:
+        if len(self.model_fields_set) != 1:
+            raise ValueError("must have one of uniform, log_uniform, integers and choice")
+        (key,) = self.model_fields_set
+        bounds = self.uniform or self.log_uniform or self.integers
+        if bounds and bounds[0] > bounds[1]:
+            raise ValueError(f"{key}: is {list(bounds)}; must have the smaller bound first")
+        if self.log_uniform and self.log_uniform[0] <= 0:
+            raise ValueError(f"log_uniform: is {list(self.log_uniform)}; must be above 0")
+        return self
+
+    def value(self, part: float) -> Any:
+        """Return the value at a ``part`` of the range, 0 to below 1."""
+        if self.choice:
+            return self.choice[int(part * len(self.choice))]
+        if self.integers:
+            first, last = self.integers
+            return first + int(part * (last - first + 1))
+        if self.uniform:
+            low, high = self.uniform
+            value = low + (high - low) * part
+        else:
+            assert self.log_uniform
+            low, high = self.log_uniform
+            value = low * (high / low) ** part
+        # The last digits of a power differ between machines.
+        return float(f"{value:.6g}")
+
+
+class Member(Settings):
+    """A member of a family, by its name and by what is its own."""
+
+    name: str = Field(description="The name of the member's folder.")
+    seed: int | None = Field(None, description="The member's seed.")
+    model: str | None = Field(None, description="The path of the member's model file.")
+
+
+class Family(Settings):
+    """Many scenes from one scene YAML. Each of them has datasets of its own."""
+
+    seeds: str | None = Field(
+        None,
+        pattern=pattern(r"^\d{1,9}-\d{1,9}$", "the first and the last seed, such as 0-999"),
+        description="The first and the last seed of the members. A builder takes them.",
+    )
+    models: str | None = Field(
+        None,
+        min_length=1,
+        max_length=1000,
+        description="The model files of the members: a path with * and **, such as "
+        "models/**/*.glb, from the folder that Snakemake runs in. scene.model is left out.",
+    )
+    values: dict[str, Draw] = Field(
+        {},
+        description="How other keys of the scene YAML are drawn for each member, by their names "
+        "with dots, such as scene.parameters.detail.",
+    )
+    batch: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        32,
+        description="How many members one job builds, at most about.",
+        json_schema_extra={"unit": "members"},
+    )
+    corpus: CorpusOptions = Field(
+        CorpusOptions(), description="How the members become one corpus: splits, and shards."
+    )
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.seeds is None) == (self.models is None):
+            raise ValueError("must have one of seeds and models")
+        for key in self.values:
+            own = "scene.parameters.seed" if self.seeds else "scene.model"
+            if not re.fullmatch(r"\w[\w-]*(\.\w[\w-]*)+", key) or key.startswith("family."):
+                raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
+            if key == own:
+                raise ValueError(f"values: {key} is the members' own")
+        if self.seeds and len(self._seeds) > MOST_MEMBERS:
+            raise ValueError(f"seeds: is {self.seeds!r}; must be at most {MOST_MEMBERS} seeds")
+        if self.seeds and not self._seeds:
+            raise ValueError(f"seeds: is {self.seeds!r}; must have the smaller seed first")
+        return self
+
+    @property
+    def _seeds(self) -> range:
+        assert self.seeds
+        first, last = map(int, self.seeds.split("-"))
+        return range(first, last + 1)
+
+    def members(self) -> list[Member]:
+        """Return all members. Raises `UserError` if no model matches, or too many do."""
+        if self.seeds:
+            return [Member.of(name=f"{seed:04d}", seed=seed) for seed in self._seeds]
+        assert self.models
+        paths = _models(self.models)
+        if not paths:
+            raise UserError(f"family.models: is {self.models!r}; there is no such model file")
+        if len(paths) > MOST_MEMBERS:
+            raise UserError(
+                f"family.models: {self.models!r} has {len(paths)} files; "
+                f"must be at most {MOST_MEMBERS}"
+            )
+        return [Member.of(name=name, model=path) for name, path in paths.items()]
+
+    def batches(self) -> dict[str, list[Member]]:
+        """Return the members that each job builds, by the batch's name.
+
+        A new seed changes one batch at most. New models change the batches that they belong to. The
+        number of batches doubles only when the number of models has doubled.
+        """
+        batches: dict[str, list[Member]] = {}
+        members = self.members()
+        count = 2 ** max(0, math.ceil(math.log2(len(members) / self.batch)))
+        for member in members:
+            if member.seed is not None:
+                first = member.seed // self.batch * self.batch
+                name = f"seeds_{first:04d}_{first + self.batch - 1:04d}"
+            else:
+                number = int(hashlib.sha256(member.name.encode()).hexdigest()[:8], 16) % count
+                name = f"models_{number:04d}_of_{count:04d}"
+            batches.setdefault(name, []).append(member)
+        return batches
+
+
+def drawn(values: Mapping[str, Draw], member: Member) -> dict[str, Any]:
+    """Return the drawn values of a member, by their keys with dots."""
+    return {key: draw.value(_part(member.name, key)) for key, draw in values.items()}
+
+
+def stand_in(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a family's scene YAML with the values of a member that stands for all of them.
+
+    It keeps the block `family`. So a check of it finds mistakes that all members have.
+    """
+    family = Family(**content["family"])
+    member = Member.of(name="", seed=0) if family.seeds else Member.of(name="", model="model.glb")
+    values = {key: draw.value(0) for key, draw in family.values.items()}
+    return member_content(content, member, values) | {"family": content["family"]}
+
+
+def member_content(
+    content: Mapping[str, Any], member: Member, values: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the content of a member's scene YAML, from that of the family's and drawn values."""
+    scene_yaml = copy.deepcopy({key: value for key, value in content.items() if key != "family"})
+    if member.model is not None:
+        _set(scene_yaml, "scene.model", member.model)
+    else:
+        _set(scene_yaml, "scene.parameters.seed", member.seed)
+    for key, value in values.items():
+        _set(scene_yaml, key, copy.deepcopy(value))
+    return scene_yaml
+
+
+def _set(content: dict[str, Any], key: str, value: Any) -> None:
+    """Set a key with dots. If a parent is no mapping, the check of the content reports it."""
+    *parents, last = key.split(".")
+    for parent in parents:
+        content = content.setdefault(parent, {})
+        if not isinstance(content, dict):
+            return
+    content[last] = value
+
+
+def _part(*names: str) -> float:
+    """Return a number from 0 to below 1 that follows from some names."""
+    digest = hashlib.sha256(json.dumps(names).encode()).digest()
+    return int.from_bytes(digest[:6], "big") / 2**48
+
+
+def _models(glob_pattern: str) -> dict[str, str]:
+    """Return the paths of the model files that match, by the names of their members."""
+    folders = Path(glob_pattern).parent.parts
+    fixed = list(itertools.takewhile(lambda part: not glob.has_magic(part), folders))
+    # Path.glob() takes no path from /.
+    paths = sorted(glob.glob(glob_pattern, recursive=True))  # noqa: PTH207
+    return {
+        _member_name(os.path.relpath(path, Path(*fixed))): path
+        for path in paths
+        if path.lower().endswith(MODELS) and os.path.isfile(path)  # noqa: PTH113, many files
+    }
+
+
+def _member_name(path: str) -> str:
+    """Return the name of the member with a model at ``path`` from the folder of all models.
+
+    It has _ in place of other characters. Unless the path is a plain name, part of its SHA-256
+    follows, because several paths may look alike.
+    """
+    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_]{0,60}\.[A-Za-z]+", path):
+        return path.replace(".", "_")
+    readable = re.sub(r"[^A-Za-z0-9]+", "_", path)[-40:].strip("_")
+    return f"{readable}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}"
+
+
+def summary(family: str, built: int, failures: Sequence[tuple[str, str]], listing: str) -> str:
+    """Return the last line of a run: how many members are built, and which failed first.
+
+    ``failures`` are names and causes of the failed members, and ``listing`` is the file with all.
+    """
+    total = built + len(failures)
+    line = f"{built:,} of {total:,} members of {family} built"
+    if not failures:
+        return line
+    first = "; ".join(f"{name}: {cause}" for name, cause in failures[:3])
+    more = f"; and {len(failures) - 3:,} more" if failures[3:] else ""
+    return f"{line}, {len(failures):,} failed: {listing}: {first}{more}"
+
+
+def outdated_members(record: Path, folder: Path) -> bool:
+    """Return whether a file of a batch's members is missing or has changed since its ``record``.
+
+    ``folder`` holds the members. Compares sizes and times of the models' files. Of the members'
+    own files it only looks for each record and sha256sums.txt: there may be a million views.
+    """
+    try:
+        content = json.loads(record.read_bytes())
+        for path, stamp in content["sources"].items():
+            if _size_and_time(path) != stamp:
+                return True
+        for name, member in content["members"].items():
+            paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in member.get("datasets", ()))]
+            if not all(os.path.isfile(f"{folder}/{name}/{path}") for path in paths):  # noqa: PTH113
+                return True
+    except FileNotFoundError:
+        return False
+    except (OSError, *DAMAGE):
+        return True
+    return False
+
+
+def _size_and_time(path: str) -> list[int] | None:
+    """Return a file's bytes and its time of change in nanoseconds. None if it does not exist."""
+    try:
+        status = os.stat(path)  # noqa: PTH116, a `Path` is slow for many files
+    except OSError:
+        return None
+    return [status.st_size, status.st_mtime_ns]

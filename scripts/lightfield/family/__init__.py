@@ -1,0 +1,1 @@
+"""Builds the members of families: all stages of one member after another, in one process."""

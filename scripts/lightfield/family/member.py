@@ -1,0 +1,259 @@
+"""Builds one member of a family, and writes its record, results/<family>/<member>/member.json."""
+
+import hashlib
+import json
+import os
+import shutil
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lightfield.core.disk_space import obstacle
+from lightfield.core.errors import UserError
+from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.files import DAMAGE, read_json, sha256, write_json
+from lightfield.dataset import config
+from lightfield.dataset.config import Scene
+from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.family import FORMAT, RECORD, Member, drawn, member_content
+from lightfield.dataset.job_settings import BatchSettings
+from lightfield.dataset.loading import datasets_of
+from lightfield.dataset.view_store import ViewStore
+from lightfield.rendering import model_files
+from lightfield.validation.files import SUMS, read_sums
+
+# Raise this number when the stages make something else of equal settings.
+VERSION = 1
+# What a member is made of does not depend on these keys of a scene YAML.
+DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
+
+
+class MemberBuild:
+    """One member of a batch: where its files lie, what it is made from, and its record."""
+
+    def __init__(self, settings: BatchSettings, member: Member) -> None:
+        self.settings = settings
+        self.member = member
+        is_full = settings.preset == "full"
+        family = settings.family if is_full else f"{settings.family}_{settings.preset}"
+        self.folder = Path(settings.results, family, member.name)
+        self.work = Path(settings.work, family, member.name)
+        self.record = self.folder / RECORD
+        self.log = self.work / "member.log"
+        self.values = drawn(settings.values, member)
+        self.store = ViewStore.configured()
+        self.content = member_content(settings.scene, member, self.values)
+
+    def _written(self) -> Scene:
+        """Return the member's scene YAML as settings. Raises `UserError` for a wrong value."""
+        file = f"{config.OWN_SCENES}/{self.settings.family}.yaml: member {self.member.name}"
+        return config.check_member(self.content, file)
+
+    def _datasets(self, written: Scene) -> list[Dataset]:
+        places = {
+            "results_root": self.settings.results,
+            "work_root": self.settings.work,
+            # One shard has all views.
+            "views_per_shard": config.MOST_VIEWS,
+            "member": self.member.name,
+        }
+        settings = self.settings
+        return datasets_of(settings.family, written, settings.preset, settings.limits, places)
+
+    def key(self) -> str:
+        """Return the SHA-256 of everything that the member is made from."""
+        content = [
+            VERSION,
+            {k: v for k, v in self.content.items() if k not in DESCRIPTIVE_KEYS},
+            self.settings.limits.as_json(),
+            self.settings.fingerprint,
+            version("bpy"),
+            self._model_sums(),
+        ]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def _model_sums(self) -> list[tuple[str, str | None]]:
+        """Return the path and SHA-256 of each file that the member's model was read from."""
+        home = Path(self.member.model).parent if self.member.model else Path()
+        files = {path: home / path for path in self.sources()}
+        return [(path, sha256(file) if file.is_file() else None) for path, file in files.items()]
+
+    def sources(self) -> list[str]:
+        """Return the files that the member's model was read from, as paths from its folder.
+
+        Before the first import, these are the files that it is known to refer to.
+        """
+        if self.member.model is None:
+            return []
+        path = Path(self.member.model)
+        with suppress(UserError, *DAMAGE):
+            record = read_json(self.work / "model.json")
+            return [str(entry["path"]) for entry in record["external_files"]]
+        files = [path]
+        with suppress(UserError, OSError, *DAMAGE):
+            files += model_files.referred(path)
+        return sorted({Path(os.path.relpath(file, path.parent)).as_posix() for file in files})
+
+    def is_finished(self) -> bool:
+        """Return whether the member is valid, of the present settings, and has its bytes.
+
+        Of files in a storage, only the checksums and the names are compared.
+        """
+        if self.store:
+            self.store.bring(str(self.record))
+        try:
+            record = read_json(self.record)
+            if record["state"] != "valid" or record["key"] != self.key():
+                return False
+            has_bytes = self._has_stored_files if self.store else _has_its_bytes
+            return all(
+                has_bytes(self.folder / rig, entry["sha256sums"])
+                for rig, entry in record["datasets"].items()
+            )
+        except (UserError, OSError, *DAMAGE):
+            return False
+
+    def _has_stored_files(self, folder: Path, digest: str) -> bool:
+        """Return whether the storage has a dataset's checksums, and all files that they name."""
+        assert self.store
+        sums = folder / SUMS
+        if not self.store.bring(str(sums)) or sha256(sums) != digest:
+            return False
+        names: dict[str, set[str]] = {}
+        for name in read_sums(sums):
+            path = folder / name
+            names.setdefault(str(path.parent), set()).add(path.name)
+        return all(expected <= {*self.store.names(path)} for path, expected in names.items())
+
+    def build(self, device: str, threads: int) -> dict[str, Any]:
+        """Make the member's datasets, and return and write its record.
+
+        A failure is in the record, and the traceback in the log. Raises `UserError` only if
+        nothing can be written.
+        """
+        # From now on the member is neither valid nor failed.
+        self.record.unlink(missing_ok=True)
+        (self.work / "model.json").unlink(missing_ok=True)
+        if self.store:
+            self.store.remove(str(self.record))
+        # Only now, because the process that starts workers needs no Blender.
+        from lightfield.family.stages import Stages
+
+        stages: Stages | None = None
+        with _output_to(self.log):
+            try:
+                written = self._written()
+                datasets = self._datasets(written)
+                self._remove_sums(datasets)
+                name = f"{self.settings.family}/{self.member.name}"
+                stages = Stages(self.settings, name, written, datasets, device, threads)
+                stages.run()
+            except (Exception, SystemExit) as error:
+                traceback.print_exc()
+                if problem := obstacle(self.folder) or obstacle(self.work):
+                    raise UserError(f"{self.folder}: cannot be written: {problem}") from None
+                stage = stages.stage if stages else "settings"
+                return self.fail(stage, _cause(error))
+        write_json(self.work / "cpu_seconds.json", stages.seconds)
+        entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
+        return self._write({"state": "valid", "datasets": entries})
+
+    def _remove_sums(self, datasets: list[Dataset]) -> None:
+        """Remove the checksums of earlier datasets. A dataset without them is not valid."""
+        for dataset in datasets:
+            Path(dataset.folder, SUMS).unlink(missing_ok=True)
+
+    def fail(self, stage: str, cause: str) -> dict[str, Any]:
+        """Write and return the record of a failed member. Removes what is half-written of it."""
+        if stage != "validate":
+            for entry in self.folder.iterdir() if self.folder.is_dir() else ():
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        failure = {"stage": stage, "cause": cause, "log": str(self.log)}
+        return self._write({"state": "failed", "datasets": {}, "failure": failure})
+
+    def _write(self, outcome: Mapping[str, Any]) -> dict[str, Any]:
+        member = self.member
+        record: dict[str, Any] = {"format": FORMAT, "name": member.name, "key": self.key()}
+        if member.model is None:
+            record["seed"] = member.seed
+        else:
+            record["model"] = member.model
+        record |= {"values": self.values, **outcome}
+        write_json(self.record, record)
+        if self.store:
+            self._send(record)
+        return record
+
+    def _send(self, record: Mapping[str, Any]) -> None:
+        """Put the member's files into the storage, each under its path, and the record last."""
+        assert self.store
+        for rig in record["datasets"]:
+            sums = self.folder / rig / SUMS
+            for name in read_sums(sums):
+                self.store.send(str(self.folder / rig / name))
+            self.store.send(str(sums))
+        self.store.send(str(self.record))
+
+    def last_stage(self) -> str:
+        """Return the stage at which a process was that died, by the member's log."""
+        with suppress(OSError):
+            lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+            stages = [line.partition(": ")[2] for line in lines if line.startswith("stage: ")]
+            return stages[-1] if stages else "settings"
+        return "settings"
+
+
+def _listing(dataset: Dataset) -> dict[str, Any]:
+    """Return what the record of a member says of a valid dataset."""
+    folder = Path(dataset.folder)
+    sums = folder / SUMS
+    split = dataset.rig.split
+    size = sum((folder / name).stat().st_size for name in read_sums(sums))
+    return {
+        "views": dataset.view_count,
+        "bytes": size + sums.stat().st_size,
+        "split": split if isinstance(split, str | None) else "chosen",
+        "sha256sums": sha256(sums),
+    }
+
+
+def _has_its_bytes(folder: Path, digest: str) -> bool:
+    """Return whether a dataset's checksums have this SHA-256, and its files these checksums."""
+    sums = folder / SUMS
+    if sha256(sums) != digest:
+        return False
+    return all(sha256(folder / name) == expected for name, expected in read_sums(sums).items())
+
+
+def _cause(error: BaseException) -> str:
+    """Return why a stage failed, in one line."""
+    if isinstance(error, MemoryError):
+        return f"out of memory: {LESS_MEMORY}"
+    text = " ".join(str(error).split()).removeprefix("error: ")
+    if isinstance(error, UserError | SystemExit):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+@contextmanager
+def _output_to(log: Path) -> Iterator[None]:
+    """Send what this process and its libraries print to a log."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    saved = [os.dup(1), os.dup(2)]
+    with log.open("wb") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        for number, descriptor in enumerate(saved, 1):
+            os.dup2(descriptor, number)
+            os.close(descriptor)

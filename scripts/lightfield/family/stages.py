@@ -1,0 +1,261 @@
+"""The stages that make the datasets of one member, through the functions that programs call.
+
+All stages of a member run in this process, so that Blender is loaded once for many members. Each
+stage that needs the scene opens its .blend anew, as the stages of other scenes do.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lightfield import export
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.dataset import lightfield_file
+from lightfield.dataset.capture import LightfieldSettings
+from lightfield.dataset.config import MODEL_KEYS, Scene
+from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.exports import Export, InstantNgp, export_settings_of
+from lightfield.dataset.job_settings import (
+    BatchSettings,
+    BuildSettings,
+    FreePlacesSettings,
+    ImportSettings,
+)
+from lightfield.dataset.keys import MODEL_VERSION
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.names import VIEWS
+from lightfield.dataset.splits_file import splits_content
+from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.rendering import (
+    built_scene,
+    camera_files,
+    inventory_file,
+    model,
+    shard,
+)
+from lightfield.reprojection import flags, pipeline
+from lightfield.reprojection.job import Job
+from lightfield.validation.files import SUMS, remove_strays, write_sums
+from lightfield.validation.result import causes
+from lightfield.validation.validate import validate
+
+
+class Stages:
+    """Runs the stages of a member. ``stage`` is the one at work, or the last one.
+
+    ``written`` is the member's scene YAML, ``datasets`` are all its datasets, and ``name`` is what
+    its light fields have as the name of the scene. ``seconds`` are the CPU seconds of each stage.
+    """
+
+    def __init__(
+        self,
+        settings: BatchSettings,
+        name: str,
+        written: Scene,
+        datasets: list[Dataset],
+        device: str,
+        threads: int,
+    ) -> None:
+        self.settings = settings
+        self.name = name
+        self.written = written
+        self.datasets = datasets
+        self.device = device
+        self.threads = threads
+        self.stage = ""
+        self.seconds: dict[str, float] = {}
+        first = datasets[0]
+        self.blend = Path(str(first.blend))
+        self.inventory = Path(str(first.inventory))
+        self.model_record = Path(str(first.model_record)) if first.source.model else None
+
+    @contextmanager
+    def _stage(self, name: str) -> Iterator[None]:
+        """Name the stage in the log, and measure its CPU time."""
+        self.stage = name
+        print(f"stage: {name}", flush=True)
+        began = time.process_time()
+        yield
+        seconds = self.seconds.get(name, 0.0) + time.process_time() - began
+        self.seconds[name] = round(seconds, 4)
+
+    def run(self) -> None:
+        """Make all files of the datasets. Raises `UserError` if one is not valid."""
+        self._make_scene()
+        for dataset in self.datasets:
+            self._place_cameras(dataset)
+        for dataset in self.datasets:
+            self._render(dataset)
+            for name in dataset.reprojections:
+                with self._stage("reproject"):
+                    self._reproject(dataset, name)
+        splits = self._write_splits()
+        with self._stage("export"):
+            # Those that test take the scale of those that train.
+            for dataset in sorted(self.datasets, key=lambda each: each.trained_by is not None):
+                self._export(dataset)
+        for dataset in self.datasets:
+            with self._stage("validate"):
+                self._validate(dataset, splits)
+
+    def _make_scene(self) -> None:
+        source = self.written.scene
+        if source.builder:
+            with self._stage("build_scene"):
+                settings = BuildSettings(builder=source.builder, parameters=source.parameters)
+                built_scene.write(settings, self.blend)
+        else:
+            assert self.model_record
+            with self._stage("import_model"):
+                keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
+                import_settings = ImportSettings(
+                    **source.model_dump(include=keys, exclude_none=True),
+                    version=MODEL_VERSION,
+                    bpy=version("bpy"),
+                )
+                model.write(import_settings, self.blend, self.model_record)
+        with self._stage("inventory"):
+            inventory_file.write_of_datasets(
+                self.blend, self.written, self.datasets, self.inventory, measures_memory=False
+            )
+
+    def _place_cameras(self, dataset: Dataset) -> None:
+        places = Path(str(dataset.places)) if dataset.places else None
+        if places:
+            with self._stage("free_places"):
+                settings = FreePlacesSettings.of(rig=dataset.rig, frame=dataset.source.frame)
+                camera_files.write_places(self.blend, settings, None, places)
+        with self._stage("lightfield"):
+            capture = LightfieldSettings.of_capture(dataset)
+            capture = capture.model_copy(update={"scene": self.name})
+            inventory = self.inventory if dataset.lightfield_inventory else None
+            lightfield = lightfield_file.from_settings(
+                capture, inventory, self.model_record, places
+            )
+            lightfield.write(Path(dataset.folder, "lightfield.json"))
+        with self._stage("check_cameras"):
+            camera_files.write_clearance(
+                self.blend,
+                Path(dataset.folder, "lightfield.json"),
+                None,
+                Path(str(dataset.cameras)),
+            )
+
+    def _render(self, dataset: Dataset) -> None:
+        with self._stage("render"):
+            (record,) = dataset.records("render")
+            shard.render(
+                LightField.read(Path(dataset.folder, "lightfield.json")),
+                ":",
+                Path(dataset.folder, "exr"),
+                blend=self.blend,
+                inventory=self.inventory,
+                device=self.device,
+                threads=self.threads,
+                record=Path(record),
+                journal=Path(record).with_suffix(".journal.jsonl"),
+            )
+
+    def _reproject(self, dataset: Dataset, name: str) -> None:
+        """Make the images of a reprojection, and its lightfield.json."""
+        (source_record,) = dataset.records("render")
+        (record,) = dataset.records(name)
+        folder = Path(dataset.folder, name)
+        parser = argparse.ArgumentParser()
+        flags.add_file_flags(parser)
+        flags.add_configuration_flags(parser)
+        flags.add_reproject_flags(parser)
+        arguments = parser.parse_args(
+            [
+                *("--input-dir", f"{dataset.folder}/exr", "--output-dir", str(folder)),
+                *("--input-cfg", f"{dataset.folder}/lightfield.json"),
+                *("--output-cfg", f"{folder}/lightfield.json"),
+                *("--source-record", source_record, "--record", record),
+                *("--views", f"0:{dataset.view_count}"),
+            ]
+        )
+        lightfield = LightField.read(arguments.input_cfg)
+        settings = dataset.reprojections[name].settings
+        pipeline.run(Job(arguments, settings, lightfield, lightfield.lens))
+
+    def _write_splits(self) -> Path | None:
+        """Write the splits.json of the member. Return None if no rig has a split."""
+        with_split = [dataset for dataset in self.datasets if dataset.splits]
+        if not with_split:
+            return None
+        lightfields = {
+            dataset.rig_folder: LightField.read(Path(dataset.folder, "lightfield.json"))
+            for dataset in with_split
+        }
+        path = Path(str(with_split[0].splits))
+        write_json(path, splits_content(lightfields))
+        return path
+
+    def _export(self, dataset: Dataset) -> None:
+        """Write all exports of a dataset."""
+        for name, options in dataset.exports.selected.items():
+            for source in options.sources:
+                self._export_source(dataset, name, options, source)
+
+    def _export_source(self, dataset: Dataset, name: str, options: Export, source: str) -> None:
+        folder = Path(dataset.folder, "" if source == VIEWS else source)
+        roles: dict[str, Any] = {}
+        if isinstance(options, InstantNgp):
+            if dataset.trained_by:
+                rig = Path(dataset.folder).parent / dataset.trained_by
+                trained = rig / ("" if source == VIEWS else source) / "transforms.json"
+                roles["trained_by"] = str(trained)
+        elif options.is_for_training:
+            rigs = Path(dataset.folder).parent
+            roles["tested_by"] = {rig: str(rigs / rig) for rig in dataset.tested_by}
+        is_rendered = source == VIEWS
+        settings: Any = export_settings_of(name).of(
+            options=options.model_copy(update={"sources": [source]}),
+            suffix=".exr" if is_rendered else dataset.reprojections[source].suffix,
+            **roles,
+        )
+        if isinstance(options, InstantNgp):
+            images = Path(dataset.folder, "exr" if is_rendered else source)
+            paths = argparse.Namespace(
+                input_cfg=folder / "lightfield.json",
+                output=folder / "transforms.json",
+                image_dir=images,
+                exr_dir=None,
+                depth_dir=None,
+            )
+            instant_ngp.write(settings, paths)
+        else:
+            views = export.source_of(name, settings, Path(dataset.folder))
+            export.run(name, views, settings.options, folder / export.FOLDER / name)
+
+    def _validate(self, dataset: Dataset, splits: Path | None) -> None:
+        """Check a dataset, and write its validation.json and checksums.
+
+        Raises `UserError` with the first problems if it is not valid.
+        """
+        folder = Path(dataset.folder)
+        reprojections = list(dataset.reprojections)
+        export_lists = [Path(path).resolve() for path in dataset.export_lists]
+        removed = Path(self.settings.work, "removed")
+        remove_strays(folder, reprojections, MANIFESTS, removed, export_lists)
+        result = validate(
+            folder,
+            reprojections,
+            [Path(record) for record in dataset.all_records],
+            Path(str(dataset.cameras)),
+            self.inventory,
+            1,
+            MANIFESTS,
+            splits if dataset.rig.split else None,
+            export_lists,
+        )
+        validation = result.to_json()
+        write_json(folder / "validation.json", validation)
+        if not result.valid:
+            raise UserError(f"{folder}: is not valid: {causes(validation)}")
+        write_sums(folder / SUMS, result.checksums, folder, folder / "validation.json")

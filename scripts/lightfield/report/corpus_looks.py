@@ -1,0 +1,177 @@
+"""How the members of a corpus look: a thumbnail of each, its depths and its brightness.
+
+Only a few views of each dataset are read. A cache keeps the result until the views change.
+"""
+
+import hashlib
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, sha256, write_bytes, write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.corpus import THUMBNAILS
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.member_record import MemberRecord
+from lightfield.geometry.depth import stored_distance
+from lightfield.imaging import images, pictures
+from lightfield.validation.files import IMAGES
+
+# Views of a dataset that are read, evenly spread over it.
+VIEWS = 4
+# Pixels of a thumbnail's longer side.
+THUMBNAIL = 160
+QUALITY = 75
+# The cache is written each time after so many members, because a kill may come.
+STEP = 200
+
+Array = pictures.Array
+# What the views of a member show, and the SHA-256 of its thumbnail.
+Look = Mapping[str, Any]
+
+
+def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[str, Look]:
+    """Return the look of each valid member by its name, and write the missing thumbnails.
+
+    Removes the thumbnails of others. ``folder`` is the family's. Raises `UserError` if a view is
+    missing or damaged.
+    """
+    cached = _read(cache)
+    valid = [member for member in members if member.is_valid and member.datasets]
+    kept = {member.name: cached[member.name] for member in valid if _holds(folder, member, cached)}
+    new = [member for member in valid if member.name not in kept]
+    if new:
+        progress = Progress(len(new), "thumbnails", "members", len(kept))
+        for number, member in enumerate(new, 1):
+            kept[member.name] = {"made_of": _made_of(member), **_look(folder, member)}
+            if number % STEP == 0:
+                write_json(cache, kept)
+            progress.done()
+    if kept != cached:
+        write_json(cache, kept)
+    for path in folder.glob(f"{THUMBNAILS}/*.webp"):
+        if path.stem not in kept:
+            path.unlink()
+    return {
+        member.name: {key: value for key, value in kept[member.name].items() if key != "made_of"}
+        for member in valid
+    }
+
+
+def thumbnail(folder: Path, name: str) -> Path:
+    """Return the path of a member's thumbnail."""
+    return folder / THUMBNAILS / f"{name}.webp"
+
+
+def _read(cache: Path) -> dict[str, dict[str, Any]]:
+    """Return the content of a cache. Empty if it is missing or damaged: it can be made again."""
+    try:
+        content = read_json(cache)
+    except UserError:
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _made_of(member: MemberRecord) -> str:
+    """Return what changes with any byte of a member's datasets, and with how they are shown."""
+    sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
+    made_of = repr([sums, VIEWS, THUMBNAIL, QUALITY])
+    return hashlib.sha256(made_of.encode()).hexdigest()
+
+
+def _holds(folder: Path, member: MemberRecord, cached: Mapping[str, dict[str, Any]]) -> bool:
+    """Return whether the cache knows a member as it is, and its thumbnail is whole."""
+    entry = cached.get(member.name, {})
+    path = thumbnail(folder, member.name)
+    return (
+        entry.get("made_of") == _made_of(member)
+        and path.is_file()
+        and sha256(path) == entry.get("thumbnail")
+    )
+
+
+def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
+    """Read views of a member, and write its thumbnail. Return what the views show.
+
+    - ``depth``: the least and the largest distance in metres, or null without any surface.
+    - ``brightness``: the mean luminance of what is visible; transparent pixels do not count.
+    - ``over_exposed``: the share of this beyond 1 in a channel.
+    - ``covered``: the share of the pixels that show a surface.
+    - ``thumbnail``: the SHA-256 of the thumbnail.
+    """
+    datasets = [folder / member.name / rig for rig in sorted(member.datasets)]
+    views = [view for dataset in datasets for view in _measured_views(dataset)]
+    opacity = sum(view["opacity"] for view in views)
+    depths = [depth for view in views for depth in view["depth"]]
+    content = _webp(views[len(views) // 2]["image"])
+    write_bytes(thumbnail(folder, member.name), content)
+    return {
+        "depth": [round(min(depths), 4), round(max(depths), 4)] if depths else None,
+        "brightness": _share(sum(view["light"] for view in views), opacity),
+        "over_exposed": _share(sum(view["over_exposed"] for view in views), opacity),
+        "covered": round(float(np.mean([view["covered"] for view in views])), 4),
+        "thumbnail": hashlib.sha256(content).hexdigest(),
+    }
+
+
+def _share(part: float, whole: float) -> float:
+    return round(part / whole, 4) if whole else 0.0
+
+
+def chosen_views(dataset: Path) -> list[Path]:
+    """Return the files of the views of a dataset that are read, evenly spread over it."""
+    names = [view.name for view in LightField.read(dataset / NAME).views]
+    count = min(VIEWS, len(names))
+    numbers = [(2 * step + 1) * len(names) // (2 * count) for step in range(count)]
+    return [dataset / IMAGES / f"{names[number]}.exr" for number in numbers]
+
+
+def _measured_views(dataset: Path) -> Iterator[dict[str, Any]]:
+    """Yield what `_measured` returns for each of the `chosen_views`."""
+    lightfield = LightField.read(dataset / NAME)
+    rays = lightfield.lens.pixel_rays()
+    for path in chosen_views(dataset):
+        yield _measured(path, rays, lightfield.depth)
+
+
+def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
+    """Return a view's sums over its pixels, which `_look` puts together.
+
+    ``rays`` (height, width, 3) and the ``meaning`` of depth are those of `stored_distance`.
+    """
+    image = images.read_image(path)
+    colour = np.where(np.isfinite(image.colour), image.colour, 0)
+    alpha = image.channels.get("A", np.ones(colour.shape[:2], np.float32)).astype(np.float32)
+    depth = image.channels.get("Z", np.full(alpha.shape, math.inf, np.float32))
+    distance = stored_distance(depth, rays, meaning)
+    hit = distance[np.isfinite(distance) & (distance > 0)]
+    return {
+        "image": np.dstack([colour, alpha]),
+        "opacity": float(alpha.sum(dtype=np.float64)),
+        "light": float(pictures.luminance(colour).sum(dtype=np.float64)),
+        "over_exposed": float(alpha[(colour > 1).any(axis=-1)].sum(dtype=np.float64)),
+        "depth": [float(hit.min()), float(hit.max())] if hit.size else [],
+        "covered": hit.size / distance.size,
+    }
+
+
+def _webp(image: Array) -> bytes:
+    """Return linear (height, width, 4) pixels with associated alpha as a thumbnail."""
+    height, width = image.shape[:2]
+    scale = min(1.0, THUMBNAIL / max(width, height))
+    small = pictures.shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
+    exposure = pictures.exposure_for(small[..., :3])
+    # Behind what transparent views show is a middle grey.
+    grey = pictures.MIDDLE_GREY / 2**exposure
+    colour = small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1))
+    file = io.BytesIO()
+    Image.fromarray(pictures.develop(colour, exposure)).save(
+        file, "WEBP", quality=QUALITY, method=4
+    )
+    return file.getvalue()

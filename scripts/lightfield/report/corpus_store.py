@@ -1,0 +1,52 @@
+"""Brings a corpus' members from the storage, and sends there what Snakemake does not.
+
+Without a shared folder, members lie in the storage under their own paths.
+"""
+
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.dataset.corpus import SHARDS, THUMBNAILS, CorpusSettings
+from lightfield.dataset.family import RECORD
+from lightfield.dataset.lightfield import NAME
+from lightfield.dataset.member_record import read_member
+from lightfield.dataset.view_store import ViewStore
+from lightfield.report.corpus_looks import chosen_views
+from lightfield.validation.files import SUMS, read_sums
+
+
+def bring(folder: Path, settings: CorpusSettings, store: ViewStore) -> None:
+    """Bring each member's record and sums, and the views that the corpus reads.
+
+    Shards need all files of a dataset. Raises `UserError` for a file that the storage lacks.
+    """
+    for name in settings.members or ():
+        # The storage has the latest one.
+        _take(folder / name / RECORD, store)
+        for rig, entry in read_member(folder / name).datasets.items():
+            dataset = folder / name / rig
+            _bring(dataset / SUMS, entry.sha256sums, store)
+            sums = read_sums(dataset / SUMS)
+            _bring(dataset / NAME, sums[NAME], store)
+            files = [dataset / file for file in sums] if settings.shards else chosen_views(dataset)
+            for path in files:
+                _bring(path, sums[path.relative_to(dataset).as_posix()], store)
+
+
+def _bring(path: Path, digest: str, store: ViewStore) -> None:
+    """Bring a file, unless it is here with a SHA-256."""
+    if not path.is_file() or sha256(path) != digest:
+        _take(path, store)
+
+
+def _take(path: Path, store: ViewStore) -> None:
+    if not store.bring(str(path)):
+        raise UserError(f"{path}: is missing in the storage; build its member again")
+
+
+def send(folder: Path, store: ViewStore) -> None:
+    """Send the thumbnails and shards. Snakemake sends the other files."""
+    for pattern in (f"{THUMBNAILS}/*.webp", f"{SHARDS}/*/*.tar"):
+        for path in sorted(folder.glob(pattern)):
+            store.send(str(path))

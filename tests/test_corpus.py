@@ -1,0 +1,456 @@
+"""The corpus of a family: its split, its statistics, its page, its shards, and its sums."""
+
+import json
+import shutil
+import subprocess
+import tarfile
+from pathlib import Path
+
+import accessibility
+import families
+import pytest
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.dataset.corpus import CorpusSettings, Shares
+from lightfield.dataset.lightfield import LightField
+from lightfield.report import corpus
+from lightfield.validation.corpus_integrity import corpus_faults
+
+CAUSE = "models/broken.glb: is empty; must be a model"
+
+
+def make(folder, cache=None, **settings):
+    settings = CorpusSettings(family="chairs", **settings)
+    return corpus.write(folder, settings, cache or folder.parent / "looks.json")
+
+
+def files(folder):
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def members(tmp_path_factory):
+    """A family of six valid members and a broken one."""
+    family = tmp_path_factory.mktemp("members") / "chairs"
+    for number in range(6):
+        families.add_member(
+            family, f"{number:04d}", shade=1 + number, wood=("oak", "ash")[number % 2]
+        )
+    families.add_failure(family, "broken", CAUSE)
+    return family
+
+
+@pytest.fixture
+def family(members, tmp_path):
+    return shutil.copytree(members, tmp_path / "chairs")
+
+
+@pytest.fixture(scope="module")
+def built(members, tmp_path_factory):
+    """The same family with its corpus, and shards of few views each."""
+    folder = shutil.copytree(members, tmp_path_factory.mktemp("corpus") / "chairs")
+    make(folder, shards=True, shard_gigabytes=2e-5, splits={"validation": 0.3, "test": 0.3})
+    return folder
+
+
+# ---- members, split and statistics -----------------------------------------------------------
+
+
+def test_a_corpus_lists_its_members_with_what_they_are_made_from(built):
+    content = read_json(built / "corpus.json")
+    names = [member["name"] for member in content["members"]]
+    assert names == [*(f"{number:04d}" for number in range(6)), "broken"]
+    first = content["members"][0]
+    assert (first["seed"], first["values"]) == (0, {"shade": 1, "wood": "oak"})
+    assert first["datasets"]["plane"]["views"] == 3
+    assert content["members"][-1]["model"] == "models/broken.glb"
+
+
+def test_a_corpus_names_each_failure_with_its_cause(built):
+    (failure,) = read_json(built / "corpus.json")["failures"]
+    assert failure == {
+        "name": "broken",
+        "stage": "import_model",
+        "cause": CAUSE,
+        "log": "work/chairs/broken/log",
+    }
+
+
+def test_statistics_say_how_values_depths_and_brightness_are_distributed(built):
+    numbers = read_json(built / "corpus.json")["statistics"]
+    assert (numbers["members"], numbers["valid"], numbers["failed"]) == (7, 6, 1)
+    assert numbers["views"] == 18
+    datasets = [path for path in built.glob("*/plane/**/*") if path.is_file()]
+    assert numbers["bytes"] == sum(path.stat().st_size for path in datasets)
+    shade = numbers["values"]["shade"]
+    assert (shade["least"], shade["median"], shade["largest"]) == (1, 3.5, 6)
+    assert sum(shade["histogram"]) == 6
+    assert numbers["values"]["wood"]["counts"] == {"ash": 3, "oak": 3}
+    # The sphere of member n is 2 n metres away, and has the grey 0.2 n.
+    assert numbers["pictures"]["farthest_metres"]["largest"] == 12
+    assert numbers["pictures"]["nearest_metres"]["least"] == 2
+    assert numbers["pictures"]["brightness"]["mean"] == pytest.approx(0.7, rel=1e-3)
+    assert numbers["pictures"]["over_exposed"]["mean"] == pytest.approx(1 / 6, rel=1e-3)
+
+
+def test_the_shares_of_a_split_hold_over_many_members():
+    shares = Shares(validation=0.2, test=0.1)
+    parts = [shares.part_of(f"{number:05d}") for number in range(10_000)]
+    assert parts.count("test") == pytest.approx(1000, rel=0.1)
+    assert parts.count("validation") == pytest.approx(2000, rel=0.1)
+    assert parts.count("train") == pytest.approx(7000, rel=0.1)
+
+
+def test_new_members_leave_the_split_of_others_alone(family):
+    before = {each["name"]: each["split"] for each in make(family)["members"]}
+    for number in range(6, 12):
+        families.add_member(family, f"{number:04d}", shade=1, wood="oak")
+    after = {each["name"]: each["split"] for each in make(family)["members"]}
+    assert len(after) == 13
+    assert before == {name: after[name] for name in before}
+
+
+def test_the_split_is_the_same_on_every_machine():
+    """These parts must never change: who has trained on a member must not test with it."""
+    shares = Shares()
+    names = ("0000", "0004", "0005", "0008", "chair", "Stühle")
+    assert [shares.part_of(name) for name in names] == [
+        *("train", "test", "validation", "test"),
+        *("train", "test"),
+    ]
+
+
+def test_only_the_members_of_the_settings_count(family):
+    content = make(family, members=["0001", "broken"])
+    assert [member["name"] for member in content["members"]] == ["0001", "broken"]
+    assert [path.stem for path in (family / "thumbnails").iterdir()] == ["0001"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"state": "odd"}, "state"),
+        ({"datasets": {"plane": {"views": "3"}}}, "datasets.plane"),
+        ({"name": "0002"}, "name"),
+        ({"state": "failed"}, "failure"),
+    ],
+)
+def test_a_damaged_record_of_a_member_is_named(family, change, said):
+    path = family / "0001/member.json"
+    path.write_text(json.dumps(read_json(path) | change))
+    with pytest.raises(UserError) as caught:
+        make(family)
+    assert str(caught.value).startswith(f"{path}: {said}")
+    assert not (family / "sha256sums.txt").exists()
+
+
+def test_a_dataset_that_changed_after_its_record_is_refused(family):
+    with (family / "0003/plane/sha256sums.txt").open("a") as file:
+        file.write("\n")
+    with pytest.raises(UserError, match=r"0003/plane/sha256sums\.txt"):
+        make(family)
+    assert not (family / "sha256sums.txt").exists()
+
+
+def test_shares_above_one_are_refused():
+    with pytest.raises(ValueError, match="at most 1"):
+        Shares(validation=0.6, test=0.6)
+
+
+# ---- equal bytes -----------------------------------------------------------------------------
+
+
+def test_equal_members_give_equal_bytes(members, tmp_path):
+    results = []
+    for name in ("first", "second"):
+        folder = shutil.copytree(members, tmp_path / name / "chairs")
+        make(folder, shards=True)
+        # From the cache.
+        make(folder, shards=True)
+        results.append(files(folder))
+    assert results[0] == results[1]
+
+
+def test_a_damaged_thumbnail_or_cache_is_made_again(family):
+    make(family)
+    before = files(family)
+    (family / "thumbnails/0002.webp").write_bytes(b"damaged")
+    make(family)
+    assert files(family) == before
+    (family.parent / "looks.json").write_text("damaged")
+    make(family)
+    assert files(family) == before
+
+
+def test_a_cached_member_is_not_read_again(family):
+    make(family)
+    before = files(family)
+    view = next((family / "0000/plane/exr").iterdir())
+    content = view.read_bytes()
+    view.unlink()
+    make(family)
+    view.write_bytes(content)
+    assert files(family) == before
+
+
+def test_a_member_that_is_built_anew_looks_anew(family):
+    make(family)
+    shutil.rmtree(family / "0000")
+    families.add_member(family, "0000", shade=5, wood="oak")
+    content = make(family)
+    assert content["members"][0]["depth"] == [10, 10]
+
+
+# ---- shards ----------------------------------------------------------------------------------
+
+
+def samples(tar):
+    with tarfile.open(tar) as archive:
+        return {entry.name: archive.extractfile(entry).read() for entry in archive}
+
+
+def test_shards_have_every_view_in_the_part_of_its_member(built):
+    split = {each["name"]: each["split"] for each in read_json(built / "corpus.json")["members"]}
+    views = {}
+    for tar in sorted((built / "shards").glob("*/*.tar")):
+        # A tar is a multiple of 10,240 bytes, and one view needs about 5 kB.
+        assert tar.stat().st_size <= 2 * 10_240
+        content = samples(tar)
+        for name, text in content.items():
+            if not name.endswith(".json"):
+                continue
+            sample = json.loads(text)
+            assert sample["split"] == tar.parent.name == split[sample["member"]]
+            (picture,) = sample["pictures"].values()
+            path = built / sample["member"] / sample["rig"] / picture["path"]
+            assert content[name.replace(".json", ".views.exr")] == path.read_bytes()
+            views.setdefault(sample["member"], set()).add(sample["view"])
+    names = {view.name for view in LightField.read(built / "0000/plane/lightfield.json").views}
+    assert views == {f"{number:04d}": names for number in range(6)}
+
+
+def test_without_shards_there_are_none(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    make(folder)
+    assert not [*folder.glob("shards/*/*")]
+    assert not [*corpus_faults(folder)]
+
+
+def test_two_members_with_the_same_key_in_shards_are_named(family):
+    for name in ("a.b", "a_b"):
+        shutil.copytree(family / "0000", family / name)
+        path = family / name / "member.json"
+        path.write_text(json.dumps(read_json(path) | {"name": name}))
+    with pytest.raises(UserError, match="rename the member"):
+        make(family, shards=True, splits={"validation": 0, "test": 0})
+
+
+# ---- without a shared folder --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shards", [False, True])
+def test_members_in_a_storage_become_the_same_corpus(members, tmp_path, monkeypatch, shards):
+    names = sorted(path.parent.name for path in members.glob("*/member.json"))
+    expected = shutil.copytree(members, tmp_path / "shared/results/chairs")
+    make(expected, members=names, shards=shards)
+    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
+    folder = Path("results/chairs")
+    make(folder, members=names, shards=shards)
+    made = ("corpus.json", "index.html", "sha256sums.txt")
+    assert [(folder / name).read_bytes() for name in made] == [
+        (expected / name).read_bytes() for name in made
+    ]
+    # Snakemake stores the files that are outputs, and the program all others.
+    sent = {*files(expected)} - {*files(members)} - {*made}
+    assert sent <= files(stored).keys()
+
+
+def test_a_view_that_the_storage_lacks_is_named(members, tmp_path, monkeypatch):
+    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
+    (stored / "0003/plane/exr/view_0001f.exr").unlink()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
+    with pytest.raises(UserError, match=r"0003/plane/exr/view_0001f\.exr: is missing"):
+        make(Path("results/chairs"), members=["0003"])
+
+
+# ---- sums ------------------------------------------------------------------------------------
+
+
+def test_the_sums_hold_and_cover_everything(built):
+    result = subprocess.run(
+        ["sha256sum", "--check", "--quiet", "sha256sums.txt"], cwd=built, check=False
+    )
+    assert result.returncode == 0
+    listed = {line.split("  ")[1] for line in (built / "sha256sums.txt").read_text().splitlines()}
+    beneath = {
+        f"{path.parent.relative_to(built)}/{line.split('  ')[1]}"
+        for path in built.glob("*/*/sha256sums.txt")
+        for line in path.read_text().splitlines()
+    }
+    assert listed | beneath | {"sha256sums.txt"} == files(built).keys()
+    assert not [*corpus_faults(built)]
+
+
+DAMAGED = (
+    "corpus.json",
+    "index.html",
+    "thumbnails/0001.webp",
+    "0001/member.json",
+    "broken/member.json",
+    "0001/plane/sha256sums.txt",
+    "0001/plane/lightfield.json",
+    "0001/plane/exr/view_0000f.exr",
+)
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+@pytest.mark.parametrize("fault", ["flip", "delete", "empty"])
+def test_every_damaged_file_of_a_corpus_is_found(built, tmp_path, name, fault):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    path = folder / name
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.unlink()
+    if fault != "delete":
+        path.write_bytes(content if fault == "flip" else b"")
+    assert {each.path.resolve() for each in corpus_faults(folder)} == {path}
+
+
+def test_a_damaged_shard_and_a_foreign_one_are_found(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    first = sorted(folder.glob("shards/*/*.tar"))[0]
+    first.write_bytes(first.read_bytes()[:-1])
+    foreign = first.with_name("foreign.tar")
+    foreign.write_bytes(b"foreign")
+    assert {each.path for each in corpus_faults(folder)} == {first, foreign}
+
+
+def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    sums = folder / "sha256sums.txt"
+    lines = sums.read_text().splitlines(keepends=True)
+    sums.write_text("".join(line for line in lines if "0002/plane" not in line))
+    (fault,) = corpus_faults(folder)
+    assert fault.path == folder / "0002/plane/sha256sums.txt"
+    sums.unlink()
+    (fault,) = corpus_faults(folder)
+    assert fault.path == sums
+
+
+def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    assert "no fault" in run_program("verify.py", folder).stdout
+    view = next((folder / "0004/plane/exr").iterdir())
+    view.write_bytes(view.read_bytes()[:-1])
+    result = run_program("verify.py", folder, check=False)
+    assert (result.returncode, view.name in result.stdout) == (1, True)
+    assert result.stderr.splitlines()[-1].startswith("error: 1 faults")
+
+
+@pytest.mark.parametrize(
+    ("name", "renewed"),
+    [
+        ("0001/plane/exr/view_0000f.exr", {"0001/plane/sha256sums.txt"}),
+        ("0002/plane/sha256sums.txt", set()),
+        ("0003/member.json", set()),
+        ("thumbnails/0001.webp", set()),
+        ("corpus.json", set()),
+    ],
+)
+def test_mending_sets_aside_what_the_next_run_must_make_again(
+    built, tmp_path, monkeypatch, run_program, name, renewed
+):
+    monkeypatch.chdir(tmp_path)
+    folder = shutil.copytree(built, tmp_path / "results/chairs")
+    before = files(folder)
+    (folder / name).write_bytes(b"damaged")
+    arguments = ("results/chairs", "--work", "work", "--mend")
+    result = run_program("verify.py", *arguments, check=False, cwd=tmp_path)
+    assert result.returncode == 1
+    assert "the next run makes them again" in result.stderr
+    removed = {name, "sha256sums.txt"} | renewed
+    assert before.keys() - files(folder).keys() == removed
+    assert files(tmp_path / "work/removed/results/chairs").keys() == removed
+
+
+# ---- the page --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_the_page_of_a_corpus_can_be_filtered(built, show, width):
+    tab = show(built / "index.html", width)
+    assert accessibility.faults(tab) == []
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width
+    names = tab.locator("#cards li:visible h3")
+    assert names.count() == 7
+    loaded = "[...document.images].every((image) => image.complete && image.naturalWidth)"
+    tab.locator("#cards li").last.scroll_into_view_if_needed()
+    tab.wait_for_function(loaded)
+
+    def shown():
+        return names.all_inner_texts()
+
+    tab.get_by_label("State").select_option("failed")
+    assert shown() == ["broken"]
+    tab.get_by_label("State").select_option("all")
+    tab.get_by_role("combobox", name="wood").select_option("oak")
+    assert shown() == ["0000", "0002", "0004"]
+    tab.get_by_label("shade from").fill("2")
+    tab.get_by_label("shade to").fill("4")
+    assert shown() == ["0002"]
+    assert tab.inner_text("#count") == "1 of 7 match"
+    tab.get_by_label("Search").fill("nothing")
+    assert shown() == []
+    assert CAUSE in tab.inner_text("#failures")
+
+
+def test_a_page_of_many_members_shows_a_part_and_more_on_demand(tmp_path, show):
+    family = tmp_path / "chairs"
+    for number in range(200):
+        families.add_failure(family, f"{number:04d}", CAUSE)
+    make(family)
+    tab = show(family / "index.html")
+    cards = tab.locator("#cards li")
+    assert cards.count() < 200
+    count = cards.count()
+    tab.get_by_role("button", name="Show more").press("Enter")
+    assert cards.count() == 200
+    # The keyboard goes on with the first new member.
+    assert tab.evaluate("document.activeElement.innerText").startswith(f"{count:04d}")
+    assert not tab.get_by_role("button", name="Show more").is_visible()
+
+
+def test_text_of_a_model_cannot_become_a_part_of_the_page(tmp_path, show):
+    family = tmp_path / "chairs"
+    families.add_failure(family, "a", "</script><img src=x onerror=alert(1)><b>")
+    path = family / "a/member.json"
+    path.write_text(json.dumps(read_json(path) | {"model": "</script><img src=x>"}))
+    make(family)
+    tab = show(family / "index.html")
+    assert tab.locator("img").count() == 0
+    assert "</script><img src=x>" in tab.inner_text("#cards")
+
+
+def test_the_index_of_datasets_leads_to_a_corpus(built, run_program, show, tmp_path):
+    results = tmp_path / "results"
+    shutil.copytree(built, results / "chairs")
+    report = results / "chairs/0000/plane/report"
+    report.mkdir()
+    (report / "index.html").write_text("")
+    output = results / "index.html"
+    run_program("report_index.py", "--results", results, "--output", output)
+    tab = show(output)
+    # The members do not crowd out the datasets.
+    assert tab.locator(".cards h2").all_inner_texts() == ["chairs"]
+    assert accessibility.faults(tab) == []
+    tab.get_by_role("link").click()
+    assert tab.inner_text("h1") == "chairs"

@@ -1,0 +1,334 @@
+"""Families: names, values and batches of their members, and what a run makes of failures."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from checkouts import checkout, snakemake
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.config import check_member
+from lightfield.dataset.family import Family, drawn, member_content, outdated_members
+from lightfield.family.batch import deadly_member, member_at_hand
+
+ROOT = Path(__file__).parents[1]
+CAMERA = "{lens: equidistant, fov: 180, resolution: [64, 64]}"
+ROOMS = f"""
+scene: {{builder: room}}
+render: {{samples: 1}}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    size: 0.5
+    center: [0, 0, 1.2]
+    camera: {CAMERA}
+    split: odd
+reprojections:
+  perspective:
+    camera: {{lens: rectilinear, fov: 60, resolution: [16, 16]}}
+    format: png
+exports:
+  instant_ngp: {{sources: [perspective]}}
+  nerf_synthetic: {{sources: [perspective]}}
+family:
+  seeds: 0-3
+  values:
+    rigs.LFPlane.size: {{uniform: [0.25, 0.5]}}
+"""
+
+
+def family(**keys):
+    return Family(**keys)
+
+
+def by_name(members):
+    return {member.name: member for member in members}
+
+
+def test_a_member_is_named_by_its_seed_and_the_same_in_larger_families():
+    values = {"render.samples": {"integers": [1, 1000]}}
+    small = family(seeds="5-7", values=values)
+    large = family(seeds="0-12345", values=values | {"scene.frame": {"integers": [1, 9]}})
+    assert [member.name for member in small.members()] == ["0005", "0006", "0007"]
+    for name, member in by_name(small.members()).items():
+        other = by_name(large.members())[name]
+        key = "render.samples"
+        assert drawn(small.values, member)[key] == drawn(large.values, other)[key]
+
+
+def test_drawn_values_are_equal_on_every_machine():
+    draws = family(
+        seeds="0-1",
+        values={
+            "a.uniform": {"uniform": [0.5, 1]},
+            "a.logarithm": {"log_uniform": [0.01, 100]},
+            "a.number": {"integers": [1, 6]},
+            "a.word": {"choice": ["city", "forest"]},
+        },
+    )
+    # As the first machine drew them.
+    assert [drawn(draws.values, member) for member in draws.members()] == [
+        {"a.uniform": 0.888407, "a.logarithm": 0.307865, "a.number": 2, "a.word": "forest"},
+        {"a.uniform": 0.813658, "a.logarithm": 0.0278231, "a.number": 3, "a.word": "city"},
+    ]
+
+
+def test_draws_fill_their_ranges():
+    draws = family(
+        seeds="0-1999",
+        values={
+            "a.uniform": {"uniform": [-1, 3]},
+            "a.logarithm": {"log_uniform": [0.01, 100]},
+            "a.number": {"integers": [1, 6]},
+            "a.word": {"choice": ["city", "forest", None]},
+        },
+    )
+    rows = [drawn(draws.values, member) for member in draws.members()]
+    uniform = [row["a.uniform"] for row in rows]
+    assert min(uniform) >= -1 and max(uniform) <= 3
+    assert abs(sum(uniform) / len(rows) - 1) < 0.1
+    assert sum(row["a.logarithm"] < 1 for row in rows) == pytest.approx(1000, abs=100)
+    for number in range(1, 7):
+        assert sum(row["a.number"] == number for row in rows) > 250
+    for word in ("city", "forest", None):
+        assert sum(row["a.word"] == word for row in rows) > 550
+
+
+def test_models_get_names_that_stay_theirs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path in ("models/chair.glb", "models/b/chair.glb", "models/b_chair.glb", "models/x y.obj"):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        Path(path).touch()
+    Path("models/notes.txt").touch()
+    models = family(models="models/**/*")
+    before = {member.model: member.name for member in models.members()}
+    assert before["models/chair.glb"] == "chair_glb"
+    assert before["models/b_chair.glb"] == "b_chair_glb"
+    assert before.keys().isdisjoint({"models/notes.txt"})
+    assert len({*before.values()}) == 4
+    Path("models/b-chair.glb").touch()
+    after = {member.model: member.name for member in models.members()}
+    assert before.items() <= after.items()
+    assert len({*after.values()}) == 5
+
+
+def test_a_family_without_models_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=r"family\.models: is 'models/\*\.glb'"):
+        family(models="models/*.glb").members()
+
+
+def test_a_new_seed_changes_one_batch_and_a_new_model_too(tmp_path, monkeypatch):
+    before = family(seeds="3-99", batch=10).batches()
+    after = family(seeds="3-100", batch=10).batches()
+    assert [member.seed for member in before["seeds_0010_0019"]] == [*range(10, 20)]
+    assert {name for name, members in after.items() if before.get(name) != members} == {
+        "seeds_0100_0109"
+    }
+    monkeypatch.chdir(tmp_path)
+    for number in range(50):
+        Path(f"model{number}.obj").touch()
+    before = family(models="*.obj", batch=16).batches()
+    Path("new.obj").touch()
+    after = family(models="*.obj", batch=16).batches()
+    assert sum(len(members) for members in after.values()) == 51
+    assert sum(before[name] != members for name, members in after.items()) == 1
+
+
+def test_a_member_gets_its_seed_and_values_and_the_familys_yaml_stays_as_it_is():
+    content = {"scene": {"builder": "room"}, "render": {"samples": 4}, "family": {"seeds": "0-9"}}
+    before = json.dumps(content)
+    member = family(seeds="7-7").members()[0]
+    values = {"render.samples": 2, "rigs.LF.camera.fov": 60}
+    made = member_content(content, member, values)
+    assert made["scene"] == {"builder": "room", "parameters": {"seed": 7}}
+    assert made["render"]["samples"] == 2
+    assert made["rigs"]["LF"]["camera"]["fov"] == 60
+    assert "family" not in made
+    assert json.dumps(content) == before
+
+
+def test_a_wrong_value_of_a_member_names_the_member_and_the_key():
+    content = {"scene": {"builder": "room"}, "render": {"samples": 0}}
+    with pytest.raises(UserError, match=r"^rooms\.yaml: member 0007: render\.samples: is 0"):
+        check_member(content, "rooms.yaml: member 0007")
+
+
+def record_of(folder, sources):
+    member = folder / "results/0000"
+    (member / "LF").mkdir(parents=True)
+    (member / "member.json").touch()
+    (member / "LF/sha256sums.txt").touch()
+    failed = folder / "results/0001"
+    failed.mkdir()
+    (failed / "member.json").touch()
+    members = {
+        "0000": {"state": "valid", "datasets": {"LF": "0" * 64}},
+        "0001": {"state": "failed"},
+    }
+    path = folder / "record.json"
+    path.write_text(json.dumps({"members": members, "sources": sources}))
+    return path
+
+
+@pytest.mark.parametrize("name", ["0000/member.json", "0000/LF/sha256sums.txt", "0001/member.json"])
+def test_a_missing_file_of_a_member_makes_its_batch_outdated(tmp_path, name):
+    record = record_of(tmp_path, {})
+    assert not outdated_members(record, tmp_path / "results")
+    (tmp_path / "results" / name).unlink()
+    assert outdated_members(record, tmp_path / "results")
+
+
+def test_a_changed_or_added_model_file_makes_its_batch_outdated(tmp_path):
+    model = tmp_path / "model.obj"
+    model.write_text("v 0 0 0")
+    status = model.stat()
+    texture = tmp_path / "texture.png"
+    sources = {str(model): [status.st_size, status.st_mtime_ns], str(texture): None}
+    record = record_of(tmp_path, sources)
+    assert not outdated_members(record, tmp_path / "results")
+    texture.touch()
+    assert outdated_members(record, tmp_path / "results")
+    texture.unlink()
+    os.utime(model, ns=(0, 0))
+    assert outdated_members(record, tmp_path / "results")
+
+
+def test_a_damaged_record_is_outdated(tmp_path):
+    record = record_of(tmp_path, {})
+    record.write_text("{")
+    assert outdated_members(record, tmp_path / "results")
+
+
+DIED = [{"started": 1}, {"member": "0001", "began": 2}, {"member": "0001", "finished": 3}]
+DIED += [{"member": "0002", "began": 3}]
+
+
+def test_the_journal_says_at_which_member_a_run_died():
+    assert member_at_hand(DIED) == "0002"
+    assert member_at_hand(DIED[:3]) is None
+    assert member_at_hand([*DIED, {"failed": "0002"}]) is None
+
+
+def test_a_member_has_failed_when_three_runs_died_at_it_and_not_before():
+    again = [{"started": 5}, {"member": "0002", "began": 6}]
+    assert deadly_member(DIED) is None
+    assert deadly_member([*DIED, *again]) is None
+    assert deadly_member([*DIED, *again, *again]) == "0002"
+    elsewhere = [{"started": 5}, {"member": "0003", "began": 6}]
+    assert deadly_member([*DIED, *again, *elsewhere]) is None
+    # Another worker of the same run went on.
+    assert deadly_member([*DIED, {"failed": "0002"}, *again, *again]) is None
+
+
+def count(folder, *states):
+    members = {
+        f"{number:04d}": {"state": state, "failure": {"stage": "render", "cause": "too dark"}}
+        for number, state in enumerate(states)
+    }
+    (folder / "record.json").write_text(json.dumps({"members": members}))
+    settings = {"family": "rooms", "records": [str(folder / "record.json")]}
+    (folder / "settings.json").write_text(json.dumps(settings))
+    paths = {name: str(folder / name) for name in ("settings.json", "failed.txt", "members.json")}
+    command = [sys.executable, str(ROOT / "scripts/count_members.py")]
+    command += ["--settings", paths["settings.json"], "--failed", paths["failed.txt"]]
+    return subprocess.run(
+        [*command, "--output", paths["members.json"]], capture_output=True, text=True, check=False
+    )
+
+
+def test_failed_members_are_counted_and_listed(tmp_path):
+    done = count(tmp_path, "valid", "failed", "valid", "failed")
+    assert done.returncode == 1
+    assert "2 of 4 members of rooms built, 2 failed:" in done.stderr
+    assert done.stderr.count("\n") == 1
+    rows = (tmp_path / "failed.txt").read_text().splitlines()
+    assert rows == ["0001: render: too dark", "0003: render: too dark"]
+    assert not (tmp_path / "members.json").exists()
+    done = count(tmp_path, "valid", "valid")
+    assert done.returncode == 0
+    assert "2 of 2 members of rooms built" in done.stdout
+    assert not (tmp_path / "failed.txt").exists()
+    assert (tmp_path / "members.json").exists()
+
+
+# A builder that raises an error for seed 1, and crashes its process for seed 2.
+BROKEN = """
+
+built = build
+
+
+def build(parameters):
+    import os, signal
+    if parameters["seed"] == 1:
+        raise ValueError("no walls")
+    if parameters["seed"] == 2:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    built(parameters)
+"""
+
+
+@pytest.mark.slow
+def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
+    folder = checkout(tmp_path / "plenoforge", rooms=ROOMS)
+    builder = folder / "scripts/scenes/room/__init__.py"
+    sound_text = builder.read_text()
+    builder.write_text(sound_text + BROKEN)
+    choice = ("--config", "scenes=[rooms]", "rigs=all", "preset=full")
+
+    run = snakemake(folder, *choice)
+    assert run.returncode == 1
+    assert "2 of 4 members of rooms built, 2 failed: results/rooms/failed.txt" in run.stderr
+    failed = (folder / "results/rooms/failed.txt").read_text().splitlines()
+    assert failed[0] == "0001: build_scene: ValueError: no walls"
+    assert failed[1].startswith("0002: build_scene: killed by SIGSEGV")
+    members = folder / "results/rooms"
+    assert sorted(path.name for path in (members / "0001").iterdir()) == ["member.json"]
+    assert "Traceback" in (folder / "work/rooms/0001/member.log").read_text()
+    assert "Traceback" not in run.stderr
+    record = json.loads((members / "0003/member.json").read_text())
+    assert record["seed"] == 3
+    assert record["state"] == "valid"
+    assert 0.25 <= record["values"]["rigs.LFPlane.size"] <= 0.5
+    dataset = members / "0003/LFPlane"
+    for name in ("exr/view_0000f.exr", "perspective/view_0000f.png", "perspective/transforms.json"):
+        assert (dataset / name).is_file()
+    check = subprocess.run(
+        ["sha256sum", "-c", "--quiet", "sha256sums.txt"], cwd=dataset, check=False
+    )
+    assert check.returncode == 0
+
+    # Nothing is built again, and the failures are named again.
+    journal = folder / "work/rooms/batches/seeds_0000_0031.journal.jsonl"
+    before = journal.read_text()
+    run = snakemake(folder, *choice)
+    assert run.returncode == 1
+    assert "2 of 4 members of rooms built" in run.stderr
+    assert journal.read_text() == before
+
+    # A sound builder makes all members. Their views are kept where the scene is the same.
+    builder.write_text(sound_text)
+    run = snakemake(folder, *choice)
+    assert run.returncode == 0, run.stderr
+    assert "4 of 4 members of rooms built" in run.stderr
+    assert not (members / "failed.txt").exists()
+
+    # A new member leaves the others alone, and a damaged file is made again.
+    scene = folder / "configs/scenes/rooms.yaml"
+    scene.write_text(ROOMS.replace("0-3", "0-4"))
+    times = {name: (members / name / "member.json").stat().st_mtime_ns for name in ("0000", "0003")}
+    view = members / "0001/LFPlane/exr/view_0000f.exr"
+    content = view.read_bytes()
+    view.write_bytes(content[:-1])
+    verify = [sys.executable, ROOT / "scripts/verify.py", "results/rooms"]
+    found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
+    assert found.returncode == 1
+    assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in found.stdout
+    run = snakemake(folder, *choice)
+    assert "5 of 5 members of rooms built" in run.stderr
+    assert times == {name: (members / name / "member.json").stat().st_mtime_ns for name in times}
+    assert view.read_bytes() == content
