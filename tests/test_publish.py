@@ -101,6 +101,22 @@ def test_each_part_of_the_split_has_shards_of_its_own(folder, output):
         assert keys == {view.name for view in lightfield.views if view.split == split}
 
 
+def test_views_for_validation_have_shards_of_their_own(tmp_path):
+    rig = RIG | {"split": {"validation": ["view_0001f"], "test": ["view_0002f", "view_0003f"]}}
+    write_views(tmp_path / "dataset", CAMERA, rig)
+    path = tmp_path / "dataset/lightfield.json"
+    LightField.read(path).changed(scene={"name": "smoke"}).write(path)
+    files = [path for path in (tmp_path / "dataset").rglob("*") if path.is_file()]
+    lines = [f"{sha256(path)}  {path.relative_to(tmp_path / 'dataset')}\n" for path in files]
+    (tmp_path / "dataset/sha256sums.txt").write_text("".join(lines))
+    output = published(tmp_path / "dataset", tmp_path / NAME)
+    counts = {"train": 3, "validation": 1, "test": 2}
+    for split, count in counts.items():
+        keys = {name.split(".")[0] for name in members(output / f"{NAME}-{split}-00000.tar")}
+        assert len(keys) == count
+    assert len([*output.glob(f"{NAME}-*.tar")]) == 3
+
+
 def test_a_sample_says_the_pose_and_the_bytes_of_each_picture(folder, output):
     content = members(output / f"{NAME}-train-00000.tar")
     view = next(name for name in content if name.endswith(".json")).removesuffix(".json")

@@ -19,6 +19,7 @@ from lightfield.core.files import atomic_path, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.names import VIEWS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report.package import add_entry, tar_size
 from lightfield.validation.files import (
     SUMS,
@@ -34,8 +35,6 @@ from lightfield.validation.files import (
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
-# The names of the parts of a split, as repositories of datasets have them.
-SPLIT_NAMES = {None: "train", "train": "train", "validate": "validation", "test": "test"}
 OTHER_FILES = "other_files"
 INDEX = "views.csv"
 
@@ -103,7 +102,8 @@ def _sample(source: ImageSet, number: int, prefix: str) -> Sample:
     view = source.lightfield.views[number]
     # A dot would end the key.
     key = "_".join(filter(None, [prefix, view.name])).replace(".", "_")
-    split = SPLIT_NAMES[view.split]
+    # Without a split, all views may train.
+    split = view.split or "train"
     content = {"view": view.name, "split": split, "pictures": {}}
     return Sample(key, split, content)
 
@@ -159,7 +159,7 @@ def write_shards(
     progress = Progress(len(samples), name, "views")
     shards: dict[str, list[Path]] = {}
     rows = []
-    for split in dict.fromkeys(SPLIT_NAMES.values()):
+    for split in PARTS:
         of_split = [sample for sample in samples if sample.split == split]
         for number, part in enumerate(_parts(of_split, most)):
             # mlcroissant takes tars with equal names for one, even of different datasets.
