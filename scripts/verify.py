@@ -1,10 +1,12 @@
 """Check every byte of datasets against the checksums of their files.
 
 Prints a line for each damaged file, with what is wrong. The exit status is then 1. For a copy of a
-dataset, DATASET is enough. --work also checks the files that the dataset was made from.
+dataset, DATASET is enough. The folder of a sequence stands for all its frames and their exports.
+--work also checks the files that the dataset was made from.
 """
 
 import argparse
+import os
 from pathlib import Path
 
 from lightfield.core.cli import run
@@ -28,10 +30,13 @@ def main() -> None:
     if arguments.mend and not arguments.work:
         raise UserError("--mend: needs --work: a dataset can only be mended where it is built")
 
-    problems: dict[Path, str] = {}
+    folders: list[Path] = []
     for folder in arguments.dataset:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
+        folders += [*Integrity(folder).frames, folder]
+    problems: dict[Path, str] = {}
+    for folder in dict.fromkeys(map(Path, map(os.path.relpath, folders))):
         integrity = Integrity(folder, arguments.work)
         # All datasets of a scene share its files. Name them once.
         faults = [fault for fault in integrity.faults() if fault.path not in problems]

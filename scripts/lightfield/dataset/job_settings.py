@@ -140,6 +140,19 @@ class ValidationSettings(Settings):
     records: list[str] = Field([], description="Sizes and checksums of the images as written.")
 
 
+class SequenceValidationSettings(Settings):
+    """The settings of scripts/validate_sequence.py. Paths are those of the working folder."""
+
+    frames: list[str] | None = Field(
+        None, description="Folders of the sequence's frames in the rig's folder. Without it, all."
+    )
+    exports: list[str] | None = Field(
+        None,
+        description="The export.json of each export that the sequence shall have. Without this key "
+        "it may have any.",
+    )
+
+
 class PackSettings(Settings):
     """The settings of scripts/package.py and scripts/publish.py."""
 

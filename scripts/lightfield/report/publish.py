@@ -38,7 +38,7 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
         name,
         scene,
         card,
-        LightField.read(folders[0] / NAME),
+        LightField.read(next(each for each in folders if (each / NAME).is_file()) / NAME),
         {split: package.listed(paths) for split, paths in written.items()},
         package.listed([output / shards.INDEX, rest]),
         ("json", *sorted(names)),

@@ -63,7 +63,7 @@ class Sample:
 class Dataset:
     """A finished dataset, or a frame of a sequence: its samples, and its files without a view.
 
-    The ``others`` have their paths in the package.
+    The ``others`` have their paths in the package. The exports of a whole sequence have no samples.
     """
 
     samples: Sequence[Sample]
@@ -78,6 +78,8 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
     if not (folder / SUMS).is_file():
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
     sums = read_sums(folder / SUMS)
+    if folder == root and NAME not in sums:
+        return Dataset([], _others(root, folder, [*sums, SUMS]))
     reprojections = sorted(Path(name).parent.name for name in sums if name.endswith(f"/{NAME}"))
     sets, checks = read_sets(folder, [name for name in reprojections if f"{name}/{NAME}" in sums])
     for check in checks:
@@ -90,12 +92,13 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
     for file in [*of_views(folder, sets)[0], *of_passes(folder, sets)[0]]:
         _add_file(samples, source, sets[file.set], file, folder, sums)
     taken = {path for sample in samples for path in sample.files.values()}
-    others = {
-        (folder / name).relative_to(root).as_posix(): folder / name
-        for name in (*sums, SUMS)
-        if folder / name not in taken
-    }
-    return Dataset(samples, others)
+    others = [name for name in (*sums, SUMS) if folder / name not in taken]
+    return Dataset(samples, _others(root, folder, others))
+
+
+def _others(root: Path, folder: Path, names: Iterable[str]) -> dict[str, Path]:
+    """Return files of a ``folder`` by their paths in the package's ``root``."""
+    return {(folder / name).relative_to(root).as_posix(): folder / name for name in names}
 
 
 def _sample(source: ImageSet, number: int, prefix: str) -> Sample:

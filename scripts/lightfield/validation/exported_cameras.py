@@ -67,7 +67,7 @@ class Expected:
         """
         if any(view.split != "train" for view in self.image_set.lightfield.views):
             return {}
-        views = {}
+        views: dict[str, View] = {}
         for rig, folder in self.other_rigs.items():
             rig_views = _views(folder / self.image_set.name / NAME)
             if all(view.split in ("validation", "test") for view in rig_views):
