@@ -254,7 +254,7 @@ REFUSED = [
             {"sources": ["perspective"]},
             f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
         )
-        for name in ("dnerf", "colmap_frames")
+        for name in ("dnerf", "colmap_frames", "multipleview")
     ),
     ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
     ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),

@@ -21,7 +21,7 @@ from lightfield.validation.readers.mp4 import read_mp4
 from lightfield.validation.sequence import export_lists, frame_folders, validate_sequence
 
 sequence = test_sequence_exports.sequence
-KINDS = ("dnerf", "neural_3d_video", "colmap_frames")
+KINDS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview")
 POINTS = {"points": 200}
 
 
@@ -145,6 +145,23 @@ def points_of_another_frame(rig):
         shutil.copy(rig / "colmap_frames/colmap_0" / file, rig / "colmap_frames/colmap_1" / file)
 
 
+def swapped_cameras(rig):
+    first, second = (rig / f"multipleview/sparse_/{name}.bin" for name in ("images", "old"))
+    content = first.read_bytes()
+    first.rename(second)
+    changed = content.replace(b"image1.png", b"imageX.png").replace(b"image2.png", b"image1.png")
+    first.write_bytes(changed.replace(b"imageX.png", b"image2.png"))
+    second.unlink()
+
+
+def missing_frame(rig):
+    (rig / "multipleview/cam02/frame_00003.jpg").unlink()
+
+
+def small_frame(rig):
+    images.write_jpeg(rig / "multipleview/cam02/frame_00003.jpg", np.zeros((8, 8, 3), np.uint8))
+
+
 def missing_image(rig):
     (rig / "colmap_frames/colmap_2/images/cam01.png").unlink()
 
@@ -161,6 +178,9 @@ def missing_image(rig):
         (long_focus, "poses_bounds.npy: row 0", "its camera has rays up to"),
         (short_video, "cam02.mp4: pictures", "is 1; must be 3"),
         (points_of_another_frame, "colmap_1/sparse/0/points3D.bin", "is not a point of a view's"),
+        (swapped_cameras, "multipleview/sparse_/images.bin: image 1 (image2)", "its position"),
+        (missing_frame, "multipleview/cam02", "must have frame_00001.jpg to frame_00003.jpg"),
+        (small_frame, "multipleview/cam02/frame_00003.jpg", "size of its view"),
         (missing_image, "colmap_2", "cam01.png is not a file"),
     ],
 )

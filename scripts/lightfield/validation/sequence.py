@@ -209,8 +209,8 @@ def _picture_faults(rig: Path, listed: ListedFiles, lens: Lens) -> Iterator[str]
 def _camera_faults(name: str, frame: Frame, exported: Exported) -> Iterator[str]:
     """Yield how an export's frame differs from the frame's lightfield.json."""
     expected = Expected(frame.folder, frame.views)
-    if name in NUMBERED:
-        views = _numbered(expected, exported)
+    if name in NUMBERED or name == "multipleview":
+        views = _numbered(expected, exported) if name in NUMBERED else _training(expected)
         lightfield = frame.views.lightfield.changed(views=views)
         expected = Expected(frame.folder, replace(frame.views, lightfield=lightfield))
     yield from exported.faults
@@ -241,6 +241,13 @@ def _numbered(expected: Expected, exported: Exported) -> list[View]:
         replace(view, name=f"cam{number:0{digits}d}", others={**view.others, "split": part})
         for number, (view, part) in enumerate(chosen)
     ]
+
+
+def _training(expected: Expected) -> list[View]:
+    """Return the views that train, with the names image1, image2 and so on."""
+    views = sorted(expected.image_set.lightfield.views, key=lambda view: view.name)
+    trains = [view for view in views if view.split in (None, "train")]
+    return [replace(view, name=f"image{number}") for number, view in enumerate(trains, 1)]
 
 
 # ---- depth -----------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ from lightfield.validation.readers import (
     lichtfeld,
     mesh,
     miv,
+    multipleview,
     ncore,
     nerf_synthetic,
     nerfstudio,
@@ -63,6 +64,7 @@ READERS = {
 SEQUENCE_READERS = {
     "colmap_frames": colmap_frames.read,
     "dnerf": dnerf.read,
+    "multipleview": multipleview.read,
     "neural_3d_video": neural_3d_video.read,
     "scene_flow": scene_flow.read,
 }

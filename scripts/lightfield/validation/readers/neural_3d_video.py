@@ -16,6 +16,7 @@ from lightfield.validation.readers.contents import (
     Exported,
     ExportedCamera,
     ExportedView,
+    Floats,
     Part,
     numbers,
 )
@@ -35,14 +36,10 @@ def read(
         rows = numbers(np.load(path), (len(videos), 17))
     for index, (row, video) in enumerate(zip(rows, videos, strict=True)):
         place = f"row {index}"
-        poses = row[:15].reshape(3, 5)
-        height, width, focal = poses[:, 4]
+        height, width, focal = row[4:15:5]
         camera = Pinhole(int(width), int(height), focal, focal, width / 2, height / 2)
         exported.cameras.append(ExportedCamera(f"{path}: {place}", camera))
-        # LLFF's columns are down, right and backwards.
-        matrix = np.eye(4)
-        matrix[:3] = np.stack([poses[:, 1], -poses[:, 0], poses[:, 2], poses[:, 3]], axis=-1)
-        exported.views.append(ExportedView(path, place, video.stem, matrix))
+        exported.views.append(ExportedView(path, place, video.stem, llff_matrix(row)))
         near, far = row[15:]
         exported.expect(f"{path}: {place}: 0 < near < far", bool(0 < near < far), True)
         facts = read_mp4(video)
@@ -59,3 +56,11 @@ def read(
         Exported(views=exported.views, cameras=exported.cameras) for _ in range(len(frames) - 1)
     ]
     return [exported, *later]
+
+
+def llff_matrix(row: Floats) -> Floats:
+    """Return the camera-to-world matrix (4, 4) of a row, whose columns are down, right, back."""
+    down, right, back, position, _ = row[:15].reshape(3, 5).T
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([right, -down, back, position], axis=-1)
+    return matrix
