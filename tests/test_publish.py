@@ -203,6 +203,32 @@ def test_the_ro_crate_says_how_its_files_were_made(output):
     assert {part["@id"] for part in action["result"]} == parts
 
 
+def test_organizations_are_entities_with_their_ror(folder, tmp_path):
+    creator = {"name": "Ada Lovelace", "affiliation": "University of London", "ror": "04cw6st05"}
+    facts = {
+        "creators": [creator, {"name": "A Laboratory", "type": "organization"}],
+        "publisher_url": "https://zenodo.org",
+        "contact": "ada@example.org",
+        "doi": "10.5281/zenodo.1234",
+    }
+    output = published(folder, tmp_path / NAME, publish=PUBLISH | facts)
+    graph = read_json(output / "ro-crate-metadata.json")["@graph"]
+    entities = {entity["@id"]: entity for entity in graph}
+    assert len(entities) == len(graph)
+    root = entities["./"]
+    (ada, laboratory) = (entities[creator["@id"]] for creator in root["creator"])
+    assert ada["affiliation"] == {"@id": "https://ror.org/04cw6st05"}
+    assert entities["https://ror.org/04cw6st05"]["name"] == "University of London"
+    assert entities[ada["contactPoint"]["@id"]]["email"] == "ada@example.org"
+    assert laboratory["@type"] == "Organization"
+    assert entities[root["publisher"]["@id"]]["url"] == "https://zenodo.org"
+    assert entities[root["publisher"]["@id"]]["name"] == "Zenodo"
+    assert entities[root["identifier"]["@id"]]["value"] == "doi:10.5281/zenodo.1234"
+    datacite = read_json(output / "datacite.json")
+    (affiliation,) = datacite["creators"][0]["affiliation"]
+    assert affiliation["affiliationIdentifier"] == "https://ror.org/04cw6st05"
+
+
 def test_datacite_has_all_that_a_doi_needs(folder, tmp_path):
     reserved = {"publish": PUBLISH | {"doi": "10.5281/zenodo.1234", "title": "A Room"}}
     content = read_json(published(folder, tmp_path / NAME, **reserved) / "datacite.json")

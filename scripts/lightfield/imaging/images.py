@@ -91,7 +91,7 @@ class Header:
     chromaticities: Chromaticities | None = None
 
 
-# Of 100. Values are off by a level or two.
+# Of 100. Most values are off by a level at most.
 JPEG_QUALITY = 98
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
