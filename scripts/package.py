@@ -29,13 +29,19 @@ def main() -> None:
 
     # Only now, so that --help need not wait for these.
     from lightfield.dataset.job_settings import PackSettings
+    from lightfield.dataset.view_store import ViewStore
     from lightfield.report import package
 
     settings = PackSettings.given(arguments.settings, arguments.scene, arguments.gigabytes)
     card = package.card(arguments.folder, arguments.output.stem, settings.scene)
     written = package.pack(arguments.folder, card, arguments.output, settings.most_bytes)
     parts = package.listed(written)
-    write_json(arguments.output.with_suffix(".json"), {**card, "parts": parts})
+    card_path = arguments.output.with_suffix(".json")
+    write_json(card_path, {**card, "parts": parts})
+    store = ViewStore.configured()
+    if store:
+        # The job declares the first part alone.
+        store.put_list(card_path, written[1:])
     print(f"{arguments.output}: {len(parts)} parts, {sum(p['bytes'] for p in parts) / 1e9:.3g} GB")
 
 

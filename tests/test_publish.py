@@ -16,6 +16,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.publication import DOCUMENTS
+from lightfield.dataset.view_store import VARIABLE
 from lightfield.imaging import images
 from lightfield.report.publish import publish
 
@@ -291,6 +293,39 @@ def test_the_frames_of_a_sequence_are_samples_of_their_own(folder, tmp_path):
     keys = {name.split(".")[0] for tar in output.glob(f"{NAME}-*.tar") for name in members(tar)}
     assert len(keys) == 12
     assert {key[:6] for key in keys} == {"f00001", "f00002"}
+
+
+@pytest.mark.slow
+def test_shards_and_parts_of_an_archive_come_back_from_a_storage(
+    run_program, folder, tmp_path, monkeypatch
+):
+    store, home = tmp_path / "store", tmp_path / "home"
+    results = store / "results/smoke"
+    results.mkdir(parents=True)
+    home.mkdir()
+    monkeypatch.setenv(VARIABLE, str(store))
+    settings = tmp_path / "settings.json"
+    write_json(settings, {"scene": SCENE, "gigabytes": 3e-5})
+    output, archive = tmp_path / "job" / NAME, tmp_path / "job" / f"{NAME}.tar"
+    for program, target in (("publish.py", output), ("package.py", archive)):
+        arguments = ["--settings", settings, "--folder", folder, "--output", target]
+        run_program(program, *arguments)
+    # Snakemake stores what the rules declare.
+    for name in DOCUMENTS:
+        (results / "published" / NAME).mkdir(parents=True, exist_ok=True)
+        shutil.copy(output / name, results / "published" / NAME)
+    for file in (archive, archive.with_suffix(".json")):
+        shutil.copy(file, results)
+    for name in (f"published/{NAME}", f"{NAME}.json"):
+        path = f"results/smoke/{name}"
+        run_program("take_dataset.py", "--store", store, path, cwd=home)
+    taken = home / "results/smoke"
+    made = {path.name: path.read_bytes() for path in output.iterdir()}
+    assert len([name for name in made if name.endswith(".tar")]) > 3
+    assert {p.name: p.read_bytes() for p in (taken / "published" / NAME).iterdir()} == made
+    parts = sorted(archive.parent.glob("*.tar"))
+    assert len(parts) > 1
+    assert [(taken / part.name).read_bytes() for part in parts] == [p.read_bytes() for p in parts]
 
 
 @pytest.mark.slow
