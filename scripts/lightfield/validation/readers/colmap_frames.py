@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield.validation.readers import colmap
+from lightfield.validation.readers.colmap import read as read_colmap
 from lightfield.validation.readers.contents import Exported, Part
 
 
@@ -15,7 +15,7 @@ def read(
     models = []
     for number in range(len(frames)):
         folder = listing.parent / f"colmap_{number}"
-        exported = colmap.read(folder / listing.name, size, options)
+        exported = read_colmap(folder / listing.name, size, options)
         names = sorted(view.name or "" for view in exported.views)
         exported.parts.append(Part(f"{folder}: images", "test", names[:1]))
         exported.parts.append(Part(f"{folder}: images", "train", names[1:]))
