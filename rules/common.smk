@@ -52,6 +52,7 @@ from lightfield.dataset.job_settings import (
     MeshSettings,
     PackSettings,
     PageSettings,
+    SequenceValidationSettings,
     SynthesisSettings,
     ValidationSettings,
 )
@@ -117,6 +118,18 @@ SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
 # The imported scenes, as a wildcard's constraint. "(?!)" matches nothing.
 IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
+
+# The rigs with exports of a whole sequence, as a wildcard's constraint on the start of a path.
+SEQUENCES = (
+    "|".join(
+        {
+            re.escape(f"{d.scene_folder}/{d.rig_name}")
+            for d in DATASETS.values()
+            if d.sequence_exports
+        }
+    )
+    or "(?!)"
+)
 
 # `folder` and `work` of a Dataset, with wildcards.
 DATASET = f"{RESULTS}/{{scene}}/{{rig}}"

@@ -30,7 +30,10 @@ def stored_lists(wildcards):
     """Return the lists of all chosen datasets' files in the view store. Empty without a store."""
     if not STORE:
         return []
-    return [file for d in CHOSEN for file in (*d.all_records, *d.published)]
+    files = []
+    for dataset in CHOSEN:
+        files += [*dataset.all_records, *dataset.published, *dataset.sequence_exports]
+    return list(dict.fromkeys(files))
 
 
 def check_storage():
@@ -75,7 +78,7 @@ def bring_settings():
             dataset.calibration,
             dataset.places,
         ]
-        for path in (*files, *dataset.published):
+        for path in (*files, *dataset.published, *dataset.sequence_exports):
             # A file that a dataset lacks is an empty list.
             if isinstance(path, str):
                 ViewStore(STORE).bring(path)

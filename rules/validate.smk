@@ -1,6 +1,9 @@
 # Validation of datasets, and the checksums of all published files.
 
 
+include: "helpers/validate.smk"
+
+
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:
@@ -24,6 +27,8 @@ rule validate:
         log_of("{scene}/{rig}/validate"),
     benchmark:
         times_of("{scene}/{rig}/validate")
+    wildcard_constraints:
+        scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
     threads: 2
     resources:
         mem_mb=4000,
@@ -53,6 +58,8 @@ rule checksums:
         f"{DATASET}/sha256sums.txt",
     log:
         log_of("{scene}/{rig}/checksums"),
+    wildcard_constraints:
+        scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
     localrule: True
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
@@ -60,6 +67,36 @@ rule checksums:
         f"python {SCRIPTS}/publish_checksums.py"
         " --validation {input.validation} --page {input.page}"
         " --sums {input.sums} --output {output} > {log} 2>&1"
+
+
+# The frames of a sequence are datasets. This is for the exports of all of them.
+rule validate_sequence:
+    input:
+        settings=sequence_validation_settings,
+        exports=sequence_exports,
+        views=validated_frames,
+    output:
+        validation=f"{DATASET}/validation.json",
+        sums=f"{DATASET}/sha256sums.txt",
+    log:
+        log_of("{scene}/{rig}/validate"),
+    benchmark:
+        times_of("{scene}/{rig}/validate")
+    wildcard_constraints:
+        scene=rf"(?=(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
+        rig="[A-Za-z0-9_.-]+",
+    resources:
+        mem_mb=4000,
+        runtime=120,
+    params:
+        rig=DATASET,
+        removed=REMOVED,
+    message:
+        "Validating the sequence {wildcards.scene}/{wildcards.rig}"
+    shell:
+        f"{taking('input')}python {SCRIPTS}/validate_sequence.py"
+        " {params.rig} --settings {input.settings} --removed {params.removed}"
+        " --output {output.validation} --sums {output.sums} > {log} 2>&1"
 
 
 # The jobs that made the files are unknown when this is planned. It reads all files, also those of an
@@ -70,7 +107,7 @@ rule verify:
     log:
         log_of("verify"),
     params:
-        folders=shlex.join([*(dataset.folder for dataset in CHOSEN), *family_results()]),
+        folders=shlex.join(verified_folders()),
         work=WORK,
     message:
         "Checking every byte of the chosen datasets"

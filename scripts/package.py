@@ -28,19 +28,20 @@ def main() -> None:
     check_settings(arguments, add_settings_flags, "scene")
 
     # Only now, so that --help need not wait for these.
-    from lightfield.core.settings import read_settings
-    from lightfield.dataset.config import load_scene
     from lightfield.dataset.job_settings import PackSettings
+    from lightfield.dataset.view_store import ViewStore
     from lightfield.report import package
 
-    if arguments.settings:
-        settings = read_settings(PackSettings, arguments.settings)
-    else:
-        settings = PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
+    settings = PackSettings.given(arguments.settings, arguments.scene, arguments.gigabytes)
     card = package.card(arguments.folder, arguments.output.stem, settings.scene)
-    most = settings.gigabytes and settings.gigabytes * 1e9
-    parts = package.listed(package.pack(arguments.folder, card, arguments.output, most))
-    write_json(arguments.output.with_suffix(".json"), {**card, "parts": parts})
+    written = package.pack(arguments.folder, card, arguments.output, settings.most_bytes)
+    parts = package.listed(written)
+    card_path = arguments.output.with_suffix(".json")
+    write_json(card_path, {**card, "parts": parts})
+    store = ViewStore.configured()
+    if store:
+        # The job declares the first part alone.
+        store.put_list(card_path, written[1:])
     print(f"{arguments.output}: {len(parts)} parts, {sum(p['bytes'] for p in parts) / 1e9:.3g} GB")
 
 

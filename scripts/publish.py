@@ -27,18 +27,14 @@ def main() -> None:
     check_settings(arguments, add_settings_flags, "scene")
 
     # Only now, so that --help need not wait for these.
-    from lightfield.core.settings import read_settings
-    from lightfield.dataset.config import load_scene
     from lightfield.dataset.job_settings import PackSettings
     from lightfield.report.publish import publish
 
-    if arguments.settings:
-        settings = read_settings(PackSettings, arguments.settings)
-    else:
-        settings = PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
-    most = settings.gigabytes and settings.gigabytes * 1e9
+    settings = PackSettings.given(arguments.settings, arguments.scene, arguments.gigabytes)
     name = arguments.output.resolve().name
-    published = publish(arguments.folder, name, settings.scene, arguments.output, most)
+    published = publish(
+        arguments.folder, name, settings.scene, arguments.output, settings.most_bytes
+    )
     files = published.files
     print(f"{arguments.output}: {len(files)} files, {sum(f['bytes'] for f in files) / 1e9:.3g} GB")
 

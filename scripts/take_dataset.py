@@ -1,7 +1,8 @@
 """Copy finished datasets from the storage of their jobs.
 
-Each file is compared with the dataset's sha256sums.txt. Files that exist already with the same
-bytes stay. The dataset's page is copied, too.
+A dataset is the folder of a rig, or of a frame. It may also be a folder of published files, or the
+.json of an archive, which stands for the archive's parts. Each file is compared with its checksum.
+Files that exist already with the same bytes stay. The dataset's page is copied, too.
 """
 
 import argparse
@@ -9,7 +10,7 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import read_keys, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
 
@@ -27,29 +28,46 @@ def main() -> None:
 def take(store: ViewStore, dataset: Path) -> None:
     """Copy all files of a dataset. Raises `UserError` if one is not in the storage."""
     # Only now, so that --help need not wait for it.
-    from lightfield.validation.files import REPORT, SUMS, read_sums
+    from lightfield.validation.files import REPORT
 
     for name in store.names(f"{dataset}/{REPORT}"):
         store.bring(f"{dataset}/{REPORT}/{name}")
-    sums = dataset / SUMS
-    if not store.bring(str(sums)):
-        raise UserError(f"{sums}: is not in {store.url}: no run has finished this dataset there")
-    published = read_sums(sums)
-    progress = Progress(len(published), "take", "files")
+    listing, sums = sums_of(store, dataset)
+    progress = Progress(len(sums), "take", "files")
     lost_files = []
-    for name, digest in published.items():
+    for path, digest in sums.items():
         # The storage has views under their checksums, and other files under their paths.
-        path = dataset / name
         has_file = store.take(digest, path) or (store.bring(str(path)) and sha256(path) == digest)
         if not has_file:
             lost_files.append(path)
         progress.done()
     if lost_files:
         raise UserError(
-            f"{len(lost_files)} files are not in {store.url} as {sums} has them, as "
+            f"{len(lost_files)} files are not in {store.url} as {listing} has them, as "
             f"{lost_files[0]}; `snakemake verify` with the storage names them, and --mend makes "
             "them again"
         )
+
+
+def sums_of(store: ViewStore, dataset: Path) -> tuple[Path, dict[Path, str]]:
+    """Bring the list of a dataset's files. Return it, and the SHA-256 of each file."""
+    from lightfield.dataset.publication import PUBLISHED_FOLDER, RO_CRATE
+    from lightfield.validation.files import SUMS, read_sums
+
+    is_archive = dataset.suffix == ".json"
+    is_published = dataset.parent.name == PUBLISHED_FOLDER
+    listing = dataset if is_archive else dataset / (RO_CRATE if is_published else SUMS)
+    if not store.bring(str(listing)):
+        raise UserError(f"{listing}: is not in {store.url}: no run has finished it there")
+    if is_archive:
+        entries = read_keys(listing, "package.py", "parts")["parts"]
+        sums = {entry["file"]: entry["sha256"] for entry in entries}
+    elif is_published:
+        entities = read_keys(listing, "publish.py", "@graph")["@graph"]
+        sums = {entity["@id"]: entity["sha256"] for entity in entities if "sha256" in entity}
+    else:
+        sums = read_sums(listing)
+    return listing, {listing.parent / name: digest for name, digest in sums.items()}
 
 
 if __name__ == "__main__":

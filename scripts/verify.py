@@ -2,10 +2,12 @@
 
 Prints a line for each damaged file, with what is wrong. The exit status is then 1. For a copy of a
 dataset, DATASET is enough. --work also checks the files that the dataset was made from. The folder
-of a family stands for its corpus: its page, its shards, and all datasets of its members.
+of a sequence stands for all its frames and their exports. The folder of a family stands for its
+corpus: its page, its shards, and all datasets of its members.
 """
 
 import argparse
+import os
 from pathlib import Path
 
 from lightfield.core.cli import run
@@ -46,9 +48,12 @@ def main() -> None:
                 mend(folder, fault, arguments.work)
     others = [folder for folder in arguments.dataset if folder not in corpora]
     # A family has no corpus before its first run has ended.
-    members = {path: None for folder in others for path in member_datasets(folder)}
-    datasets = [folder for folder in others if not any(folder.glob("*/member.json"))]
-    for folder in [*datasets, *members]:
+    members = {Path(os.path.relpath(path)) for folder in others for path in member_datasets(folder)}
+    datasets: list[Path] = []
+    for folder in others:
+        if not any(folder.glob("*/member.json")):
+            datasets += [*Integrity(folder).frames, folder]
+    for folder in dict.fromkeys(map(Path, map(os.path.relpath, [*datasets, *sorted(members)]))):
         is_of_member = folder in members
         # The checksums of a member's dataset are beside its files.
         integrity = Integrity(folder, None if is_of_member else arguments.work)

@@ -254,7 +254,7 @@ REFUSED = [
             {"sources": ["perspective"]},
             f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
         )
-        for name in ("dnerf", "colmap_frames")
+        for name in ("dnerf", "colmap_frames", "multipleview")
     ),
     ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
     ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
@@ -422,6 +422,10 @@ REFUSED = [
     *(("publish", PUBLISH | {"url": value}) for value in ("example.org", 7)),
     *(("publish", PUBLISH | {"licence": value}) for value in ("CC BY", "")),
     *(("publish", PUBLISH | {"doi": value}) for value in ("https://doi.org/10.1/2", 10.1)),
+    *(("publish", PUBLISH | {"contact": value}) for value in ("Ada", "a b@c.org", 7)),
+    *(("publish", PUBLISH | {"publisher_ror": v}) for v in ("https://ror.org/03f0f6041", "1", 7)),
+    ("publish", PUBLISH | {"publisher_url": "zenodo.org"}),
+    ("publish", PUBLISH | {"creators": [{"name": "A", "ror": "03f0f604"}]}),
     *(("publish", PUBLISH | {key: ""}) for key in ("limitations", "biases", "use_cases")),
     *(("publish", value) for value in (True, [])),
     *(("scene.parameters.detail", value) for value in (0, 1.1, "1")),

@@ -852,6 +852,18 @@ def test_views_of_a_rig_that_tests_are_compared_with_its_own_lightfield(scene):
             assert "scale, offset" in problems(scene / "along", "views", "instant_ngp")[0]
 
 
+def test_views_of_rigs_with_splits_of_their_own_are_not_expected(tmp_path):
+    for name in ("near", "far"):
+        write_views(tmp_path / "dataset", LENSES["perspective"], RIG | {"split": "odd"})
+        (tmp_path / "dataset").rename(tmp_path / name)
+    for kind in ("nerfstudio", "nerf_synthetic"):
+        write_export(tmp_path / "near", "views", kind, {})
+    lightfields = {n: LightField.read(tmp_path / n / "lightfield.json") for n in ("near", "far")}
+    write_json(tmp_path / "splits.json", splits_content(lightfields))
+    for kind in ("nerfstudio", "nerf_synthetic"):
+        assert problems(tmp_path / "near", "views", kind) == []
+
+
 def test_an_unpacked_dataset_may_lack_the_rigs_that_test_it(scene, tmp_path):
     for rig in ("around", "along"):
         shutil.copytree(scene / rig, tmp_path / f"scene_{rig}")

@@ -16,6 +16,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.publication import DOCUMENTS
+from lightfield.dataset.view_store import VARIABLE
 from lightfield.imaging import images
 from lightfield.report.publish import publish
 
@@ -99,6 +101,22 @@ def test_each_part_of_the_split_has_shards_of_its_own(folder, output):
     for split in ("train", "test"):
         keys = {name.split(".")[0] for name in members(output / f"{NAME}-{split}-00000.tar")}
         assert keys == {view.name for view in lightfield.views if view.split == split}
+
+
+def test_views_for_validation_have_shards_of_their_own(tmp_path):
+    rig = RIG | {"split": {"validation": ["view_0001f"], "test": ["view_0002f", "view_0003f"]}}
+    write_views(tmp_path / "dataset", CAMERA, rig)
+    path = tmp_path / "dataset/lightfield.json"
+    LightField.read(path).changed(scene={"name": "smoke"}).write(path)
+    files = [path for path in (tmp_path / "dataset").rglob("*") if path.is_file()]
+    lines = [f"{sha256(path)}  {path.relative_to(tmp_path / 'dataset')}\n" for path in files]
+    (tmp_path / "dataset/sha256sums.txt").write_text("".join(lines))
+    output = published(tmp_path / "dataset", tmp_path / NAME)
+    counts = {"train": 3, "validation": 1, "test": 2}
+    for split, count in counts.items():
+        keys = {name.split(".")[0] for name in members(output / f"{NAME}-{split}-00000.tar")}
+        assert len(keys) == count
+    assert len([*output.glob(f"{NAME}-*.tar")]) == 3
 
 
 def test_a_sample_says_the_pose_and_the_bytes_of_each_picture(folder, output):
@@ -187,6 +205,32 @@ def test_the_ro_crate_says_how_its_files_were_made(output):
     assert {part["@id"] for part in action["result"]} == parts
 
 
+def test_organizations_are_entities_with_their_ror(folder, tmp_path):
+    creator = {"name": "Ada Lovelace", "affiliation": "University of London", "ror": "04cw6st05"}
+    facts = {
+        "creators": [creator, {"name": "A Laboratory", "type": "organization"}],
+        "publisher_url": "https://zenodo.org",
+        "contact": "ada@example.org",
+        "doi": "10.5281/zenodo.1234",
+    }
+    output = published(folder, tmp_path / NAME, publish=PUBLISH | facts)
+    graph = read_json(output / "ro-crate-metadata.json")["@graph"]
+    entities = {entity["@id"]: entity for entity in graph}
+    assert len(entities) == len(graph)
+    root = entities["./"]
+    (ada, laboratory) = (entities[creator["@id"]] for creator in root["creator"])
+    assert ada["affiliation"] == {"@id": "https://ror.org/04cw6st05"}
+    assert entities["https://ror.org/04cw6st05"]["name"] == "University of London"
+    assert entities[ada["contactPoint"]["@id"]]["email"] == "ada@example.org"
+    assert laboratory["@type"] == "Organization"
+    assert entities[root["publisher"]["@id"]]["url"] == "https://zenodo.org"
+    assert entities[root["publisher"]["@id"]]["name"] == "Zenodo"
+    assert entities[root["identifier"]["@id"]]["value"] == "doi:10.5281/zenodo.1234"
+    datacite = read_json(output / "datacite.json")
+    (affiliation,) = datacite["creators"][0]["affiliation"]
+    assert affiliation["affiliationIdentifier"] == "https://ror.org/04cw6st05"
+
+
 def test_datacite_has_all_that_a_doi_needs(folder, tmp_path):
     reserved = {"publish": PUBLISH | {"doi": "10.5281/zenodo.1234", "title": "A Room"}}
     content = read_json(published(folder, tmp_path / NAME, **reserved) / "datacite.json")
@@ -249,6 +293,39 @@ def test_the_frames_of_a_sequence_are_samples_of_their_own(folder, tmp_path):
     keys = {name.split(".")[0] for tar in output.glob(f"{NAME}-*.tar") for name in members(tar)}
     assert len(keys) == 12
     assert {key[:6] for key in keys} == {"f00001", "f00002"}
+
+
+@pytest.mark.slow
+def test_shards_and_parts_of_an_archive_come_back_from_a_storage(
+    run_program, folder, tmp_path, monkeypatch
+):
+    store, home = tmp_path / "store", tmp_path / "home"
+    results = store / "results/smoke"
+    results.mkdir(parents=True)
+    home.mkdir()
+    monkeypatch.setenv(VARIABLE, str(store))
+    settings = tmp_path / "settings.json"
+    write_json(settings, {"scene": SCENE, "gigabytes": 3e-5})
+    output, archive = tmp_path / "job" / NAME, tmp_path / "job" / f"{NAME}.tar"
+    for program, target in (("publish.py", output), ("package.py", archive)):
+        arguments = ["--settings", settings, "--folder", folder, "--output", target]
+        run_program(program, *arguments)
+    # Snakemake stores what the rules declare.
+    for name in DOCUMENTS:
+        (results / "published" / NAME).mkdir(parents=True, exist_ok=True)
+        shutil.copy(output / name, results / "published" / NAME)
+    for file in (archive, archive.with_suffix(".json")):
+        shutil.copy(file, results)
+    for name in (f"published/{NAME}", f"{NAME}.json"):
+        path = f"results/smoke/{name}"
+        run_program("take_dataset.py", "--store", store, path, cwd=home)
+    taken = home / "results/smoke"
+    made = {path.name: path.read_bytes() for path in output.iterdir()}
+    assert len([name for name in made if name.endswith(".tar")]) > 3
+    assert {p.name: p.read_bytes() for p in (taken / "published" / NAME).iterdir()} == made
+    parts = sorted(archive.parent.glob("*.tar"))
+    assert len(parts) > 1
+    assert [(taken / part.name).read_bytes() for part in parts] == [p.read_bytes() for p in parts]
 
 
 @pytest.mark.slow

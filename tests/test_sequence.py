@@ -138,8 +138,13 @@ def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
         assert "moving_LFPair/exports/dnerf/transforms_test.json" in archive.getnames()
         card = json.load(archive.extractfile("moving_LFPair/card.json"))
     assert "exports/dnerf" in card["loaders"]
+    assert json.loads((rig / "validation.json").read_text())["valid"] is True
+    assert "exports/dnerf/transforms_test.json" in (rig / "sha256sums.txt").read_text()
     damaged = rig / "exports/dnerf" / f"{content['frames'][0]['file_path']}.png"
     damaged.write_bytes(b"")
+    verified = snakemake(folder, "verify", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    assert verified.returncode == 1
+    assert damaged.name in verified.stdout + verified.stderr
     assert planned(folder, *arguments)["export_sequence"] == 1
     assert snakemake(folder, "--cores", "2", *arguments).returncode == 0
     assert damaged.stat().st_size > 0

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import struct
 
 import cv2
 import numpy as np
@@ -191,6 +192,58 @@ def test_colmap_frames_have_the_same_names_and_the_points_of_their_frames(sequen
         assert nearest.split == "test"
         np.testing.assert_allclose(nearest.position, -turn.T @ np.array(shift), atol=1e-9)
     assert len(names) == 1
+
+
+def read_cameras(model):
+    """Return width, height, and focal length of the camera of a binary model, and its images.
+
+    Images have rotation (3, 3) and translation (3,) from the world, by name.
+    """
+    content = (model / "cameras.bin").read_bytes()
+    count, number, kind, width, height, focal = struct.unpack_from("<QiiQQd", content)
+    assert (count, number, kind) == (1, 1, 1)
+    content = (model / "images.bin").read_bytes()
+    (count,) = struct.unpack_from("<Q", content)
+    place = 8
+    images_by_name = {}
+    for _ in range(count):
+        _, w, x, y, z, *shift, camera = struct.unpack_from("<i7di", content, place)
+        assert camera == 1
+        end = content.index(b"\0", place + 64)
+        (points,) = struct.unpack_from("<Q", content, end + 1)
+        turn = cv2.Rodrigues(2 * np.arccos(w) * np.array([x, y, z]) / np.sqrt(1 - w * w))[0]
+        images_by_name[content[place + 64 : end].decode()] = (turn, np.array(shift))
+        place = end + 9 + 24 * points
+    return width, height, focal, images_by_name
+
+
+@pytest.mark.parametrize("name", ["plain", "split"])
+def test_multipleview_has_the_frames_of_each_training_camera(sequence, tmp_path, name):
+    folder = exported(sequence / name, "multipleview", tmp_path, points=300)
+    width, height, focal, cameras = read_cameras(folder / "sparse_")
+    assert [width, height] == FLAT["resolution"]
+    # 4DGaussians takes the first of the layouts that it knows, and this is the last one.
+    for other in ("sparse", "transforms_train.json", "poses_bounds.npy", "dataset.json"):
+        assert not (folder / other).exists()
+    views = {tuple(v.position.round(9)): v for v in source_of(sequence / name).lightfield.views}
+    # 4DGaussians takes a camera's number from between "image" and a suffix of four characters.
+    seen = set()
+    for image, (turn, shift) in cameras.items():
+        camera = folder / f"cam{image[5:-4].zfill(2)}"
+        matrix = np.eye(4)
+        matrix[:3, :3] = turn.T @ np.diag([1, -1, -1])
+        matrix[:3, 3] = -turn.T @ shift
+        seen.add(views[tuple(matrix[:3, 3].round(9))].split)
+        assert len([*camera.iterdir()]) == len(FRAMES)
+        for number, frame in enumerate(FRAMES, 1):
+            picture = cv2.imread(str(camera / f"frame_{number:05}.jpg"))[..., ::-1]
+            assert_shows_its_frame(picture, frame, matrix, focal)
+    assert len(cameras) == (9 if name == "plain" else 5)
+    assert seen == ({None} if name == "plain" else {"train"})
+    rows = np.load(folder / "poses_bounds_multipleview.npy")
+    assert rows.shape == (len(cameras), 17)
+    assert (rows[:, 15] < rows[:, 16]).all()
+    assert (folder / "points3D_multipleview.ply").is_file()
 
 
 def test_without_a_split_the_first_camera_tests_and_all_others_train(sequence):

@@ -1,9 +1,11 @@
 """Builds whose jobs share no folder, with a storage in a folder."""
 
+import tarfile
 from collections import Counter
 
 import pytest
-from checkouts import ROOT, wait_until
+import yaml
+from checkouts import PUBLISHED_VIEWS, ROOT, wait_until
 from sphere import write_views
 
 import cloud
@@ -12,6 +14,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset import shard_files
 from lightfield.dataset.view_store import ViewStore
+from lightfield.validation.integrity import Integrity
 
 PANORAMAS = "smoke/LFLattice_2panos"
 WORDS = (
@@ -123,9 +126,37 @@ render: {{samples: 1}}
 report: {{panorama: false}}
 rigs: {{LFPlane: {PLANE | {"camera": CAMERA}}}}
 """
+PUBLISH = yaml.safe_load(PUBLISHED_VIEWS)["publish"] | {"date": "2026-11-30"}
+# A model at two frames, which is exported as a sequence, packed and published.
+MODELLED = f"""
+description: A ball
+licence: CC-BY-4.0
+publish: {PUBLISH}
+scene: {{model: models/ball.obj}}
+render: {{samples: 1}}
+report: {{panorama: false}}
+rigs:
+  LFPair:
+    type: plane
+    cameras: [2, 1]
+    size: [0.5, 0, 0]
+    center: [0, 0, 1.5]
+    frames: {{first: 1, last: 2}}
+    camera: {{lens: rectilinear, fov: 90, resolution: [16, 16]}}
+exports:
+  dnerf: {{sources: [views], points: 20}}
+"""
+BALL = """
+import bpy, sys
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5, location=(0, 0, 0))
+bpy.ops.wm.obj_export(filepath=sys.argv[1])
+"""
+PUBLISHED = "results/modelled/published/modelled_LFPair"
 BROUGHT_WORDS = (
-    *("--config", "scenes=[brought,theirs]", "rigs=all", "preset=full", "--"),
+    *("--config", "scenes=[brought,theirs,modelled]", "rigs=all", "preset=full", "--"),
     *(f"results/{name}/LFPlane/validation.json" for name in ("brought", "theirs")),
+    *("results/modelled/modelled_LFPair.tar", f"{PUBLISHED}/croissant.json"),
 )
 
 
@@ -133,13 +164,15 @@ BROUGHT_WORDS = (
 def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     folder, root, given = (tmp_path / name for name in ("store", "cloud", "dataset"))
     build = Cloud(root, 2, str(folder), ("published/LFPlane/lightfield.json",))
-    for name in ("blends/parts", "textures", "published"):
+    for name in ("blends/parts", "textures", "published", "models"):
         (root / name).mkdir(parents=True)
+    (tmp_path / "ball.py").write_text(BALL)
+    run_program(tmp_path / "ball.py", root / "models/ball.obj")
     (tmp_path / "make.py").write_text(BLEND)
     run_program(tmp_path / "make.py", root, ROOT / "scripts")
     write_views(given, CAMERA, {**PLANE, "center": [0, 0, 0]})
     given.rename(root / "published/LFPlane")
-    scenes = {"brought": BROUGHT, "theirs": "scene: {dataset: published}"}
+    scenes = {"brought": BROUGHT, "theirs": "scene: {dataset: published}", "modelled": MODELLED}
     for name, text in scenes.items():
         (root / f"configs/scenes/{name}.yaml").write_text(text)
     said, _ = (run := build.start(*BROUGHT_WORDS)).communicate()
@@ -162,6 +195,17 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     for name, (_, digest) in files.items():
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
+
+    for path in ("results/modelled/LFPair", PUBLISHED):
+        run_program("take_dataset.py", "--store", folder, path, cwd=tmp_path)
+    rig = tmp_path / "results/modelled/LFPair"
+    assert list(Integrity(rig).faults()) == []
+    assert len([*rig.glob("exports/dnerf/*/f0000?_view_*.png")]) == 4
+    (shard,) = (tmp_path / PUBLISHED).glob("modelled_LFPair-*.tar")
+    with tarfile.open(shard) as archive:
+        assert len(archive.getnames()) == 8
+    with tarfile.open(tmp_path / PUBLISHED / "other_files.tar") as archive:
+        assert "modelled_LFPair/exports/dnerf/transforms_train.json" in archive.getnames()
 
     dry_run = ("--dry-run", "--quiet", "rules", *BROUGHT_WORDS)
     (folder / "views/sums" / sha256(root / "textures/walls.png")).unlink()

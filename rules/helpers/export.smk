@@ -40,16 +40,20 @@ def views_of_source(dataset, wildcards):
 
 
 def frames_of(wildcards):
-    """Return the datasets of a rig's sequence, in the order of time."""
+    """Return the datasets of a rig's sequence, in the order of time.
+
+    Ends the run if there is none, and if it has no export of the job's format.
+    """
     name = f"{wildcards.scene}/{wildcards.rig}"
     frames = [
         dataset
         for dataset in DATASETS.values()
         if f"{dataset.scene_folder}/{dataset.rig_name}" == name and dataset.rig.sequence
     ]
-    if not frames or wildcards.format not in frames[0].exports.selected:
+    format = wildcards.get("format")
+    if not frames or (format and format not in frames[0].exports.selected):
         sys.exit(
-            f"error: {RESULTS}/{name}/exports/{wildcards.format}: the scene YAML asks for no such "
+            f"error: {RESULTS}/{name}/exports/{format}: the scene YAML asks for no such "
             "export of a sequence"
         )
     return frames

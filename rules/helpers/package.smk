@@ -30,8 +30,12 @@ def packed_sums(wildcards):
     """
     datasets = packed(wildcards)
     files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
-    files += datasets[0].sequence_exports
+    if datasets[0].sequence_exports:
+        files.append(datasets[0].sequence_sums)
     if STORE:
+        if datasets[0].sequence_exports:
+            files.append(f"{datasets[0].rig_home}/validation.json")
+            files += datasets[0].sequence_exports
         for dataset in datasets:
             files += [f"{dataset.folder}/validation.json", *dataset.published]
             files += dataset.all_records

@@ -2,7 +2,8 @@
 
 The consumers are pycolmap, nerfstudio, NCore and OpenCV. `make consumers` runs this in an
 environment of its own, after export.py. Prints the largest error of each export. An error beyond
-its limit ends in an AssertionError. published.py reads what is published.
+its limit ends in an AssertionError. published.py reads what is published, sequences.py the exports
+with a time, and lichtfeld.py those for a program that has no Python package.
 """
 
 import json
@@ -10,8 +11,10 @@ import sys
 from pathlib import Path
 
 import cv2
+import lichtfeld
 import numpy as np
 import published
+import sequences
 
 ROOT = Path(__file__).resolve().parents[2]
 RADIUS = 3.0  # The radius of the scene, a sphere around the origin.
@@ -283,6 +286,9 @@ def main():
             check(folder, path.name)
     for path in sorted((folder / "moving").iterdir()):
         moving(path)
+    for path in sorted((folder / "lichtfeld").iterdir()):
+        lichtfeld.check(path, *ours(folder, path.name))
+    sequences.check(folder / "sequence")
     for name in ("fisheye", "opencv"):
         opencv(folder, name)
     radiance_field(folder)

@@ -12,13 +12,14 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 
-from sphere import LENSES, enlarged, write_views  # noqa: E402
+from sphere import LENSES, enlarged, look, look_at_ball, write_views  # noqa: E402
 
 from lightfield import export  # noqa: E402
 from lightfield.core.files import sha256  # noqa: E402
 from lightfield.dataset.config import Credits  # noqa: E402
 from lightfield.dataset.exports import settings_of  # noqa: E402
 from lightfield.dataset.lightfield import LightField  # noqa: E402
+from lightfield.export.sequence import SourceSequence  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
 from lightfield.report.publish import publish  # noqa: E402
 
@@ -30,11 +31,20 @@ PUBLISHED = {
     "licence": "CC-BY-4.0",
     "publish": {
         "creators": [
-            {"name": "Ada Lovelace", "orcid": "0000-0002-1825-0097", "affiliation": "London"},
-            {"name": "A Laboratory", "type": "organization"},
+            {
+                "name": "Ada Lovelace",
+                "orcid": "0000-0002-1825-0097",
+                "affiliation": "London",
+                "ror": "04cw6st05",
+            },
+            {"name": "A Laboratory", "type": "organization", "ror": "03f0f6041"},
         ],
         "url": "https://example.org/sphere",
         "publisher": "Zenodo",
+        "publisher_url": "https://zenodo.org",
+        "publisher_ror": "01ggx4157",
+        "contact": "ada@example.org",
+        "doi": "10.5281/zenodo.1234567",
         "date": "2026-11-30",
         "limitations": "Few pixels.",
         "biases": "One sphere.",
@@ -47,8 +57,36 @@ PUBLISHED = {
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
+    "lichtfeld": ("perspective", "shifted", "fisheye", "panorama"),
     "ncore": ("perspective", "shifted", "fisheye", "wide"),
 }
+
+# The frames of a sequence, and what they show.
+FRAMES = {1: look, 2: look_at_ball, 5: look_at_ball}
+SEQUENCE = {
+    "dnerf": {"points": 20000},
+    "colmap_frames": {"points": 20000},
+    "multipleview": {"points": 20000},
+    "neural_3d_video": {"points": 20000},
+}
+
+
+def write_sequence(folder: Path) -> None:
+    """Write views of a rig with a split at each frame, and the exports of all frames."""
+    camera = enlarged(LENSES["perspective"], 2)
+    for number, see in FRAMES.items():
+        write_views(folder / "dataset", camera, RIG | {"split": {"every": 3}}, see=see)
+        path = folder / "dataset/lightfield.json"
+        LightField.read(path).changed(frame=number).write(path)
+        (folder / "dataset").rename(folder / f"f{number:05}")
+    frames = [f"f{number:05}" for number in FRAMES]
+    source = SourceSequence.of_folders(folder, frames, "", ".exr", {})
+    for kind, options in SEQUENCE.items():
+        if kind == "neural_3d_video" and shutil.which("ffmpeg") is None:
+            print("neural_3d_video: is not written, because ffmpeg is not installed")
+            continue
+        settings = settings_of(kind).model_validate({"sources": ["views"], **options})
+        export.run(kind, source, settings, folder / "exports" / kind)
 
 
 # Cameras that move while their shutters are open.
@@ -100,14 +138,16 @@ def main() -> None:
     for kind, sources in OF.items():
         for name in sources:
             options = {"sources": [name], "points": 40000}
-            # COLMAP has no depth maps of panoramas.
-            if kind != "ncore" and (kind, name) != ("colmap", "panorama"):
+            # COLMAP and LichtFeld have no depth maps of panoramas.
+            is_panorama = kind != "nerfstudio" and name == "panorama"
+            if kind != "ncore" and not is_panorama:
                 options["depth"] = True
             settings = settings_of(kind).model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
     for name, motion in MOVING.items():
         export_moving(folder / "moving" / name, motion)
+    write_sequence(folder / "sequence")
     publish_views(folder / "publish")
     write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")

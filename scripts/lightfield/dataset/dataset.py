@@ -62,6 +62,7 @@ class Dataset(DatasetPaths):
             *_paths(self.splits),
             *self.published,
             *self.sequence_exports,
+            *_paths(self.sequence_sums),
             *self.pictures,
             self.costs,
             self.page,

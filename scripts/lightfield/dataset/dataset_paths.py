@@ -161,6 +161,11 @@ class DatasetPaths(Description):
         ]
 
     @property
+    def sequence_sums(self) -> str | list[str]:
+        """The checksums of the exports of the whole sequence, if it has any."""
+        return f"{self.rig_home}/sha256sums.txt" if self.sequence_exports else []
+
+    @property
     def mesh_list(self) -> list[str]:
         """The file in which the mesh's job lists its files, if the dataset has meshes."""
         return [f"{self.folder}/{MESH}/{MANIFEST}"] if self.mesh else []

@@ -370,6 +370,17 @@ class ColmapFrames(Colmap):
         return super().refusal(lens, has_depth)
 
 
+class MultipleView(Developed):
+    """The layout of 4DGaussians' own recordings: a folder of frames for each camera."""
+
+    is_of_sequence: ClassVar[bool] = True
+
+    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return _centred_pinhole(lens)
+
+
 class SceneFlow(Export):
     """How far each surface moves in the world from one frame to the next."""
 
@@ -435,6 +446,9 @@ class Exports(Settings):
     )
     colmap_frames: ColmapFrames | None = Field(
         None, description="A sequence, for SpacetimeGaussians."
+    )
+    multipleview: MultipleView | None = Field(
+        None, description="A sequence, for 4DGaussians: its MultipleView."
     )
     scene_flow: SceneFlow | None = Field(
         None, description="A sequence: the motion of surfaces in the world."

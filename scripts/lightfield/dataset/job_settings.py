@@ -5,11 +5,12 @@ file with --settings. The settings of light fields are in `lightfield.dataset.ca
 reprojections and exports have modules of their own.
 """
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 
-from lightfield.core.settings import Settings
+from lightfield.core.settings import Settings, read_settings
 from lightfield.dataset.config import (
     FILE,
     AtLeastOne,
@@ -19,6 +20,7 @@ from lightfield.dataset.config import (
     Parameters,
     Preset,
     check_model,
+    load_scene,
 )
 from lightfield.dataset.family import Draw, Member
 from lightfield.dataset.names import builders
@@ -140,6 +142,19 @@ class ValidationSettings(Settings):
     records: list[str] = Field([], description="Sizes and checksums of the images as written.")
 
 
+class SequenceValidationSettings(Settings):
+    """The settings of scripts/validate_sequence.py. Paths are those of the working folder."""
+
+    frames: list[str] | None = Field(
+        None, description="Folders of the sequence's frames in the rig's folder. Without it, all."
+    )
+    exports: list[str] | None = Field(
+        None,
+        description="The export.json of each export that the sequence shall have. Without this key "
+        "it may have any.",
+    )
+
+
 class PackSettings(Settings):
     """The settings of scripts/package.py and scripts/publish.py."""
 
@@ -156,6 +171,18 @@ class PackSettings(Settings):
     scene: Credits = Field(
         Credits(), description="What the card says of the scene, and what publishing needs."
     )
+
+    @classmethod
+    def given(cls, path: Path | None, scene_name: str, gigabytes: float | None) -> Self:
+        """Return the settings of the file ``path``. Without one, those that the flags give."""
+        if path:
+            return read_settings(cls, path)
+        return cls.of(scene=load_scene(scene_name), gigabytes=gigabytes)
+
+    @property
+    def most_bytes(self) -> float | None:
+        """The largest size of a part, or of a shard, in bytes. None without ``gigabytes``."""
+        return self.gigabytes and self.gigabytes * 1e9
 
 
 class SynthesisSettings(Settings):

@@ -84,7 +84,7 @@ class View:
 
     @property
     def split(self) -> str | None:
-        """What the view is for: ``train``, ``validate`` or ``test``; None if the file is silent."""
+        """What the view is for: ``train``, ``validation`` or ``test``. None without a split."""
         return self.others.get("split")
 
     @property

@@ -25,11 +25,12 @@ EXPORTS = (
     "dnerf",
     "neural_3d_video",
     "colmap_frames",
+    "multipleview",
     "scene_flow",
 )
 
 # Those of them that are made of a whole sequence.
-SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "scene_flow")
+SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview", "scene_flow")
 
 # The formats of model files that scripts/import_model.py reads.
 MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")

@@ -50,6 +50,14 @@ Text = Annotated[
 ]
 
 
+Ror = Annotated[
+    str,
+    Field(
+        pattern=pattern(r"^0[a-hj-km-np-tv-z0-9]{6}[0-9]{2}$", "an identifier such as 03f0f6041")
+    ),
+]
+
+
 class Creator(Settings):
     """A person or an organization that made a dataset."""
 
@@ -63,6 +71,9 @@ class Creator(Settings):
         description="ORCID of a person.",
     )
     affiliation: str | None = Field(None, description="Where a person works.")
+    ror: Ror | None = Field(
+        None, description="ROR of the organization, or of the place where a person works."
+    )
 
 
 # The licence may be that of the scene.
@@ -86,6 +97,13 @@ class Publication(Settings):
     url: Address | None = Field(None, description="The page on which the dataset will be found.")
     publisher: Text | None = Field(
         None, description="Who keeps the dataset: Zenodo, Hugging Face, a university."
+    )
+    publisher_url: Address | None = Field(None, description="The publisher's page.")
+    publisher_ror: Ror | None = Field(None, description="ROR of the publisher.")
+    contact: str | None = Field(
+        None,
+        pattern=pattern(r"^[^@\s]+@[^@\s]+$", "an e-mail address"),
+        description="E-mail address for questions about the dataset, which becomes public.",
     )
     date: Date | None = Field(None, description="The day of publication, as 2026-11-30.")
     limitations: Text | None = Field(None, description="What the dataset cannot show.")

@@ -137,8 +137,10 @@ def _pictures(path: Path) -> list[str]:
     return [name for name in _files(path) if name.endswith(".png")]
 
 
+# The exports with a folder of their own. Those of a sequence are in the rig's folder.
+IN_FOLDERS = Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=_files)
 MANIFESTS = [
     instant_ngp.MANIFEST,
-    Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=_files),
+    IN_FOLDERS,
     Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=_files),
 ]

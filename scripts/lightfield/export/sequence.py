@@ -112,4 +112,19 @@ class SourceSequence:
             views = [parts.test[0], *parts.train]
         digits = max(2, len(str(len(views) - 1)))
         names = {f"cam{number:0{digits}d}": view.name for number, view in enumerate(views)}
+        return self._renamed(names)
+
+    def training(self) -> "SourceSequence":
+        """Return the sequence of the views that train, named image1, image2 and so on.
+
+        Without a split, all views train. Raises `UserError` if none does.
+        """
+        views = sorted(self.lightfield.views, key=lambda view: view.name)
+        views = [view for view in views if view.split in (None, "train")]
+        if not views:
+            raise UserError(f"{self.lightfield.path}: frames: no view is left to train")
+        return self._renamed({f"image{n}": view.name for n, view in enumerate(views, 1)})
+
+    def _renamed(self, names: Mapping[str, str]) -> "SourceSequence":
+        """Return the sequence of these views alone: new names and the views'."""
         return replace(self, frames=[replace(frame, renamed=names) for frame in self.frames])

@@ -91,6 +91,8 @@ class Header:
     chromaticities: Chromaticities | None = None
 
 
+# Of 100. Most values are off by a level at most.
+JPEG_QUALITY = 98
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
@@ -229,6 +231,20 @@ def write_png(
         if not (file.open(str(temporary), spec) and file.write_image(pixels) and file.close()):
             raise OSError(file.geterror())
         _check_png(temporary)
+
+
+def write_jpeg(path: Path | str, pixels: np.ndarray[Any, Any]) -> None:
+    """Write sRGB pixels, (height, width, 3) uint8, atomically. Chroma has the full resolution."""
+    import OpenImageIO as oiio
+
+    height, width, count = pixels.shape
+    spec = oiio.ImageSpec(width, height, count, "uint8")
+    spec.attribute("Compression", f"jpeg:{JPEG_QUALITY}")
+    spec.attribute("jpeg:subsampling", "4:4:4")
+    with atomic_path(path) as temporary:
+        file = oiio.ImageOutput.create(str(temporary))
+        if not (file.open(str(temporary), spec) and file.write_image(pixels) and file.close()):
+            raise OSError(file.geterror())
 
 
 def _check_exr(path: Path) -> None:

@@ -5,7 +5,7 @@ Source: schema.datacite.org/meta/kernel-4.5.
 
 from typing import Any
 
-from lightfield.dataset.publication import Creator
+from lightfield.dataset.publication import Creator, Publication
 from lightfield.report.published import Published
 
 
@@ -17,7 +17,7 @@ def describe(published: Published) -> dict[str, Any]:
         "types": {"resourceType": "Light field", "resourceTypeGeneral": "Dataset"},
         "creators": [_creator(creator) for creator in published.creators],
         "titles": [{"title": published.title}],
-        "publisher": {"name": publication.publisher},
+        "publisher": _publisher(publication),
         "publicationYear": published.date[:4],
         "dates": [{"date": published.date, "dateType": "Issued"}],
         "url": publication.url,
@@ -50,6 +50,17 @@ def describe(published: Published) -> dict[str, Any]:
     return content
 
 
+def _publisher(publication: Publication) -> dict[str, Any]:
+    content: dict[str, Any] = {"name": publication.publisher}
+    if publication.publisher_ror:
+        content |= {
+            "publisherIdentifier": f"https://ror.org/{publication.publisher_ror}",
+            "publisherIdentifierScheme": "ROR",
+            "schemeUri": "https://ror.org",
+        }
+    return content
+
+
 def _creator(creator: Creator) -> dict[str, Any]:
     is_person = creator.type == "person"
     content: dict[str, Any] = {
@@ -64,6 +75,18 @@ def _creator(creator: Creator) -> dict[str, Any]:
                 "schemeUri": "https://orcid.org",
             }
         ]
+    ror = f"https://ror.org/{creator.ror}"
+    if creator.ror and not is_person:
+        content["nameIdentifiers"] = [
+            {"nameIdentifier": ror, "nameIdentifierScheme": "ROR", "schemeUri": "https://ror.org"}
+        ]
     if creator.affiliation:
-        content["affiliation"] = [{"name": creator.affiliation}]
+        affiliation = {"name": creator.affiliation}
+        if creator.ror:
+            affiliation |= {
+                "affiliationIdentifier": ror,
+                "affiliationIdentifierScheme": "ROR",
+                "schemeUri": "https://ror.org",
+            }
+        content["affiliation"] = [affiliation]
     return content

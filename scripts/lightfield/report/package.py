@@ -50,6 +50,8 @@ LOADERS = {
     "dnerf": "python train.py -s {} --configs arguments/dnerf/lego.py  # 4DGaussians",
     "neural_3d_video": "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians",
     "colmap_frames": "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians",
+    "multipleview": "python train.py -s {} --configs arguments/multipleview/default.py"
+    "  # 4DGaussians",
     "scene_flow": "import OpenEXR\nflow = OpenEXR.File('{}/{frame}/{view}.exr').channels()",
     "coco": "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')",
     "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",

@@ -10,6 +10,7 @@ from lightfield.core.files import write_json, write_text
 from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
+from lightfield.dataset.view_store import ViewStore
 from lightfield.report import croissant, datacite, hugging_face, package, ro_crate, shards
 from lightfield.report.published import Published
 from lightfield.validation.files import SUMS
@@ -38,7 +39,7 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
         name,
         scene,
         card,
-        LightField.read(folders[0] / NAME),
+        LightField.read(next(each for each in folders if (each / NAME).is_file()) / NAME),
         {split: package.listed(paths) for split, paths in written.items()},
         package.listed([output / shards.INDEX, rest]),
         ("json", *sorted(names)),
@@ -49,4 +50,8 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
     write_json(output / CROISSANT, croissant.describe(published))
     documents = package.listed([output / name for name in (CARD, CROISSANT, DATACITE)])
     write_json(output / RO_CRATE, ro_crate.describe(published, documents))
+    store = ViewStore.configured()
+    if store:
+        # The job declares the descriptions. Nobody knows before how many shards there will be.
+        store.put_list(output / RO_CRATE, [output / entry["file"] for entry in published.files])
     return published

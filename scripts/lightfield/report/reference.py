@@ -226,6 +226,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
+            Section("validate_sequence.py", job_settings.SequenceValidationSettings),
             Section("package.py and publish.py", job_settings.PackSettings),
             Section("package.py and publish.py: scene", config.Credits),
             Section("report_figures.py", job_settings.FiguresSettings),
@@ -287,7 +288,7 @@ PROGRAM_PAGES = {
     "programs-check.md": (
         "Programs that check",
         "These programs check files, and say how far a build is.",
-        ["validate", "verify", "status"],
+        ["validate", "validate_sequence", "verify", "status"],
     ),
     "programs-report.md": (
         "Programs that report",

@@ -6,9 +6,10 @@ made. Source: w3id.org/ro/crate/1.2.
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import quote
 
 from lightfield.dataset.keys import RENDER_VERSION
-from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE, Creator
+from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE, Creator, Publication
 from lightfield.report.published import Published
 from lightfield.report.shards import INDEX, OTHER_FILES
 
@@ -39,7 +40,11 @@ def describe(published: Published, documents: Sequence[Mapping[str, Any]]) -> di
     """
     publication = published.publication
     files = [_file(entry) for entry in (*published.files, *documents)]
-    creators = [_creator(number, creator) for number, creator in enumerate(published.creators, 1)]
+    creators = [
+        _creator(number, creator, publication.contact)
+        for number, creator in enumerate(published.creators, 1)
+    ]
+    publisher = _publisher(publication)
     settings = _settings(published)
     graph = [
         {
@@ -49,19 +54,18 @@ def describe(published: Published, documents: Sequence[Mapping[str, Any]]) -> di
             "conformsTo": {"@id": "https://w3id.org/ro/crate/1.2"},
             "about": {"@id": "./"},
         },
-        _root(published, files, creators),
+        _root(published, files, creators, publisher),
         {
             "@id": published.licence_url,
             "@type": "CreativeWork",
             "name": published.credits.data_licence,
             "description": "The licence of this dataset",
         },
-        {"@id": "#publisher", "@type": "Organization", "name": publication.publisher},
+        *_contextual(publication, creators, publisher),
         *(
             {"@id": address, "@type": "CreativeWork", "name": address}
             for address in publication.derived_from
         ),
-        *creators,
         *files,
         *_provenance(published, files, settings),
         *settings,
@@ -69,7 +73,59 @@ def describe(published: Published, documents: Sequence[Mapping[str, Any]]) -> di
     return {"@context": "https://w3id.org/ro/crate/1.2/context", "@graph": graph}
 
 
-def _root(published: Published, files: Sequence[Entity], creators: Sequence[Entity]) -> Entity:
+def _contextual(
+    publication: Publication, creators: Sequence[Entity], publisher: Entity
+) -> list[Entity]:
+    """Return the entities of creators, affiliations, publisher, contact and DOI, each once."""
+    entities = [publisher, *creators]
+    for creator in publication.creators or []:
+        if creator.affiliation:
+            entities.append(_organization(creator.affiliation, creator.ror))
+    if publication.contact:
+        entities.append(
+            {
+                "@id": f"mailto:{publication.contact}",
+                "@type": "ContactPoint",
+                "name": "Contact",
+                "contactType": "questions about the dataset",
+                "email": publication.contact,
+            }
+        )
+    if publication.doi:
+        address = f"https://doi.org/{publication.doi}"
+        entities.append(
+            {
+                "@id": address,
+                "@type": "PropertyValue",
+                "name": "DOI",
+                "propertyID": "https://registry.identifiers.org/registry/doi",
+                "value": f"doi:{publication.doi}",
+                "url": address,
+            }
+        )
+    return list({entity["@id"]: entity for entity in reversed(entities)}.values())[::-1]
+
+
+def _organization(name: str, ror: str | None) -> Entity:
+    """Return an organization. Its ROR, if it has one, is its identifier and its page."""
+    address = f"https://ror.org/{ror}"
+    content = {"@id": address if ror else f"#{quote(name)}", "@type": "Organization", "name": name}
+    return {**content, "url": address} if ror else content
+
+
+def _publisher(publication: Publication) -> Entity:
+    publisher = _organization(publication.publisher or "", publication.publisher_ror)
+    if publication.publisher_url:
+        publisher["url"] = publication.publisher_url
+    return publisher
+
+
+def _root(
+    published: Published,
+    files: Sequence[Entity],
+    creators: Sequence[Entity],
+    publisher: Entity,
+) -> Entity:
     publication = published.publication
     root = {
         "@id": "./",
@@ -78,35 +134,43 @@ def _root(published: Published, files: Sequence[Entity], creators: Sequence[Enti
         "description": published.credits.description,
         "datePublished": published.date,
         "license": {"@id": published.licence_url},
+        "author": _references(creators),
         "creator": _references(creators),
-        "publisher": {"@id": "#publisher"},
+        "publisher": {"@id": publisher["@id"]},
         "url": publication.url,
         "version": publication.version,
-        "keywords": publication.keywords,
+        "keywords": _compact(publication.keywords),
         "hasPart": _references(files),
         "mentions": {"@id": "#rendering"},
     }
     if publication.doi:
-        root["identifier"] = f"https://doi.org/{publication.doi}"
+        root["identifier"] = {"@id": f"https://doi.org/{publication.doi}"}
     if publication.derived_from:
-        sources = [{"@id": address} for address in publication.derived_from]
-        # The specification recommends no lists of one entry.
-        root["isBasedOn"] = sources if sources[1:] else sources[0]
+        root["isBasedOn"] = _compact([{"@id": address} for address in publication.derived_from])
     return root
 
 
-def _references(entities: Sequence[Entity]) -> list[Entity]:
-    return [{"@id": entity["@id"]} for entity in entities]
+def _references(entities: Sequence[Entity]) -> Any:
+    return _compact([{"@id": entity["@id"]} for entity in entities])
 
 
-def _creator(number: int, creator: Creator) -> Entity:
-    content: Entity = {
-        "@id": f"https://orcid.org/{creator.orcid}" if creator.orcid else f"#creator{number}",
-        "@type": "Person" if creator.type == "person" else "Organization",
-        "name": creator.name,
-    }
-    if creator.affiliation:
-        content["affiliation"] = creator.affiliation
+def _compact(values: Sequence[Any]) -> Any:
+    """Return a list of values. The specification recommends no lists of one: return its entry."""
+    return list(values) if len(values) > 1 else values[0]
+
+
+def _creator(number: int, creator: Creator, contact: str | None) -> Entity:
+    """Return a creator. The contact for questions is that of the first one."""
+    if creator.type == "person":
+        address = f"https://orcid.org/{creator.orcid}" if creator.orcid else f"#creator{number}"
+        content: Entity = {"@id": address, "@type": "Person", "name": creator.name}
+        if creator.affiliation:
+            organization = _organization(creator.affiliation, creator.ror)
+            content["affiliation"] = {"@id": organization["@id"]}
+    else:
+        content = _organization(creator.name, creator.ror)
+    if contact and number == 1:
+        content["contactPoint"] = {"@id": f"mailto:{contact}"}
     return content
 
 
@@ -160,8 +224,8 @@ def _provenance(
         "@id": "#rendering",
         "@type": "CreateAction",
         "name": "Rendering and packing of the views",
-        "instrument": [{"@id": name} for name in instruments],
-        "object": [{"@id": SCENE}, *_references(settings)],
+        "instrument": _compact([{"@id": name} for name in instruments]),
+        "object": _references([{"@id": SCENE}, *settings]),
         "result": _references(files),
     }
     return [action, *entities]

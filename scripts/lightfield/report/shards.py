@@ -19,6 +19,7 @@ from lightfield.core.files import atomic_path, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.names import VIEWS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report.package import add_entry, tar_size
 from lightfield.validation.files import (
     SUMS,
@@ -34,8 +35,6 @@ from lightfield.validation.files import (
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
-# The names of the parts of a split, as repositories of datasets have them.
-SPLIT_NAMES = {None: "train", "train": "train", "validate": "validation", "test": "test"}
 OTHER_FILES = "other_files"
 INDEX = "views.csv"
 
@@ -64,7 +63,7 @@ class Sample:
 class Dataset:
     """A finished dataset, or a frame of a sequence: its samples, and its files without a view.
 
-    The ``others`` have their paths in the package.
+    The ``others`` have their paths in the package. The exports of a whole sequence have no samples.
     """
 
     samples: Sequence[Sample]
@@ -79,6 +78,8 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
     if not (folder / SUMS).is_file():
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
     sums = read_sums(folder / SUMS)
+    if folder == root and NAME not in sums:
+        return Dataset([], _others(root, folder, [*sums, SUMS]))
     reprojections = sorted(Path(name).parent.name for name in sums if name.endswith(f"/{NAME}"))
     sets, checks = read_sets(folder, [name for name in reprojections if f"{name}/{NAME}" in sums])
     for check in checks:
@@ -91,19 +92,21 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
     for file in [*of_views(folder, sets)[0], *of_passes(folder, sets)[0]]:
         _add_file(samples, source, sets[file.set], file, folder, sums)
     taken = {path for sample in samples for path in sample.files.values()}
-    others = {
-        (folder / name).relative_to(root).as_posix(): folder / name
-        for name in (*sums, SUMS)
-        if folder / name not in taken
-    }
-    return Dataset(samples, others)
+    others = [name for name in (*sums, SUMS) if folder / name not in taken]
+    return Dataset(samples, _others(root, folder, others))
+
+
+def _others(root: Path, folder: Path, names: Iterable[str]) -> dict[str, Path]:
+    """Return files of a ``folder`` by their paths in the package's ``root``."""
+    return {(folder / name).relative_to(root).as_posix(): folder / name for name in names}
 
 
 def _sample(source: ImageSet, number: int, prefix: str) -> Sample:
     view = source.lightfield.views[number]
     # A dot would end the key.
     key = "_".join(filter(None, [prefix, view.name])).replace(".", "_")
-    split = SPLIT_NAMES[view.split]
+    # Without a split, all views may train.
+    split = view.split or "train"
     content = {"view": view.name, "split": split, "pictures": {}}
     return Sample(key, split, content)
 
@@ -159,7 +162,7 @@ def write_shards(
     progress = Progress(len(samples), name, "views")
     shards: dict[str, list[Path]] = {}
     rows = []
-    for split in dict.fromkeys(SPLIT_NAMES.values()):
+    for split in PARTS:
         of_split = [sample for sample in samples if sample.split == split]
         for number, part in enumerate(parts(of_split, most)):
             # mlcroissant takes tars with equal names for one, even of different datasets.

@@ -61,12 +61,18 @@ class Expected:
 
     @cached_property
     def views_of_other_rigs(self) -> dict[str, View]:
-        """The views of the scene's other rigs that are here, by the names <rig>_<view>."""
-        return {
-            f"{rig}_{view.name}": view
-            for rig, folder in self.other_rigs.items()
-            for view in _views(folder / self.image_set.name / NAME)
-        }
+        """The views of other rigs that test what these views train, by the names <rig>_<view>.
+
+        These are the rigs of which no view trains. A rig with test views of its own has none.
+        """
+        if any(view.split != "train" for view in self.image_set.lightfield.views):
+            return {}
+        views: dict[str, View] = {}
+        for rig, folder in self.other_rigs.items():
+            rig_views = _views(folder / self.image_set.name / NAME)
+            if all(view.split in ("validation", "test") for view in rig_views):
+                views |= {f"{rig}_{view.name}": view for view in rig_views}
+        return views
 
     @cached_property
     def other_rigs(self) -> dict[str, Path]:
@@ -158,7 +164,7 @@ def check(
             set_exports.append(SetExport(number, exported, cube is not None and cube.fits_depth))
             views += len(exported.views)
             problems += exported.faults
-            problems += _faults(exported, expected)
+            problems += faults(exported, expected)
             if cube and not cube.fits_depth:
                 problems += unit_cube.faults(cube, image_set.lightfield.matrices)
         if paths:
@@ -171,7 +177,7 @@ def check(
     return checks, set_exports
 
 
-def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
+def faults(exported: Exported, expected: Expected) -> Iterator[str]:
     """Yield how an export differs from lightfield.json."""
     lens = expected.image_set.lightfield.lens
     lens_faults: dict[Camera, str | None] = {}

@@ -314,7 +314,7 @@ def of_exports(
             for path in set_lists:
                 lists.append(path.relative_to(dataset).as_posix())
                 try:
-                    listed = _listed_files(dataset, path, manifest)
+                    listed = listed_files(dataset, path, manifest)
                 except UserError as error:
                     problems.append(str(error).replace(f"{dataset}/", ""))
                     continue
@@ -339,7 +339,7 @@ def of_exports(
 
 
 @dataclass(frozen=True)
-class _ListedFiles:
+class ListedFiles:
     """The files that an export's list names, relative to the dataset, and what is wrong there."""
 
     pictures: list[Path] = field(default_factory=list)
@@ -347,12 +347,12 @@ class _ListedFiles:
     problems: list[str] = field(default_factory=list)
 
 
-def _listed_files(dataset: Path, path: Path, manifest: Manifest) -> _ListedFiles:
+def listed_files(dataset: Path, path: Path, manifest: Manifest) -> ListedFiles:
     """Read an export's list. Raises `UserError` if it is not a list of this kind."""
     named_pictures = manifest.pictures(path)
     sums = manifest.files(path)
     list_name = path.relative_to(dataset).as_posix()
-    listed = _ListedFiles()
+    listed = ListedFiles()
     for name in named_pictures:
         target = (path.parent / name).resolve()
         if target.is_file() and target.is_relative_to(dataset):

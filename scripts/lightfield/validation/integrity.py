@@ -31,6 +31,8 @@ from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
+# The folder of a sequence's frame.
+_FRAME = re.compile(r"f\d{5,7}")
 # Records of past work. Nothing can make them again, and no dataset needs them.
 _HISTORY = (JOURNAL_SUFFIX, ".tsv")
 
@@ -61,7 +63,11 @@ def file_problem(path: Path, digest: str, source: str) -> str | None:
 
 
 class Integrity:
-    """Checks the files of a dataset. With the folder ``work``, also those that it was made from."""
+    """Checks the files of a dataset. With the folder ``work``, also those that it was made from.
+
+    The folder may also be that of a sequence. Then only the exports of the whole sequence count,
+    because each frame is a dataset of its own.
+    """
 
     def __init__(self, dataset: Path, work: Path | None = None) -> None:
         # The ledger has paths as the configuration gives them, most of them relative.
@@ -69,11 +75,24 @@ class Integrity:
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
         folder = absolute_path(dataset)
-        depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
+        depth = 3 if _FRAME.fullmatch(folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
         # Beside the folders of the scene's rigs.
         self._splits = Path(os.path.relpath(folder.parents[depth - 2] / SPLITS))
+
+    @property
+    def frames(self) -> list[Path]:
+        """The folders of a sequence's frames. Empty for a dataset."""
+        if _FRAME.fullmatch(self.dataset.name) or (self.dataset / NAME).exists():
+            return []
+        folders = sorted(path.parent for path in self.dataset.glob(f"f[0-9]*/{NAME}"))
+        return [folder for folder in folders if _FRAME.fullmatch(folder.name)]
+
+    @property
+    def is_sequence(self) -> bool:
+        """Whether the folder is that of a sequence."""
+        return bool(self.frames)
 
     def faults(self) -> Iterator[Fault]:
         """Yield every fault, one for each file."""
@@ -202,13 +221,22 @@ class Integrity:
     def _belongs_here(self, path: Path) -> bool:
         """Return whether a file of the ledger belongs to the dataset, or to its scene."""
         if path.is_relative_to(self.dataset) or path == self._splits:
-            return True
+            return not self._is_of_frame(path, self.dataset)
         if not self.work or not path.is_relative_to(self.work):
             return False
         inside = path.relative_to(self.work).as_posix()
         scene, _, name_in_scene = inside.partition("/")
         is_of_scene = "/" not in name_in_scene and f"{self._scene}_".startswith(f"{scene}_")
+        for folder in (self.work / self._name, self.work / "benchmarks" / self._name):
+            if self._is_of_frame(path, folder):
+                return False
         return is_of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
+
+    def _is_of_frame(self, path: Path, folder: Path) -> bool:
+        """Return whether a file is of a frame, if ``folder`` is that of a sequence."""
+        if not path.is_relative_to(folder) or path == folder:
+            return False
+        return bool(_FRAME.fullmatch(path.relative_to(folder).parts[0]))
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files. Those of its report only with a ledger, which lists them."""
@@ -217,7 +245,8 @@ class Integrity:
             is_addition = parts in ((SUMS,), (CARD,), (README,))
             # A folder may have taken a picture's place.
             is_file = not path.is_dir() or path.suffix in (".exr", ".png")
-            if is_file and not is_addition and (self._ledger or parts[0] != REPORT):
+            is_own = not _FRAME.fullmatch(parts[0]) and (self._ledger or parts[0] != REPORT)
+            if is_file and is_own and not is_addition:
                 yield path
 
     def _required_views(self, present: set[Path]) -> set[Path]:
@@ -238,6 +267,8 @@ class Integrity:
         """Check that sums, validation and lightfield.json agree on which files exist."""
         sums = self.dataset / SUMS
         validation = self.dataset / "validation.json"
+        if self.is_sequence and not expected and not any(self._present()):
+            return  # The sequence has no exports.
         if self._ledger and not self._published:
             return  # The build is unfinished, or both lists of sums are damaged: already reported.
         if not self._published:
@@ -245,12 +276,13 @@ class Integrity:
                 sums, broken(sums) or ("has no checksum" if sums.exists() else "is missing")
             )
             return
-        for path in (validation, self.dataset / NAME):
+        required = [validation] if self.is_sequence else [validation, self.dataset / NAME]
+        for path in required:
             if path not in expected:
                 yield Fault(sums, f"has no checksum of {path.name}")
                 return
         try:
-            views = LightField.read(self.dataset / NAME).views
+            views = [] if self.is_sequence else LightField.read(self.dataset / NAME).views
             if not read_json(validation).get("valid"):
                 yield Fault(validation, "says that the dataset is not valid")
         except UserError:

@@ -9,9 +9,14 @@ A reader shares no code with the writer of its format in `lightfield.export`. It
 
 It returns `contents.Exported`, in the axes and metres of lightfield.json. It raises `UserError` for
 a file that its consumer could not open.
+
+A reader of an export of a sequence also takes the frames: the numbers of the animation's frames by
+the names of their folders. It returns `contents.Exported` for each frame.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
@@ -19,18 +24,23 @@ from lightfield.dataset.exports import MANIFEST
 from lightfield.validation.readers import (
     coco,
     colmap,
+    colmap_frames,
+    dnerf,
     hci,
     instant_ngp,
     lichtfeld,
     mesh,
     miv,
+    multipleview,
     ncore,
     nerf_synthetic,
     nerfstudio,
+    neural_3d_video,
     opendibr,
     point_cloud,
     poses_csv,
     scannetpp,
+    scene_flow,
 )
 from lightfield.validation.readers.contents import Exported
 
@@ -51,6 +61,15 @@ READERS = {
 }
 
 
+SEQUENCE_READERS = {
+    "colmap_frames": colmap_frames.read,
+    "dnerf": dnerf.read,
+    "multipleview": multipleview.read,
+    "neural_3d_video": neural_3d_video.read,
+    "scene_flow": scene_flow.read,
+}
+
+
 def read(path: Path, size: tuple[int, int]) -> Exported:
     """Read the export that a transforms.json or an export.json lists.
 
@@ -59,11 +78,29 @@ def read(path: Path, size: tuple[int, int]) -> Exported:
     """
     if path.name != MANIFEST:
         return instant_ngp.read(path)
+    name, options = _format_and_options(path, READERS)
+    with reading(path, f"list of an export for {name}"):
+        return READERS[name](path, size, options)
+
+
+def read_sequence(
+    path: Path, size: tuple[int, int], frames: Mapping[str, int]
+) -> tuple[str, list[Exported]]:
+    """Read the export of a sequence that an export.json lists. Return its format and its frames.
+
+    ``frames`` are the numbers of the animation's frames by the names of their folders, in order.
+    Raises `UserError` for an export that its consumer could not open.
+    """
+    name, options = _format_and_options(path, SEQUENCE_READERS)
+    with reading(path, f"list of an export for {name}"):
+        return name, SEQUENCE_READERS[name](path, size, options, frames)
+
+
+def _format_and_options(path: Path, readers: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     with reading(path, "list of an export"):
         content = read_json(path)
         name = str(content["format"])
         options = dict(content["options"])
-    if name not in READERS:
-        raise UserError(f"{path}: format: is {name!r}; must be of {', '.join(READERS)}")
-    with reading(path, f"list of an export for {name}"):
-        return READERS[name](path, size, options)
+    if name not in readers:
+        raise UserError(f"{path}: format: is {name!r}; must be of {', '.join(readers)}")
+    return name, options

@@ -136,8 +136,8 @@ def read_model(folder: Path, suffix: str) -> Model:
     return Model(folder, suffix, cameras, images, points)
 
 
-def exported_model(model: Model, pictures: Path) -> Exported:
-    """Return what a model says of the images in the folder ``pictures``."""
+def exported_model(model: Model, pictures: Path | None) -> Exported:
+    """Return what a model says of the images in the folder ``pictures``, if they have one."""
     exported = Exported()
     cameras_file = model.file("cameras")
     images_file = model.file("images")
@@ -151,7 +151,7 @@ def exported_model(model: Model, pictures: Path) -> Exported:
         numbers_so_far.add(image.number)
         if image.camera not in model.cameras:
             exported.faults.append(f"{images_file}: {place}: has no camera {image.camera}")
-        if not (pictures / image.name).is_file():
+        if pictures and not (pictures / image.name).is_file():
             exported.faults.append(f"{images_file}: {place}: {image.name} is not a file")
         matrix = np.eye(4)
         matrix[:3, :3] = image.rotation.T @ _FLIP

@@ -94,6 +94,14 @@ class Cloud:
 
 
 @dataclass(frozen=True)
+class Flow:
+    """An image of a view's scene flow: X, Y, Z in metres, and V, which is 1 where it is known."""
+
+    path: Path
+    view: str
+
+
+@dataclass(frozen=True)
 class UnitCube:
     """How instant-ngp maps rotated world points into its unit cube: times ``scale`` + ``offset``.
 
@@ -113,7 +121,8 @@ class UnitCube:
 class Exported:
     """One export.
 
-    ``views_of`` names the part of the split whose views it holds. None for all views. ``faults``
+    ``views_of`` names the part of the split whose views it holds. None for all views. ``flows`` is
+    None for an export without flow. ``faults``
     are lines about contradictions in its files, and with what its consumer needs. Each line names
     the file.
     """
@@ -125,6 +134,7 @@ class Exported:
     ranges: list[DepthRange] = field(default_factory=list)
     depth_map: DepthMap | None = None
     clouds: list[Cloud] = field(default_factory=list)
+    flows: list[Flow] | None = None
     cube: UnitCube | None = None
     faults: list[str] = field(default_factory=list)
 

@@ -1,0 +1,48 @@
+"""Writes a sequence as 4DGaussians reads its own recordings, which it calls MultipleView.
+
+- ``cam01/frame_00001.jpg`` and so on: the frames of each camera.
+- ``sparse_/``: a binary COLMAP model. Its image1 has the pose of cam01.
+- ``points3D_multipleview.ply``: points of the first frame.
+- ``poses_bounds_multipleview.npy``: LLFF's poses, around which 4DGaussians draws a video.
+
+4DGaussians trains on all frames of all cameras, so views that do not train are left out. Source:
+multipleview_dataset.py and dataset_readers.py of 4DGaussians.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import MultipleView
+from lightfield.export.colmap import Model
+from lightfield.export.llff import depths, write_poses_bounds
+from lightfield.export.points import Observations, lift, write_ply
+from lightfield.export.sequence import SourceSequence
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+
+
+def export(source: SourceSequence, settings: MultipleView, folder: Path) -> None:
+    """Write a sequence into ``folder``."""
+    source.require_still_cameras()
+    sequence = source.training()
+    lens = source.lens
+    assert isinstance(lens, Rectilinear)
+    first = sequence.frames[0]
+    views = first.lightfield.views
+    points = lift(first, count=settings.points)
+    unseen = Observations(np.empty(0, np.intp), np.empty((0, 2)))
+    model = Model(first, points, [unseen for _ in views], np.empty(0, np.intp))
+    model.write_binary(folder / "sparse_")
+    write_ply(folder / "points3D_multipleview.ply", points)
+    seen_depths = {view.name: [depths(lens, view, s)] for view, s in first.surfaces(views)}
+    path = folder / "poses_bounds_multipleview.npy"
+    write_poses_bounds(path, lens, views, seen_depths)
+    progress = Progress(len(sequence.frames), "multipleview", "frames")
+    for number, frame in enumerate(sequence.frames, 1):
+        for view in frame.lightfield.views:
+            camera = view.name.removeprefix("image").zfill(2)
+            picture = folder / f"cam{camera}" / f"frame_{number:05d}.jpg"
+            images.write_jpeg(picture, frame.colour(view))
+        progress.done()
