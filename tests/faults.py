@@ -15,6 +15,7 @@ CUBOID, PLANE, LATTICE = (
     f"smoke/{rig}" for rig in ("LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos")
 )
 HDR = f"results/{CUBOID}/perspective_hdr"
+NCORE = f"{HDR}/exports/ncore/views.ncore4.zarr/cameras/camera/frames"
 
 # For each kind: a file of the build, and another file that it may be swapped with.
 KINDS = {
@@ -106,6 +107,8 @@ KINDS = {
         f"work/benchmarks/{LATTICE}/render/0-2.tsv",
     ),
     "log": (f"work/logs/{PLANE}/render/0-6.log", f"work/logs/{LATTICE}/render/0-2.log"),
+    "array of a Zarr store": (f"{NCORE}/0/image/0", f"{NCORE}/1000000/image/0"),
+    "metadata of a Zarr store": (f"{NCORE}/0/image/.zarray", f"{NCORE}/.zattrs"),
 }
 
 

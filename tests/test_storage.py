@@ -196,7 +196,8 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
 
-    for path in ("results/modelled/LFPair", PUBLISHED):
+    frames = [f"results/modelled/LFPair/f{number:05}" for number in (1, 2)]
+    for path in (*frames, "results/modelled/LFPair", PUBLISHED):
         run_program("take_dataset.py", "--store", folder, path, cwd=tmp_path)
     rig = tmp_path / "results/modelled/LFPair"
     assert list(Integrity(rig).faults()) == []
