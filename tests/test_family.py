@@ -139,13 +139,20 @@ def test_a_new_seed_changes_one_batch_and_a_new_model_too(tmp_path, monkeypatch)
     assert sum(before[name] != members for name, members in after.items()) == 1
 
 
+def test_all_members_show_the_place_that_the_yaml_names():
+    scene = {"builder": "room", "parameters": {"place": 3}}
+    member = family(seeds="7-7").members()[0]
+    made = member_content({"scene": scene, "family": {"seeds": "7-7"}}, member, {})
+    assert made["scene"]["parameters"] == {"place": 3, "seed": 7}
+
+
 def test_a_member_gets_its_seed_and_values_and_the_familys_yaml_stays_as_it_is():
     content = {"scene": {"builder": "room"}, "render": {"samples": 4}, "family": {"seeds": "0-9"}}
     before = json.dumps(content)
     member = family(seeds="7-7").members()[0]
     values = {"render.samples": 2, "rigs.LF.camera.fov": 60}
     made = member_content(content, member, values)
-    assert made["scene"] == {"builder": "room", "parameters": {"seed": 7}}
+    assert made["scene"] == {"builder": "room", "parameters": {"seed": 7, "place": 7}}
     assert made["render"]["samples"] == 2
     assert made["rigs"]["LF"]["camera"]["fov"] == 60
     assert "family" not in made

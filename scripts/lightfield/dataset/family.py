@@ -89,7 +89,8 @@ class Family(Settings):
     seeds: str | None = Field(
         None,
         pattern=pattern(r"^\d{1,9}-\d{1,9}$", "the first and the last seed, such as 0-999"),
-        description="The first and the last seed of the members. A builder takes them.",
+        description="The first and the last seed of the members. The builder takes a member's seed, "
+        "and lays out the place of that number, unless scene.parameters.place is given.",
     )
     models: str | None = Field(
         None,
@@ -194,9 +195,18 @@ def member_content(
         _set(scene_yaml, "scene.model", member.model)
     else:
         _set(scene_yaml, "scene.parameters.seed", member.seed)
+        if not _has_place(scene_yaml):
+            _set(scene_yaml, "scene.parameters.place", member.seed)
     for key, value in values.items():
         _set(scene_yaml, key, copy.deepcopy(value))
     return scene_yaml
+
+
+def _has_place(content: Mapping[str, Any]) -> bool:
+    """Return whether a scene YAML says itself which of its builder's places it shows."""
+    scene = content.get("scene")
+    parameters = scene.get("parameters") if isinstance(scene, Mapping) else None
+    return isinstance(parameters, Mapping) and "place" in parameters
 
 
 def _set(content: dict[str, Any], key: str, value: Any) -> None:
