@@ -339,3 +339,8 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     assert "5 of 5 members of rooms built" in run.stderr
     assert times == {name: (members / name / "member.json").stat().st_mtime_ns for name in times}
     assert view.read_bytes() == content
+    corpus = json.loads((members / "corpus.json").read_text())
+    assert [member["state"] for member in corpus["members"]] == ["valid"] * 5
+    assert len([*(members / "thumbnails").iterdir()]) == 5
+    found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stdout
