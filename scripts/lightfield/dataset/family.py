@@ -89,8 +89,8 @@ class Family(Settings):
     seeds: str | None = Field(
         None,
         pattern=pattern(r"^\d{1,9}-\d{1,9}$", "the first and the last seed, such as 0-999"),
-        description="The first and the last seed of the members. The builder takes a member's seed, "
-        "and lays out the place of that number, unless scene.parameters.place is given.",
+        description="The first and the last seed of the members. The builder takes a member's "
+        "seed, and lays out the place of that number, unless scene.parameters.place is given.",
     )
     models: str | None = Field(
         None,

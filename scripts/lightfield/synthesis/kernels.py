@@ -245,18 +245,26 @@ def _draw_triangle(
                 continue
             w0, w1, w2 = max(w0, zero), max(w1, zero), max(w2, zero)
             part = one / (w0 + w1 + w2)
-            w0, w1, w2 = w0 * part, w1 * part, w2 * part
+            weights = (w0 * part, w1 * part, w2 * part)
             j = column % width if wraps else column
-            nearness = w0 * values[a, 0] + w1 * values[b, 0] + w2 * values[c, 0]
-            if nearness > inverse[i, j]:
-                inverse[i, j] = nearness
-                for k in range(3):
-                    drawn[i, j, k] = (
-                        w0 * values[a, k + 1] + w1 * values[b, k + 1] + w2 * values[c, k + 1]
-                    )
-                certainty = w0 * values[a, 4] + w1 * values[b, 4] + w2 * values[c, 4]
-                worth = w0 * values[a, 5] + w1 * values[b, 5] + w2 * values[c, 5]
-                drawn[i, j, 3] = _signed_weight(certainty, worth)
+            _draw_pixel(i, j, values, corners, weights, inverse, drawn)
+
+
+@kernel
+def _draw_pixel(
+    i: int, j: int, values: Array, corners: Any, weights: Any, inverse: Array, drawn: Array
+) -> None:
+    """Draw a triangle's pixel unless something nearer is drawn. ``weights`` are its corners'."""
+    a, b, c = corners
+    w0, w1, w2 = weights
+    nearness = w0 * values[a, 0] + w1 * values[b, 0] + w2 * values[c, 0]
+    if nearness > inverse[i, j]:
+        inverse[i, j] = nearness
+        for k in range(3):
+            drawn[i, j, k] = w0 * values[a, k + 1] + w1 * values[b, k + 1] + w2 * values[c, k + 1]
+        certainty = w0 * values[a, 4] + w1 * values[b, 4] + w2 * values[c, 4]
+        worth = w0 * values[a, 5] + w1 * values[b, 5] + w2 * values[c, 5]
+        drawn[i, j, 3] = _signed_weight(certainty, worth)
 
 
 @kernel

@@ -92,7 +92,6 @@ def validate(
     export_checks, set_exports = exported_cameras.check(dataset, sets, manifests, export_lists)
     checks += export_checks
     images = views + passes + extras
-    processes = min(processes, _worthwhile_processes(dataset, images))
     facts, image_checks = _check_images(
         dataset, sets, images, presence_checks, set_exports, volumes, processes
     )
@@ -157,6 +156,7 @@ def _check_images(
     The check of ``presence_checks`` for a set comes before the others of that set.
     """
     checks = []
+    processes = min(processes, _worthwhile_processes(dataset, images))
     exported_depth = ExportedDepth(dataset, sets, set_exports)
     with _workers(Examiner(dataset, sets), processes) as parallel_map:
         facts = _read_images(dataset, images, exported_depth, parallel_map)
