@@ -61,9 +61,11 @@ docs: .venv-docs/complete
 	.venv-docs/bin/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
-# Builds that are killed, damaged and left with full disks.
+# Builds that are killed, damaged and left with full disks; then a family of 200 models, some broken.
 soak: .venv/complete
 	python benchmarks/soak.py
+	rm -rf work/soak
+	python benchmarks/corpus.py --output work/soak --views 4 --samples 1
 
 # PYTHON names an interpreter. Without it, envs/find_python.sh chooses one.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt

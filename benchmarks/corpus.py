@@ -115,7 +115,7 @@ def problems(build: Build, expected: dict[str, Any], kills: int) -> list[str]:
     """Return what is wrong with a finished corpus."""
     content = read_json(build.root / RESULTS / "corpus.json")
     states = {Path(member["model"]).name: member["state"] for member in content["members"]}
-    found = [
+    faults = [
         f"{name}: is {states.get(name, 'missing')}, but it is {entry['kind']}"
         for name, entry in expected.items()
         if states.get(name) != ("valid" if entry["renders"] else "failed")
@@ -124,8 +124,8 @@ def problems(build: Build, expected: dict[str, Any], kills: int) -> list[str]:
     # Failed members are tried again with their batch. They cost little.
     repeated = [name for name, times in build.begun().items() if times > 1 and name in valid]
     if len(repeated) > kills * build.cores:
-        found.append(f"built more than once: {', '.join(repeated)}")
-    return found + [str(fault) for fault in corpus_faults(build.root / RESULTS)]
+        faults.append(f"built more than once: {', '.join(repeated)}")
+    return faults + [str(fault) for fault in corpus_faults(build.root / RESULTS)]
 
 
 def stage_seconds(build: Build) -> dict[str, float]:

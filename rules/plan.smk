@@ -58,10 +58,11 @@ rule plan:
         datasets=" ".join(
             f"--dataset {name} {frames} {probe}" for name, frames, probe in probes()
         ),
+        families=shlex.join(f"--family={folder}" for folder in FAMILY_FOLDERS),
         advice=advice_arguments(),
         table=f"{RESULTS}/tables/plan.md",
     message:
         "Adding up the time and size of the chosen datasets"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} {params.advice} --output {params.table} > {log} 2>&1"
+        " {params.datasets} {params.families} {params.advice} --output {params.table} > {log} 2>&1"

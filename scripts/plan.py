@@ -30,12 +30,19 @@ def main() -> None:
         metavar=("NAME", "JSON"),
         help="scene/rig, and the JSON that scripts/try_changes.py wrote for its scene",
     )
+    parser.add_argument(
+        "--family", action="append", default=[], metavar="NAME", help="a family of scenes"
+    )
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
     from lightfield.measurement import plan
 
+    for name in arguments.family:
+        print(f"{name}: its members are not probed; snakemake -n estimates them")
+    if arguments.family and not arguments.dataset:
+        return
     if not arguments.dataset:
         raise UserError("the views of all chosen datasets exist already: nothing is rendered")
     probes = [

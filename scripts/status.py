@@ -19,13 +19,32 @@ def main() -> None:
         "--dataset",
         action="append",
         nargs=3,
-        required=True,
+        default=[],
         metavar=("NAME", "VIEWS", "REPROJECTIONS"),
         help="scene/rig, its number of views, and its reprojections, separated by commas",
+    )
+    parser.add_argument(
+        "--family",
+        action="append",
+        nargs=2,
+        default=[],
+        metavar=("NAME", "MEMBERS"),
+        help="folder of a family of scenes, and the number of its members",
     )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.report import status
+
+    for name, count in arguments.family:
+        members = counted("--family", count)
+        print(status.of_family(name, arguments.results / name, members))
+    if arguments.dataset:
+        print_datasets(arguments)
+
+
+def print_datasets(arguments: argparse.Namespace) -> None:
+    """Print the progress of each dataset and of all together."""
     from lightfield.report import status
 
     now = time.time()

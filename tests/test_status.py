@@ -223,3 +223,17 @@ def test_a_record_lists_finished_views_until_a_file_is_lost(dataset):
     dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
     os.utime(record, (1, 1))
     assert dataset()[1].startswith("  rendered: 1 of 4")
+
+
+def test_a_familys_members_are_counted_by_their_state(tmp_path, monkeypatch, capsys):
+    failure = {"stage": "import_model", "cause": "it is empty", "log": "work/chairs/b/member.log"}
+    states = {"a": {"state": "valid"}, "b": {"state": "failed", "failure": failure}}
+    for name, state in states.items():
+        record = {"format": "plenoforge member", "name": name, "key": "0" * 64, "values": {}}
+        record |= {"model": f"models/{name}.glb", "datasets": {}, **state}
+        (tmp_path / "chairs" / name).mkdir(parents=True)
+        files.write_json(tmp_path / "chairs" / name / "member.json", record)
+    folders = ("--results", str(tmp_path), "--work", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["status.py", *folders, "--family", "chairs", "5"])
+    status.main()
+    assert capsys.readouterr().out == "chairs: 1 of 5 members built, 1 failed\n"

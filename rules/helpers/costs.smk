@@ -21,9 +21,12 @@ def full_size(dataset):
 
 
 def status_arguments():
-    """Return the arguments that name each chosen dataset to scripts/status.py."""
+    """Return the arguments that name each chosen dataset and family to scripts/status.py."""
     arguments = []
     for dataset in CHOSEN:
         reprojections = ",".join(dataset.reprojections)
         arguments += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
+    for folder in FAMILY_FOLDERS:
+        members = sum(map(len, batches_of(folder).values()))
+        arguments += ["--family", folder, str(members)]
     return shlex.join(arguments)

@@ -7,6 +7,7 @@ lightfield.json. A reprojected view counts if it is no older than its source.
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +15,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
 from lightfield.core.progress import duration
 from lightfield.dataset import journal, keys, shard_files
+from lightfield.dataset.family import RECORD
 from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.dataset.member_record import read_member
 from lightfield.imaging import images
 from lightfield.validation.files import IMAGES
 
@@ -22,6 +25,18 @@ from lightfield.validation.files import IMAGES
 WINDOW = 600.0
 # A process on another machine counts as dead after this many silent seconds.
 SILENCE = 3600.0
+
+
+def of_family(name: str, folder: Path, count: int) -> str:
+    """Return the progress of a family of ``count`` members, whose folders are in ``folder``."""
+    states = []
+    for record in folder.glob(f"*/{RECORD}"):
+        # A build may remove it meanwhile. A damaged one counts as missing.
+        with suppress(UserError):
+            states.append(read_member(record.parent).state)
+    failed = states.count("failed")
+    failures = f", {failed} failed" if failed else ""
+    return f"{name}: {states.count('valid')} of {count} members built{failures}"
 
 
 @dataclass
