@@ -44,10 +44,6 @@ KINDS = {
         f"work/{LATTICE}/render/0-2.journal.jsonl",
     ),
     "view": (f"results/{CUBOID}/exr/view_b0000f.exr", f"results/{CUBOID}/exr/view_f0000f.exr"),
-    "light group": (
-        f"results/{CUBOID}/Combined_lamp/view_b0000f.exr",
-        f"results/{CUBOID}/Combined_lamp/view_f0000f.exr",
-    ),
     "reprojected PNG": (
         f"results/{CUBOID}/perspective/view_l0000f.png",
         f"results/{CUBOID}/perspective/view_r0000f.png",

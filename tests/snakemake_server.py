@@ -30,7 +30,7 @@ def run(arguments, folder, env=None, merge_outputs=False, prefix=()):
         files = [f"/proc/{os.getpid()}/fd/{file.fileno()}" for file in (stdout, stderr)]
         request = {
             "arguments": [str(argument) for argument in arguments],
-            "folder": str(folder),
+            "folder": str(Path(folder).absolute()),
             "env": os.environ | (env or {}),
             "stdout": files[0],
             "stderr": None if merge_outputs else files[1],

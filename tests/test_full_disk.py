@@ -52,9 +52,8 @@ def write_plot(path, seed):
 
 def write_page(path, seed):
     keys = ("rig", "link", "resolution", "lens", "projection", "state", "picture")
-    page.write(
-        path, "index.html.j2", datasets=[dict.fromkeys(keys) | {"scene": "a", "views": seed}]
-    )
+    datasets = [dict.fromkeys(keys) | {"scene": "a", "views": seed}]
+    page.write(path, "index.html.j2", datasets=datasets, families=[])
 
 
 def write_json(path, seed):

@@ -59,10 +59,7 @@ def test_lightfield_and_views_name_the_machine_with_cycles_own_instructions(
     (dataset, *_) = scene_datasets("smoke", limits=Preset(resolution=16, samples=1))
     settings = tmp_path / "settings.json"
     write_json(settings, LightfieldSettings.of_capture(dataset).as_json())
-    inventory = tmp_path / "inventory.json"
-    write_json(inventory, {"emitters": ["lamp"]})
-    capture = ("--settings", settings, "--inventory", inventory)
-    run_program("make_lightfield.py", *capture, "--output", written)
+    run_program("make_lightfield.py", "--settings", settings, "--output", written)
     arguments = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
     run_program("render_shard.py", *arguments, "--output", tmp_path / "exr")
     (view,) = (tmp_path / "exr").iterdir()
