@@ -33,7 +33,7 @@ pytestmark = [
 def slower_checkout(folder: Path) -> Path:
     """Return a checkout whose views take seconds, so that a test can stop a shard between them."""
     path = checkout(folder) / "configs/scenes/smoke.yaml"
-    path.write_text(path.read_text().replace("samples: 4\n", "samples: 60\n"))
+    path.write_text(path.read_text().replace("samples: 4\n", "samples: 120\n"))
     return folder
 
 
