@@ -56,7 +56,7 @@ rule status:
     params:
         results=RESULTS,
         work=WORK,
-        datasets=status_arguments(),
+        datasets=lambda wildcards: status_arguments(),
     message:
         "Looking at the progress of the chosen datasets"
     shell:

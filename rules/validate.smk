@@ -107,7 +107,7 @@ rule verify:
     log:
         log_of("verify"),
     params:
-        folders=shlex.join(verified_folders()),
+        folders=lambda wildcards: shlex.join(verified_folders()),
         work=WORK,
     message:
         "Checking every byte of the chosen datasets"

@@ -1,6 +1,6 @@
 """Check the exports of a whole sequence: that each frame has its own cameras, depth and time.
 
-Prints a line for each failure; then the exit status is 1. For a valid sequence, --output writes
+Prints a line for each failure. The exit status is then 1. For a valid sequence, --output writes
 validation.json, and --sums the checksums of the exports. The frames are datasets of their own,
 which validate.py checks.
 

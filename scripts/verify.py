@@ -12,7 +12,6 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys
 
 
 def main() -> None:
@@ -77,11 +76,11 @@ def main() -> None:
 
 def member_datasets(folder: Path) -> list[Path]:
     """Return the datasets of the members of a family in ``folder``. Empty for a dataset."""
-    datasets: list[Path] = []
-    for record in sorted(folder.glob("*/member.json")):
-        rigs = read_keys(record, "build_members.py", "datasets")["datasets"]
-        datasets += [record.parent / rig for rig in rigs]
-    return datasets
+    from lightfield.dataset.member_record import read_members
+
+    return [
+        folder / member.name / rig for member in read_members(folder) for rig in member.datasets
+    ]
 
 
 if __name__ == "__main__":

@@ -17,6 +17,11 @@ THUMBNAILS = "thumbnails"
 SHARDS = "shards"
 
 
+def evenly_spread(text: str) -> float:
+    """Return a number from 0 to below 1 that follows from a text. Texts spread evenly."""
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6]) / 2**48
+
+
 class Shares(Settings):
     """The shares of the members that validate and test. All others train."""
 
@@ -34,8 +39,7 @@ class Shares(Settings):
 
     def part_of(self, name: str) -> Part:
         """Return the part of a member. It depends on the name alone, so new members change none."""
-        # Evenly spread from 0 to 1.
-        position = int.from_bytes(hashlib.sha256(name.encode()).digest()[:6]) / 2**48
+        position = evenly_spread(name)
         if position < self.test:
             return "test"
         return "validation" if position < self.test + self.validation else "train"

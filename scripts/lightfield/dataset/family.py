@@ -19,9 +19,9 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE
+from lightfield.core.files import DAMAGE, size_and_time
 from lightfield.core.settings import Settings, as_list, pattern
-from lightfield.dataset.corpus import CorpusOptions
+from lightfield.dataset.corpus import CorpusOptions, evenly_spread
 from lightfield.dataset.names import MODELS
 
 # Planning more members would take minutes.
@@ -221,8 +221,7 @@ def _set(content: dict[str, Any], key: str, value: Any) -> None:
 
 def _part(*names: str) -> float:
     """Return a number from 0 to below 1 that follows from some names."""
-    digest = hashlib.sha256(json.dumps(names).encode()).digest()
-    return int.from_bytes(digest[:6], "big") / 2**48
+    return evenly_spread(json.dumps(names))
 
 
 def _models(glob_pattern: str) -> dict[str, str]:
@@ -273,7 +272,7 @@ def outdated_members(record: Path, folder: Path) -> bool:
     try:
         content = json.loads(record.read_bytes())
         for path, stamp in content["sources"].items():
-            if _size_and_time(path) != stamp:
+            if size_and_time(path) != (stamp and tuple(stamp)):
                 return True
         for name, member in content["members"].items():
             paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in member.get("datasets", ()))]
@@ -284,12 +283,3 @@ def outdated_members(record: Path, folder: Path) -> bool:
     except (OSError, *DAMAGE):
         return True
     return False
-
-
-def _size_and_time(path: str) -> list[int] | None:
-    """Return a file's bytes and its time of change in nanoseconds. None if it does not exist."""
-    try:
-        status = os.stat(path)  # noqa: PTH116, a `Path` is slow for many files
-    except OSError:
-        return None
-    return [status.st_size, status.st_mtime_ns]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, unreadable
+from lightfield.core.files import DAMAGE, size_and_time, unreadable
 from lightfield.dataset import config, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.view_store import ViewStore
@@ -49,8 +49,8 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
         return False
     import_time = record.stat().st_mtime_ns
     for name, size in sizes.items():
-        source_size, source_time = _size_and_time(Path(str(dataset.imported), name))
-        if source_time and (source_size != size or source_time > import_time):
+        source = size_and_time(Path(str(dataset.imported), name))
+        if source and (source[0] != size or source[1] > import_time):
             return True
     return False
 
@@ -93,7 +93,8 @@ def model_changed(dataset: Dataset) -> bool:
 
 def _has_changed(home: Path, file: Mapping[str, Any]) -> bool:
     """Return whether a file, with its path from ``home``, has another size or time than listed."""
-    return _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
+    listed = (file["bytes"], file["mtime_ns"])
+    return (size_and_time(home / file["path"]) or (None, None)) != listed
 
 
 def check_presence(dataset: Dataset) -> None:
@@ -160,14 +161,6 @@ def _first_names(names: list[str]) -> str:
     """Return the first eight names, and the number of the others."""
     text = ", ".join(names[:8])
     return text if len(names) <= 8 else f"{text} and {len(names) - 8} more"
-
-
-def _size_and_time(path: Path) -> tuple[int, int] | tuple[None, None]:
-    """Return a file's bytes and its time of change in nanoseconds. None if it does not exist."""
-    if not path.is_file():
-        return None, None
-    status = path.stat()
-    return status.st_size, status.st_mtime_ns
 
 
 def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:

@@ -22,7 +22,13 @@ import psutil
 from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.failures import signal_cause
-from lightfield.core.files import append_json_line, read_json, read_json_lines, write_json
+from lightfield.core.files import (
+    append_json_line,
+    read_json,
+    read_json_lines,
+    size_and_time,
+    write_json,
+)
 from lightfield.core.progress import Progress
 from lightfield.dataset.family import Member
 from lightfield.dataset.job_settings import BatchSettings
@@ -140,14 +146,13 @@ def _content(builds: Mapping[str, MemberBuild]) -> dict[str, Any]:
     The plan of a run compares the models' files, to know which batches are outdated.
     """
     members = {}
-    sources: dict[str, list[int] | None] = {}
+    sources: dict[str, tuple[int, int] | None] = {}
     for name, build in builds.items():
         members[name] = read_json(build.record)
         home = Path(build.member.model or "").parent
         for source in build.sources():
             path = Path(os.path.normpath(home / source))
-            status = path.stat() if path.is_file() else None
-            sources[path.as_posix()] = status and [status.st_size, status.st_mtime_ns]
+            sources[path.as_posix()] = size_and_time(path)
     return {"members": members, "sources": sources}
 
 

@@ -124,9 +124,9 @@ def _share(part: float, whole: float) -> float:
     return round(part / whole, 4) if whole else 0.0
 
 
-def chosen_views(dataset: Path) -> list[Path]:
+def chosen_views(dataset: Path, lightfield: LightField) -> list[Path]:
     """Return the files of the views of a dataset that are read, evenly spread over it."""
-    names = [view.name for view in LightField.read(dataset / NAME).views]
+    names = [view.name for view in lightfield.views]
     count = min(VIEWS, len(names))
     numbers = [(2 * step + 1) * len(names) // (2 * count) for step in range(count)]
     return [dataset / IMAGES / f"{names[number]}.exr" for number in numbers]
@@ -136,7 +136,7 @@ def _measured_views(dataset: Path) -> Iterator[dict[str, Any]]:
     """Yield what `_measured` returns for each of the `chosen_views`."""
     lightfield = LightField.read(dataset / NAME)
     rays = lightfield.lens.pixel_rays()
-    for path in chosen_views(dataset):
+    for path in chosen_views(dataset, lightfield):
         yield _measured(path, rays, lightfield.depth)
 
 

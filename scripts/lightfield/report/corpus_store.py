@@ -9,7 +9,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset.corpus import SHARDS, THUMBNAILS, CorpusSettings
 from lightfield.dataset.family import RECORD
-from lightfield.dataset.lightfield import NAME
+from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.member_record import read_member
 from lightfield.dataset.view_store import ViewStore
 from lightfield.report.corpus_looks import chosen_views
@@ -29,7 +29,10 @@ def bring(folder: Path, settings: CorpusSettings, store: ViewStore) -> None:
             _bring(dataset / SUMS, entry.sha256sums, store)
             sums = read_sums(dataset / SUMS)
             _bring(dataset / NAME, sums[NAME], store)
-            files = [dataset / file for file in sums] if settings.shards else chosen_views(dataset)
+            if settings.shards:
+                files = [dataset / file for file in sums]
+            else:
+                files = chosen_views(dataset, LightField.read(dataset / NAME))
             for path in files:
                 _bring(path, sums[path.relative_to(dataset).as_posix()], store)
 

@@ -417,13 +417,18 @@ def remove_strays(
     # Leave hidden files: another process is writing them now.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
     strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
+    set_strays_aside(dataset, strays, folder)
+    return len(strays)
+
+
+def set_strays_aside(dataset: Path, strays: Iterable[str], folder: Path) -> None:
+    """Move files out of a dataset into ``folder``, and remove the folders that become empty."""
     for name in strays:
         set_aside(dataset / name, folder)
         for parent in (dataset / name).parents:
             if parent == dataset or any(parent.iterdir()):
                 break
             parent.rmdir()
-    return len(strays)
 
 
 def checksums(

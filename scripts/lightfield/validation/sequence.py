@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import set_aside, sha256
+from lightfield.core.files import sha256
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, View
 from lightfield.dataset.passes import PASSES
@@ -32,6 +32,7 @@ from lightfield.validation.files import (
     Manifest,
     listed_files,
     read_sets,
+    set_strays_aside,
 )
 from lightfield.validation.pixels import Examiner
 from lightfield.validation.readers import read_sequence
@@ -145,12 +146,7 @@ def remove_strays(
         except UserError:
             return 0
     strays = _strays(rig, frames, owned)
-    for name in strays:
-        set_aside(rig / name, folder)
-        for parent in (rig / name).parents:
-            if parent == rig or any(parent.iterdir()):
-                break
-            parent.rmdir()
+    set_strays_aside(rig, strays, folder)
     return len(strays)
 
 
