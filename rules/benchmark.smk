@@ -107,3 +107,4 @@ rule check_gpu:
 rule gpu_check:
     input:
         [f"{MEASURED}/gpu_check/{name}.json" for name in RENDERED_SCENES],
+        PROBES,

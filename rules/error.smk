@@ -100,6 +100,7 @@ rule measure_error:
 rule error_vs_time:
     input:
         [f"{RESULTS}/benchmarks/error_vs_time/{name}.json" for name in RENDERED_SCENES],
+        PROBES,
 
 
 rule try_changes:
@@ -135,11 +136,12 @@ rule try_changes:
 # It has no output: its log is printed.
 rule advise:
     input:
-        [f"{RESULTS}/benchmarks/advise/{name}.json" for name in RENDERED_SCENES],
+        trials=[f"{RESULTS}/benchmarks/advise/{name}.json" for name in RENDERED_SCENES],
+        probes=PROBES,
     log:
         log_of("advise"),
     localrule: True
     message:
         "Saying what could be cheaper"
     shell:
-        f"python {SCRIPTS}/advise.py" " {input} > {log} 2>&1"
+        f"python {SCRIPTS}/advise.py" " {input.trials} > {log} 2>&1"

@@ -251,6 +251,23 @@ def test_all_rules_have_jobs_in_the_build_and_none_runs_twice(build):
     assert not build.plan()
 
 
+def test_target_rules_name_an_output_of_every_job(build):
+    """Otherwise Snakemake would not make it again if it is missing."""
+    stderr = build.snakemake("--dry-run", "--forceall", "--ignore-incomplete", "--logger", "jobs")
+    without_output = [job for job in jobs_on(stderr) if not job["output"]]
+    named = {name for job in without_output for name in job["input"]}
+    unnamed = [job for job in build.jobs.values() if named.isdisjoint(job["output"])]
+    # The user may remove a downloaded .blend once its views are rendered.
+    assert {job["rule"] for job in unnamed} - {*TARGETS} == {"fetch_brought"}
+
+
+def test_a_missing_output_is_made_again_with_the_others_of_its_job(build):
+    outputs = {job["output"][-1]: first for first, job in build.jobs.items() if job["output"][1:]}
+    for name in outputs:
+        (build.folder / name).unlink()
+    assert build.plan().keys() >= {*outputs.values()}
+
+
 def followers(jobs, first):
     """Return the first outputs of these jobs and of all jobs that depend on them."""
     maker = {name: output for output, job in jobs.items() for name in job["output"]}

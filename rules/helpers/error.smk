@@ -1,5 +1,8 @@
 # Functions for the rules of error.smk.
 
+# The probe cameras of the chosen scenes. Target rules name them, so that missing ones are made again.
+PROBES = [f"{WORK}/{name}/probes.json" for name in RENDERED_SCENES]
+
 
 @cache
 def first_dataset(folder):

@@ -66,10 +66,14 @@ def batch_record(folder, batch):
     return f"{WORK}/{folder}/batches/{batch}.json"
 
 
+def records_of(folder):
+    """Return the records of all batches of a family."""
+    return [batch_record(folder, batch) for batch in batches_of(folder)]
+
+
 def batch_records(wildcards):
     """Return the records of all batches of a family."""
-    folder = wildcards.family
-    return [batch_record(folder, batch) for batch in batches_of(folder)]
+    return records_of(wildcards.family)
 
 
 def count_settings(wildcards):
@@ -142,7 +146,10 @@ def family_results():
 
 def family_targets():
     """Return the files that a run with families makes."""
-    return [f"{WORK}/{folder}/members.json" for folder in FAMILY_FOLDERS] + corpora()
+    files = corpora()
+    for folder in FAMILY_FOLDERS:
+        files += [f"{WORK}/{folder}/members.json", *records_of(folder)]
+    return files
 
 
 def corpora():

@@ -129,13 +129,15 @@ class Ledger:
     def damage(self) -> dict[str, tuple[str, list[str]]]:
         """For each damaged path: what is wrong with it, and the outputs of the job that made it.
 
-        A file with other times is compared by its SHA-256. A missing file counts only if its job
-        did not declare it, because Snakemake detects the others.
+        A file with other times is compared by its SHA-256. If a job's outputs are all missing, they
+        do not count, because Snakemake detects them.
         """
         damage = {}
         for job in self._suspects:
+            has_output = any(map(os.path.lexists, job.outputs))
             for name, stamp in job.files.items():
-                if stamp.is_current(name) or (name in job.outputs and not os.path.lexists(name)):
+                is_left_to_snakemake = name in job.outputs and not has_output
+                if is_left_to_snakemake or stamp.is_current(name):
                     continue
                 if problem := _problem(name, stamp):
                     damage[name] = (problem, job.outputs)
