@@ -77,14 +77,7 @@ def check(arguments: argparse.Namespace) -> None:
         reprojections = [path.parent.name for path in lightfields]
     wanted = settings.exports and [Path(path).resolve() for path in settings.exports]
     if arguments.removed:
-        count = remove_strays(
-            arguments.dataset, reprojections, MANIFESTS, arguments.removed, wanted
-        )
-        if count:
-            print(
-                f"{arguments.dataset}: {count} files that are no longer its own are now below "
-                f"{arguments.removed}, under their own paths"
-            )
+        remove_strays(arguments.dataset, reprojections, MANIFESTS, arguments.removed, wanted)
     result = validate(
         arguments.dataset,
         reprojections,

@@ -57,12 +57,7 @@ def main() -> None:
         lists = [Path(path) for path in settings.exports]
     sequence = (arguments.rig, frames, lists, IN_FOLDERS)
     if arguments.removed:
-        count = remove_strays(*sequence, arguments.removed)
-        if count:
-            print(
-                f"{arguments.rig}: {count} files that are no longer its own are now below "
-                f"{arguments.removed}, under their own paths"
-            )
+        remove_strays(*sequence, arguments.removed)
     result = validate_sequence(*sequence)
     print(result.summary())
     for line in result.failures():

@@ -8,7 +8,7 @@ import os
 import shutil
 import stat
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -274,6 +274,19 @@ def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
 
 # The exceptions that a program may raise when it uses the content of a damaged file.
 DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+
+
+def is_outdated(record: Path, differs: Callable[[dict[str, Any]], bool]) -> bool:
+    """Return whether a JSON record is damaged, or ``differs`` from the files that it lists.
+
+    False if there is no record, because Snakemake detects that.
+    """
+    try:
+        return differs(json.loads(record.read_bytes()))
+    except FileNotFoundError:
+        return False
+    except (OSError, *DAMAGE):
+        return True
 
 
 @contextmanager

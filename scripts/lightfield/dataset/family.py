@@ -19,7 +19,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, size_and_time
+from lightfield.core.files import is_outdated, size_and_time
 from lightfield.core.settings import Settings, as_list, pattern
 from lightfield.dataset.corpus import CorpusOptions, evenly_spread
 from lightfield.dataset.names import MODELS
@@ -269,8 +269,8 @@ def outdated_members(record: Path, folder: Path) -> bool:
     ``folder`` holds the members. Compares sizes and times of the models' files. Of the members'
     own files it only looks for each record and sha256sums.txt: there may be a million views.
     """
-    try:
-        content = json.loads(record.read_bytes())
+
+    def differs(content: Mapping[str, Any]) -> bool:
         for path, stamp in content["sources"].items():
             if size_and_time(path) != (stamp and tuple(stamp)):
                 return True
@@ -278,8 +278,6 @@ def outdated_members(record: Path, folder: Path) -> bool:
             paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in member.get("datasets", ()))]
             if not all(os.path.isfile(f"{folder}/{name}/{path}") for path in paths):  # noqa: PTH113
                 return True
-    except FileNotFoundError:
         return False
-    except (OSError, *DAMAGE):
-        return True
-    return False
+
+    return is_outdated(record, differs)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, size_and_time, unreadable
+from lightfield.core.files import DAMAGE, is_outdated, size_and_time, unreadable
 from lightfield.dataset import config, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.view_store import ViewStore
@@ -63,18 +63,16 @@ def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
     if not dataset.source.blend:
         return False
     home = Path(dataset.source.blend).parent
-    try:
-        inventory = json.loads(Path(str(dataset.inventory)).read_bytes())
+
+    def differs(inventory: Mapping[str, Any]) -> bool:
         for file in inventory["external_files"]:
             if _has_changed(home, file):
                 return True
             if store and file["bytes"] and not store.has(file["sha256"], file["bytes"]):
                 return True
-    except FileNotFoundError:
         return False
-    except (OSError, *DAMAGE):
-        return True
-    return False
+
+    return is_outdated(Path(str(dataset.inventory)), differs)
 
 
 def model_changed(dataset: Dataset) -> bool:
@@ -82,13 +80,10 @@ def model_changed(dataset: Dataset) -> bool:
     if not dataset.source.model:
         return False
     home = Path(dataset.source.model).parent
-    try:
-        record = json.loads(Path(str(dataset.model_record)).read_bytes())
-        return any(_has_changed(home, file) for file in record["external_files"])
-    except FileNotFoundError:
-        return False
-    except (OSError, *DAMAGE):
-        return True
+    return is_outdated(
+        Path(str(dataset.model_record)),
+        lambda record: any(_has_changed(home, file) for file in record["external_files"]),
+    )
 
 
 def _has_changed(home: Path, file: Mapping[str, Any]) -> bool:

@@ -421,14 +421,22 @@ def remove_strays(
     return len(strays)
 
 
-def set_strays_aside(dataset: Path, strays: Iterable[str], folder: Path) -> None:
-    """Move files out of a dataset into ``folder``, and remove the folders that become empty."""
+def set_strays_aside(dataset: Path, strays: Sequence[str], folder: Path) -> None:
+    """Move files out of a dataset into ``folder``, and remove the folders that become empty.
+
+    Says how many files it has moved.
+    """
     for name in strays:
         set_aside(dataset / name, folder)
         for parent in (dataset / name).parents:
             if parent == dataset or any(parent.iterdir()):
                 break
             parent.rmdir()
+    if strays:
+        print(
+            f"{dataset}: {len(strays)} files that are no longer its own are now below {folder}, "
+            "under their own paths"
+        )
 
 
 def checksums(

@@ -133,8 +133,8 @@ def validate_sequence(
 
 def remove_strays(
     rig: Path, frames: Collection[str], lists: Sequence[Path], manifest: Manifest, folder: Path
-) -> int:
-    """Move former exports out of a rig's folder into ``folder``. Return the number of files.
+) -> None:
+    """Move former exports out of a rig's folder into ``folder``.
 
     Moves nothing if a list of an export cannot be read.
     """
@@ -144,10 +144,8 @@ def remove_strays(
         try:
             owned += _owned(resolved, path, manifest)
         except UserError:
-            return 0
-    strays = _strays(rig, frames, owned)
-    set_strays_aside(rig, strays, folder)
-    return len(strays)
+            return
+    set_strays_aside(rig, _strays(rig, frames, owned), folder)
 
 
 def _owned(rig: Path, path: Path, manifest: Manifest) -> list[str]:
