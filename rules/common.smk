@@ -80,6 +80,8 @@ OWN_PYTHON = (
 # ended a program into the job's log.
 shell.prefix(
     f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};{OWN_PYTHON}"
+    # numpy would start a thread for each core, also in jobs that have one core.
+    " export OPENBLAS_NUM_THREADS=1;"
     # A signal to the whole group must not end the shell first.
     " trap : TERM;"
     ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'

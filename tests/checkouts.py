@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import snakemake_server
+import forks
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
@@ -75,7 +75,23 @@ def snakemake(folder, *arguments):
     # The folder of the logger plugin follows the test's own folders.
     folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
     path = os.pathsep.join(filter(None, folders))
-    return snakemake_server.run(["--cores", "1", *arguments], folder, {"PYTHONPATH": path})
+    result = forks.run_snakemake(["--cores", "1", *arguments], folder, {"PYTHONPATH": path})
+    keep_kernels(Path(folder))
+    return result
+
+
+def keep_kernels(folder):
+    """Copy the kernels that a checkout compiled to the repository, for the next checkouts."""
+    for index in folder.glob("scripts/lightfield/*/__pycache__/*.nbi"):
+        cache = ROOT / index.parent.relative_to(folder)
+        source = Path(f"{index.name.partition('.')[0]}.py")
+        is_same_source = filecmp.cmp(index.parents[1] / source, cache.parent / source)
+        if is_same_source and not (cache / index.name).exists():
+            # The index comes last, because it names the others.
+            for path in [*index.parent.glob(f"{index.stem}.*.nbc"), index]:
+                temporary = cache / f"{path.name}.tmp.{os.getpid()}"
+                shutil.copy2(path, temporary)
+                temporary.replace(cache / path.name)
 
 
 def wait_until(condition, process, seconds=600, log=None):

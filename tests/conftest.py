@@ -5,17 +5,20 @@ import fcntl
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
+import forks
 import pytest
 from checkouts import checkout, snakemake
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
+
+# For the programs that tests start, as in the jobs of the workflow.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 # Fixtures that start programs, a browser, Blender or Snakemake, or that compute for long.
@@ -58,7 +61,7 @@ def run_program():
     def run(name, *arguments, check=True, **options):
         program = name if isinstance(name, Path) else SCRIPTS / name
         result = subprocess.run(
-            [sys.executable, program, *map(str, arguments)],
+            [forks.python(), program, *map(str, arguments)],
             capture_output=True,
             text=True,
             check=False,

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
+import forks
 import numpy as np
 import pytest
-import snakemake_server
 from conftest import ROOT
 
 from lightfield.core.files import sha256
@@ -64,7 +64,7 @@ def build(folder, *arguments, accept="accept_blend=false"):
         *arguments,
         *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
     ]
-    return snakemake_server.run(command_line, "/")
+    return forks.run_snakemake(command_line, "/")
 
 
 @pytest.fixture(scope="module")

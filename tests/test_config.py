@@ -5,10 +5,10 @@ import re
 import sys
 from pathlib import Path
 
+import forks
 import jsonschema
 import numpy as np
 import pytest
-import snakemake_server
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
@@ -248,7 +248,7 @@ def test_a_single_word_becomes_a_list():
 @pytest.mark.slow
 def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
-    plan = snakemake_server.run(
+    plan = forks.run_snakemake(
         ["--cores", "1", "--dry-run", "--quiet", "host", "--config", *folders, *arguments],
         config.ROOT,
     )
@@ -268,7 +268,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
 )
 @pytest.mark.slow
 def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
-    result = snakemake_server.run(["--cores", "1", "--config", *arguments], config.ROOT)
+    result = forks.run_snakemake(["--cores", "1", "--config", *arguments], config.ROOT)
     assert result.returncode != 0
     errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]
     assert len(errors) == 1

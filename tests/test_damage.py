@@ -11,9 +11,9 @@ import shutil
 import signal
 from pathlib import Path
 
+import forks
 import pytest
 import simulated
-import snakemake_server
 from checkouts import (
     assert_same_bytes,
     checkout,
@@ -67,7 +67,7 @@ class Damaged:
         may_not = ["--bounding-set=-dac_override,-dac_read_search"]
         held = [] if os.geteuid() else ["setpriv", *may_not, "--inh-caps=-all"]
         env = {"PYTHONPATH": str(Path(__file__).parent)}
-        return snakemake_server.run(["--cores", "2", *arguments], self.root, env, prefix=held)
+        return forks.run_snakemake(["--cores", "2", *arguments], self.root, env, prefix=held)
 
     def damaged_and_made(self, result):
         """Return the files that a run reports as damaged, and the files that it makes."""

@@ -5,11 +5,12 @@ import json
 import os
 import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
+import forks
 import pytest
-import snakemake_server
 from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, with_consumers
 from sphere import write_views
@@ -145,7 +146,7 @@ class Failing:
             "WORK_TO_DO": json.dumps(work or {}),
         }
         arguments = ("--cores", "1", *arguments)
-        return snakemake_server.run(arguments, self.folder, env, merge_outputs=True)
+        return forks.run_snakemake(arguments, self.folder, env, merge_outputs=True)
 
     def independent_groups(self):
         """Return the rules in groups. No job reads what another rule of its group writes."""
@@ -335,8 +336,22 @@ def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
 
 
 @pytest.mark.slow
-def test_a_signal_to_a_job_and_its_shell_is_named(failing):
+def test_a_signal_to_a_job_and_its_shell_is_named(failing, monkeypatch):
     """`timeout`, a CI and a batch system send a signal to each process of a run."""
+
+    def run_in_processes(arguments, folder, env, merge_outputs):
+        return subprocess.run(
+            [Path(sys.executable).with_name("snakemake"), *arguments],
+            cwd=folder,
+            env=os.environ | env,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT if merge_outputs else subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+
+    # The shell is no parent of a fork.
+    monkeypatch.setattr(forks, "run_snakemake", run_in_processes)
     program = failing.folder / "scripts/render_shard.py"
     program.write_text(
         "import os, signal\n"

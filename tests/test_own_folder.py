@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
+import forks
 import pytest
-import snakemake_server
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -48,7 +48,7 @@ def folder(tmp_path):
 
 
 def snakemake(*arguments, cwd="/"):
-    result = snakemake_server.run(arguments, cwd, merge_outputs=True)
+    result = forks.run_snakemake(arguments, cwd, merge_outputs=True)
     return result.returncode, result.stdout
 
 

@@ -6,8 +6,8 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
+import forks
 import pytest
-import snakemake_server
 import yaml
 from checkouts import ROOT, snakemake
 
@@ -44,7 +44,7 @@ def planned(tmp_path_factory):
             *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
         ]
         # Snakemake finds the logger plugin here.
-        run = snakemake_server.run(arguments, ROOT, {"PYTHONPATH": str(Path(__file__).parent)})
+        run = forks.run_snakemake(arguments, ROOT, {"PYTHONPATH": str(Path(__file__).parent)})
         assert run.returncode == 0, run.stderr
         return [json.loads(line) for line in run.stderr.splitlines() if line.startswith("{")]
 

@@ -1,0 +1,188 @@
+"""Runs Snakemake and the programs in forks of one process, which has imported their libraries.
+
+Most of the time of a short run are imports of libraries. Each fork reads the Snakefile and the
+project's own code anew, as a process of its own does. Blender is imported in the fork, because its
+import starts threads, which a fork lacks.
+"""
+
+import atexit
+import importlib
+import json
+import os
+import pkgutil
+import runpy
+import select
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
+LIBRARIES = (
+    # What Snakemake imports when it reads a Snakefile.
+    *("snakemake.report", "snakemake.report.html_reporter", "smart_open"),
+    # What the programs import.
+    *("numba", "OpenEXR", "OpenImageIO", "pydantic", "scipy.ndimage", "scipy.spatial", "yaml"),
+)
+# A request has the environment, which is the largest part of it.
+MOST_BYTES = 200_000
+# Stands for python. It starts forks for programs, and processes for all else.
+PYTHON = """#!/bin/sh
+case "$1" in
+*.py) exec {python} -IS {client} {socket} "$@" ;;
+*) exec {python} "$@" ;;
+esac
+"""
+# The exit status of a fork, once its program has ended.
+STATUS = []
+# The folders of the servers of this test process, by the command that starts them.
+_FOLDERS = {}
+
+
+def run_snakemake(arguments, folder, env=None, merge_outputs=False, prefix=()):
+    """Run ``snakemake`` with arguments in a folder. Return its CompletedProcess.
+
+    ``env`` adds to the environment. ``merge_outputs`` writes stderr to stdout. ``prefix`` is a
+    command that runs another, such as ``nice``.
+    """
+    return subprocess.run(
+        [python(prefix), "snakemake.py", *map(str, arguments)],
+        cwd=Path(folder).absolute(),
+        env=os.environ | (env or {}),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT if merge_outputs else subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+
+
+def python(prefix=()):
+    """Return the path of a ``python`` that runs programs in forks. Starts their server."""
+    prefix = tuple(map(str, prefix))
+    if prefix not in _FOLDERS:
+        home = tempfile.TemporaryDirectory(prefix="forks")
+        atexit.register(home.cleanup)
+        folder = Path(home.name)
+        names = {"python": sys.executable, "client": Path(__file__).with_name("fork_client.py")}
+        names["socket"] = folder / "socket"
+        quoted = {name: shlex.quote(str(path)) for name, path in names.items()}
+        (folder / "python").write_text(PYTHON.format(**quoted))
+        (folder / "python").chmod(0o755)
+        server = subprocess.Popen(
+            [*prefix, sys.executable, Path(__file__), folder], stdout=subprocess.PIPE
+        )
+        atexit.register(server.kill)
+        # It writes a line when it listens.
+        server.stdout.readline()
+        _FOLDERS[prefix] = folder
+    return _FOLDERS[prefix] / "python"
+
+
+def serve(folder):
+    """Fork for each request on the socket in a folder. Return in each fork, after its program."""
+    # The first function that is registered is called last.
+    atexit.register(leave)
+    # The folder of this file is not on the path of other programs.
+    sys.path.remove(str(Path(__file__).parent))
+    for module in pkgutil.iter_modules():
+        if module.name.startswith(PLUGINS):
+            importlib.import_module(module.name)
+    for name in ("snakemake.cli", *LIBRARIES):
+        importlib.import_module(name)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.bind(f"{folder}/socket")
+    listener.listen(64)
+    print("listening", flush=True)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    while True:
+        connection, _ = listener.accept()
+        if os.fork():
+            connection.close()
+            continue
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        listener.close()
+        message, descriptors, _, _ = socket.recv_fds(connection, MOST_BYTES, 3)
+        child = os.fork()
+        if child:
+            attend(connection, child)
+        connection.close()
+        run(json.loads(message), descriptors, folder)
+        return
+
+
+def attend(connection, child):
+    """Send a fork the signals of its client, and the client its exit status. Then end."""
+    ended = os.pidfd_open(child)
+    while True:
+        ready, _, _ = select.select([ended, connection], [], [])
+        if ended in ready:
+            break
+        number = connection.recv(16)
+        # The client was killed if there is none.
+        os.kill(child, int(number) if number else signal.SIGKILL)
+        if not number:
+            break
+    _, status = os.waitpid(child, 0)
+    try:
+        connection.send(str(os.waitstatus_to_exitcode(status)).encode())
+    finally:
+        os._exit(0)
+
+
+def run(request, descriptors, folder):
+    """Turn a fork into the process of a request, and run its program until it ends."""
+    try:
+        become(request, descriptors)
+        run_program(folder)
+    except SystemExit as end:
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
+            end.code = 1
+        STATUS.append(end.code or 0)
+    except BaseException:
+        traceback.print_exc()
+        STATUS.append(1)
+
+
+def leave():
+    """End a fork at once. Python would first free all libraries, which takes 0.4 s."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(*STATUS or [0])
+
+
+def become(request, descriptors):
+    """Turn a fork into the process of a request."""
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    for target, descriptor in enumerate(descriptors):
+        os.dup2(descriptor, target)
+        os.close(descriptor)
+    sys.path[:0] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
+    sys.argv = request["arguments"]
+
+
+def run_program(folder):
+    """Run the program of the command line, which may be Snakemake."""
+    program = sys.argv[0]
+    if program == "snakemake.py":
+        sys.argv[0] = "snakemake"
+        # Its jobs run in forks, too.
+        sys.executable = f"{folder}/python"
+        importlib.import_module("snakemake.cli").main()
+        return
+    # As a program does that starts itself anew, isolated from the user's environment.
+    sys._xoptions["isolated"] = True
+    os.environ["BLENDER_USER_RESOURCES"] = str(folder)
+    sys.path.insert(0, str(Path(program).resolve().parent))
+    runpy.run_path(program, run_name="__main__")
+
+
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]))
