@@ -36,7 +36,6 @@ from lightfield.validation import (
     geometry,
     machines,
     pixels,
-    sensor_check,
     splits_check,
 )
 from lightfield.validation.consistency import Answer
@@ -104,7 +103,7 @@ def validate(
     )
     if len(sets) <= len(reprojections):
         files_checks[0] = UNLISTED
-    checks += [*sensor_check.checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
+    checks += [*_sensor_checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
     rendered = files.rendered(sets)
     view_count = len(rendered.views) if rendered else 0
     return Result(f"{dataset.parent.name}/{dataset.name}", view_count, checks, digests)
@@ -119,6 +118,16 @@ Sums = dict[str, tuple[int, str]]
 
 # The check of the files if not every lightfield.json could be read.
 UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+
+
+def _sensor_checks(dataset: Path, sets: Sequence[files.ImageSet]) -> list[Check]:
+    """Return a check of each set that a sensor developed."""
+    if not any(image_set.sensor for image_set in sets):
+        return []
+    # Only here, because it imports numba.
+    from lightfield.validation import sensor_check
+
+    return sensor_check.checks(dataset, sets)
 
 
 def _recorded_sums(records: Sequence[Path]) -> Sums | None:
