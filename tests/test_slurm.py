@@ -30,6 +30,22 @@ pytestmark = [
 ]
 
 
+# Two batches, of two members each.
+ROOMS = """
+scene: {builder: room}
+render: {samples: 4}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    size: 0.5
+    center: [0, 0, 1.2]
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+family: {seeds: 0-3, batch: 2}
+"""
+OF_ROOMS = ["--config", "scenes=rooms", "rigs=all", "preset=full"]
+
+
 def slower_checkout(folder: Path) -> Path:
     """Return a checkout whose views take seconds, so that a test can stop a shard between them."""
     path = checkout(folder) / "configs/scenes/smoke.yaml"
@@ -85,6 +101,40 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     assert set(rendered(folder).values()) == {1}
     assert views_of(folder) == views_of(undisturbed)
     assert len(views_of(folder)) == 6
+
+
+def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path):
+    install()
+    folder = checkout(tmp_path / "cluster", rooms=ROOMS)
+    log = folder / "terminal.log"
+    with Node(tmp_path / "node") as node:
+        with log.open("wb") as terminal:
+            run = start_snakemake(
+                folder,
+                *("--profile", "profiles/slurm", "--slurm-init-seconds-before-status-checks", "2"),
+                *OF_ROOMS,
+                env=node.environment,
+                stdout=terminal,
+                stderr=terminal,
+            )
+        first = folder / "results/rooms/0000/member.json"
+        wait_until(first.exists, run, log=log)
+        time = first.stat().st_mtime_ns
+        node.run("scancel", "--state=RUNNING", "--full", "--user=root")
+        assert run.wait(1800) == 0, log.read_text()
+        states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
+    assert "CANCELLED" in states
+    assert "4 of 4 members of rooms built" in log.read_text()
+    assert first.stat().st_mtime_ns == time
+    # The same members on one machine, in one batch.
+    alone = checkout(tmp_path / "alone", rooms=ROOMS.replace("batch: 2", "batch: 4"))
+    result = snakemake(alone, *OF_ROOMS)
+    assert result.returncode == 0, result.stdout + result.stderr
+    for number in range(4):
+        sums = f"results/rooms/000{number}/LFPlane/sha256sums.txt"
+        views = [line for line in (folder / sums).read_text().splitlines() if "exr/" in line]
+        assert len(views) == 2
+        assert set(views) <= set((alone / sums).read_text().splitlines())
 
 
 def pids(journal: Path) -> set[int]:
