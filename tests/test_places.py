@@ -177,14 +177,37 @@ def test_the_rigs_of_a_garden_stand_free_in_its_court():
         assert all(plan.pond_distance(x, y) > 0.3 for x, y in plan.pines)
 
 
-def test_the_rigs_of_a_cloister_stand_free_in_its_court():
-    for place in PLACES:
-        plan = drawn("lone_monk", place)
-        x, y = np.abs(plan.center)
-        assert max(x, y) + 2 < plan.front - 1  # the arcades
-        assert max(x, y) - 2 > 0.8  # the well
-        monk = np.add(plan.monk[:2], plan.center)
-        assert np.abs(monk).max() > 2.3
+@pytest.mark.parametrize("place", range(100))
+def test_the_rigs_of_a_cloister_stand_free_in_its_court(place):
+    plan = drawn("lone_monk", place)
+    rig = -np.array(plan.center)
+    assert np.abs(rig).max() + 2 < plan.front - 1  # the arcades
+    assert np.abs(rig).max() - 2 > 1.25  # the middle
+    assert np.abs(rig - plan.monk[:2]).max() > 2.3
+    for spots, reach in ((plan.olives, 2.0), (plan.cypresses, 0.65), ((plan.chair,), 0.5)):
+        for spot in spots:
+            assert np.abs(rig - spot).max() > 2 + reach
+            assert np.abs(spot).max() < plan.front - 1
+
+
+@pytest.mark.parametrize("place", range(100))
+def test_each_side_of_a_cloister_has_a_church_a_house_or_a_low_wall(place):
+    plan = drawn("lone_monk", place)
+    sides = [house.side for house in plan.houses] + [*plan.low_sides]
+    if "church" not in plan.absent:
+        sides.append(plan.church_side)
+    assert sorted(sides) == [0, 1, 2, 3]
+    assert plan.bays % 2 == 1  # so that a gate is in the middle
+    assert plan.arch_radius + 2.45 < 3.8  # the arches end below the eaves
+
+
+def test_cloisters_differ_in_their_plan():
+    plans = [drawn("lone_monk", place) for place in range(100)]
+    assert {plan.bays for plan in plans} == {7, 9, 11}
+    assert {plan.middle for plan in plans} == {"well", "fountain", "cross", "statue", "tree"}
+    assert {plan.ground for plan in plans} == {"lawn", "gravel", "paved"}
+    assert {len(plan.houses) for plan in plans} == {1, 2, 3}
+    assert {len(house.tops) for plan in plans for house in plan.houses} == {1, 2}
 
 
 def test_a_value_is_equal_whatever_else_is_drawn():
