@@ -121,6 +121,7 @@ PAPERED: tuple[tuple[Wall, ...], ...] = (
     ("front", "back"),
     (),
 )
+BOARDS = ("Oak", "Cream", "Mahogany")  # materials of ceilings
 FLOORS = ("checker", "checker", "large checker", "stripes", "diagonal", "dots", "rings")
 
 
@@ -150,7 +151,7 @@ def drawn(place: int) -> Barbershop:
         paper=draw.choice("paper", ("Wallpaper", "Wallpaper", "Brick")),
         floor=draw.choice("floor", FLOORS),
         green_rows=draw.choice("green rows", (0, 4, 7, 11, 11, 16, 23)),
-        has_tin_ceiling=draw.chance("tin ceiling", 0.6),
+        ceiling="tin" if draw.chance("tin ceiling", 0.6) else draw.choice("boards", BOARDS),
         pendants=_pendants(draw, layout.room),
         lamp_shade=draw.choice("lamp shade", ("globe", "enamel")),
         prints=layout.prints,

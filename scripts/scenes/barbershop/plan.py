@@ -211,9 +211,9 @@ class Barbershop(Variation):
 
     stations: where the barbers' stations are along the counter's wall. chair_turns: of their
     chairs, in degrees. staff_door: its wall, and where it is along it. papered: the walls in
-    wallpaper, or in what `paper` names. green_rows: rows of tiles in the lower colour. bins: x, y
-    and turn of the waste bins. hanging_corner, tree_corner: signs of x and y of the corners with
-    the hanging plant and the rubber tree.
+    wallpaper, or in what `paper` names. ceiling: "tin", or the material of its boards. green_rows:
+    rows of tiles in the lower colour. bins: x, y and turn of the waste bins. hanging_corner,
+    tree_corner: signs of x and y of the corners with the hanging plant and the rubber tree.
     """
 
     light: Light = field(default_factory=Light)
@@ -230,7 +230,7 @@ class Barbershop(Variation):
     paper: str = "Wallpaper"
     floor: str = "checker"
     green_rows: int = 11
-    has_tin_ceiling: bool = True
+    ceiling: str = "tin"
     pendants: tuple[tuple[float, float], ...] = (
         (-1.15, -1.5),
         (-1.15, 1.5),

@@ -465,9 +465,11 @@ def _wainscot_runs(plan: Barbershop) -> list[tuple[Wall, float, float]]:
 
 
 def ceiling(scene: Scene[Barbershop]) -> None:
-    """Pressed tin tiles, and a cornice."""
-    if scene.plan.has_tin_ceiling:
+    """Pressed tin tiles or boards, and a cornice."""
+    if scene.plan.ceiling == "tin":
         _tin_tiles(scene)
+    else:
+        _boards(scene)
     width, length, height = scene.plan.room
     cornice = Model(scene)
     t = np.linspace(0, np.pi / 2, scene.segments(8))
@@ -475,6 +477,19 @@ def ceiling(scene: Scene[Barbershop]) -> None:
     profile = [(-0.15, 0), (-0.15, 0.03), *cove, (-0.03, 0.16), (0, 0.16)]
     cornice.add(frame(width, length, profile), "Cream", (0, 0, height), (180, 0, 0))
     put(cornice.mesh("Cornice"), where=standing())
+
+
+def _boards(scene: Scene[Barbershop]) -> None:
+    """Boards about 0.25 m wide along the room, with beads between them."""
+    width, length, height = scene.plan.room
+    count = round(width / 0.25)
+    size = width / count
+    board = Model(scene)
+    board.box(size=(size - 0.02, length, 0.02), bevel=0.004, material=scene.plan.ceiling)
+    board.box(size=(0.02, length, 0.012), at=(size / 2, 0, 0.004), material="Gilt")
+    across = [(i + 0.5) * size - width / 2 for i in range(count)]
+    where = [standing(x=x, z=height - 0.01) for x in across]
+    put(board.mesh(name="Ceiling board"), where)
 
 
 def _tin_tiles(scene: Scene[Barbershop]) -> None:
