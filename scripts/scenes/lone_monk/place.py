@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from scenes.library.materials import Color
 from scenes.library.variation import Draw, Factors
 from scenes.lone_monk.plan import SIDES, Cloister, House
 
@@ -55,13 +56,16 @@ PROBABILITIES: Mapping[str, float] = {
     "swallows": 0.6,
     "fallen_leaves": 0.7,
 }
-# The sun's elevation in degrees, its strength and colour, and the sky's strength.
-HOURS = (
-    ((8, 14), (5.0, 9.0), (1.0, 0.62, 0.34), 0.45),
-    ((22, 38), (12.0, 17.0), (1.0, 0.80, 0.56), 0.34),
-    ((45, 70), (14.0, 20.0), (1.0, 0.94, 0.85), 0.32),
-    ((30, 60), (0.5, 2.0), (0.9, 0.95, 1.0), 0.75),
-    ((1, 3), (0.05, 0.2), (1.0, 0.5, 0.3), 1.0),
+DAY_CLOUDS: Color = (9.0, 8.6, 8.2)
+# The sun's elevation in degrees, its strength and colour, the sky's strength, the clouds' colour.
+# Clouds light nothing, so their brightness has to suit the sky's.
+Hour = tuple[tuple[float, float], tuple[float, float], Color, float, Color]
+HOURS: tuple[Hour, ...] = (
+    ((8, 14), (7.0, 12.0), (1.0, 0.62, 0.34), 0.8, (5.0, 4.0, 3.2)),
+    ((22, 38), (12.0, 17.0), (1.0, 0.80, 0.56), 0.34, DAY_CLOUDS),
+    ((45, 70), (14.0, 20.0), (1.0, 0.94, 0.85), 0.32, DAY_CLOUDS),
+    ((30, 60), (0.5, 2.0), (0.9, 0.95, 1.0), 1.5, (3.6, 3.7, 3.8)),
+    ((1, 3), (0.05, 0.2), (1.0, 0.5, 0.3), 3.0, (1.2, 0.75, 0.6)),
 )
 CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 LEAST_COURT = 14.4  # metres between the axes of opposite arcades
@@ -82,7 +86,7 @@ def drawn(place: int) -> Cloister:
     front = bay * bays / 2 - 0.25
     corner = draw.count("corner", 0, 3)
     rig = _rig(draw, corner, front)
-    elevation, sun, color, sky = draw.choice("hour", HOURS)
+    elevation, sun, color, sky, cloud_color = draw.choice("hour", HOURS)
     clouds = draw.uniform("clouds", 0.3, 0.62)
     church_side = draw.count("church side", 0, 3)
     houses = _houses(draw, None if "church" in absent else church_side)
@@ -112,6 +116,7 @@ def drawn(place: int) -> Cloister:
         sun=draw.uniform("sun", *sun),
         sun_color=color,
         sky=round(sky * draw.uniform("sky", 0.85, 1.2), 4),
+        cloud_color=cloud_color,
         clouds=(clouds, round(clouds + 0.28, 4)),
     )
 

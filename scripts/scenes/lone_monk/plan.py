@@ -82,6 +82,7 @@ class Cloister(Variation):
     sun: float = 16.0
     sun_color: Color = (1.0, 0.80, 0.56)
     sky: float = 0.34
+    cloud_color: Color = (9.0, 8.6, 8.2)  # before the sky's strength
     clouds: tuple[float, float] = (0.50, 0.78)  # the noise at which they begin and are full
 
     @property
