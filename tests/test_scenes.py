@@ -305,15 +305,14 @@ def test_only_equal_seeds_give_equal_geometry_and_pixels(name):
     assert fingerprint(name, 4, "1") not in (first, first[:1])
 
 
-@pytest.mark.parametrize("place", [3, 11])
+@pytest.mark.parametrize("place", [3, 15])  # stations on the right, and at the back
 def test_another_barbershop_is_closed_and_rich_and_leaves_its_cameras_clear(place):
     built("barbershop", 0.02, place)
     width, length, height = drawn_barbershop(place).room
     assert_closed_and_rich((width / 2 + 1e-3, length / 2 + 0.1, height + 2e-3), 1500, 100)
-    nearest_geometry(cameras("barbershop"))
+    assert nearest_geometry(cameras("barbershop")) < REACH
 
 
-@pytest.mark.parametrize("place", [2, 5])
-def test_another_cloister_leaves_its_cameras_clear(place):
-    built("lone_monk", 0.02, place)
-    nearest_geometry(cameras("lone_monk"))
+def test_another_cloister_leaves_its_cameras_clear():
+    built("lone_monk", 0.02, place=2)
+    assert nearest_geometry(cameras("lone_monk")) < REACH

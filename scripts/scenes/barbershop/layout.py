@@ -13,6 +13,7 @@ from scenes.barbershop.plan import (
     DOOR_WIDTH,
     HEADINGS,
     SIZES,
+    TILE,
     WALLS,
     Fitting,
     Print,
@@ -24,7 +25,6 @@ from scenes.barbershop.plan import (
 )
 from scenes.library.variation import Draw, Move
 
-TILE = 0.3125  # of the floor; a room has a whole number of them
 RIGS = (-0.76, -1.56, 0.76, 1.56)
 CORNER = 0.5  # what a plant takes of a corner, in metres
 TRIES = 200

@@ -28,6 +28,7 @@ WALLS: tuple[Wall, ...] = ("left", "right", "front", "back")
 Room = tuple[float, float, float]  # metres in x, y, z
 ROOM: Room = (5.0, 7.5, 3.0)  # of the original
 HEADINGS = {"left": -90, "right": 90, "front": 180, "back": 0}  # degrees of the walls' frames
+TILE = 0.3125  # of the floor; a room has a whole number of them
 COUNTER_TOP = 0.86
 WINDOW_HEIGHT = 1.45
 WINDOW_MIDDLE = 1.725  # z

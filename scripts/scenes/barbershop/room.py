@@ -9,6 +9,7 @@ from scenes.barbershop.plan import (
     DOOR_WIDTH,
     HAIR,
     TAU,
+    TILE,
     WALLS,
     WINDOW_HEIGHT,
     WINDOW_MIDDLE,
@@ -25,7 +26,6 @@ from scenes.library.points import Array, circle, evenly, lattice, mirrored, pola
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, grid, lettering, prism, tube
 
-TILE = 0.3125
 THICK = 0.15  # of the walls
 MOSAIC_HEIGHT = 0.0015
 GREEN = ["Green glaze 0", "Green glaze 1", "Green glaze 2"]
