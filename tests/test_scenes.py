@@ -313,6 +313,11 @@ def test_another_barbershop_is_closed_and_rich_and_leaves_its_cameras_clear(plac
     assert nearest_geometry(cameras("barbershop")) < REACH
 
 
-def test_another_cloister_leaves_its_cameras_clear():
+def test_another_cloister_has_walls_all_round_and_leaves_its_cameras_clear():
     built("lone_monk", 0.02, place=2)
+    middle = Vector((0, 0, 2.2))
+    for azimuth in np.linspace(0, 2 * np.pi, 72, endpoint=False):
+        for height in np.tan(np.radians([-35, -5, 0, 5, 8])):
+            hit, at, *_ = ray_cast(middle, (np.cos(azimuth), np.sin(azimuth), height))
+            assert hit and (at - middle).length < 23, (azimuth, height)
     assert nearest_geometry(cameras("lone_monk")) < REACH
