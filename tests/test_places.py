@@ -2,6 +2,7 @@
 
 import shutil
 from importlib import import_module
+from itertools import combinations
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from lightfield.dataset import keys, names
 from lightfield.dataset.config import SceneSource
 from lightfield.dataset.job_settings import BuildSettings
 from lightfield.dataset.keys import scene_fingerprint
+from scenes.barbershop.plan import SIZES
 from scenes.library.variation import Draw
 
 # Each builder with the modules that draw its places and that hold its original.
@@ -113,6 +115,59 @@ def test_the_pieces_of_a_room_stand_apart_within_it_and_leave_the_rigs_free():
             assert (np.abs(np.subtract((x1, y1), room.center)) < half).all()
 
 
+@pytest.mark.parametrize("place", range(100))
+def test_the_furniture_of_a_barbershop_stands_apart_and_leaves_rigs_and_doors_free(place):
+    layout_module = import_module("scenes.barbershop.layout")
+    layout = layout_module.drawn_layout(Draw(place))
+    half = np.array(layout.room[:2]) / 2 + 1e-3
+    rigs, counter, chairs, *others = layout.taken
+    for x0, y0, x1, y1 in layout.taken:
+        assert (np.abs([(x0, y0), (x1, y1)]) <= half).all()
+    for first, second in combinations([counter, *others], 2):
+        assert min(first[2], second[2]) <= max(first[0], second[0]) or (
+            min(first[3], second[3]) <= max(first[1], second[1])
+        )
+    for other in [chairs, *others]:
+        assert layout_module.apart(rigs, other)
+    assert (np.array(rigs) == (-0.76, -1.56, 0.76, 1.56)).all()
+
+
+@pytest.mark.parametrize("place", range(100))
+def test_windows_and_door_of_a_barbershop_stand_side_by_side_in_the_front_wall(place):
+    plan = drawn("barbershop", place)
+    spans = [(each.along - each.width / 2, each.along + each.width / 2) for each in plan.windows]
+    spans = sorted([*spans, (plan.door - 0.475, plan.door + 0.475)])
+    ends = np.array([-plan.half_x, *np.ravel(spans), plan.half_x])
+    assert (np.diff(ends)[::2] > 0.4).all()  # the wall between the openings
+    assert all(each.width > 1 for each in plan.windows)
+    assert plan.staff_door
+
+
+def test_barbershops_differ_in_their_plan():
+    plans = [drawn("barbershop", place) for place in range(100)]
+    assert {plan.counter_wall for plan in plans} == {"left", "right", "back"}
+    assert {len(plan.stations) for plan in plans} == {2, 3, 4}
+    assert {len(plan.windows) for plan in plans} == {1, 2}
+    assert {plan.door > plan.windows[0].along for plan in plans} == {True, False}
+    assert len({plan.room for plan in plans}) > 50
+    assert len({plan.prints for plan in plans}) == 100
+
+
+@pytest.mark.parametrize("place", range(100))
+def test_what_hangs_on_the_walls_of_a_barbershop_is_not_over_doors_or_behind_tall_furniture(place):
+    plan = drawn("barbershop", place)
+    for each in plan.prints:
+        assert each.wall != plan.counter_wall
+        half = SIZES[each.name][0] / 2
+        for window in plan.windows if each.wall == "front" else ():
+            assert abs(each.along - window.along) > half + window.width / 2
+        if each.wall == "front":
+            assert abs(each.along - plan.door) > half + 0.475
+        if each.wall == plan.staff_door[0]:
+            assert abs(each.along - plan.staff_door[1]) > half + 0.425
+        assert abs(each.along) + half < plan.wall_length(each.wall) / 2
+
+
 def test_the_rigs_of_a_garden_stand_free_in_its_court():
     for place in PLACES:
         plan = drawn("garden", place)
@@ -122,14 +177,37 @@ def test_the_rigs_of_a_garden_stand_free_in_its_court():
         assert all(plan.pond_distance(x, y) > 0.3 for x, y in plan.pines)
 
 
-def test_the_rigs_of_a_cloister_stand_free_in_its_court():
-    for place in PLACES:
-        plan = drawn("lone_monk", place)
-        x, y = np.abs(plan.center)
-        assert max(x, y) + 2 < plan.front - 1  # the arcades
-        assert max(x, y) - 2 > 0.8  # the well
-        monk = np.add(plan.monk[:2], plan.center)
-        assert np.abs(monk).max() > 2.3
+@pytest.mark.parametrize("place", range(100))
+def test_the_rigs_of_a_cloister_stand_free_in_its_court(place):
+    plan = drawn("lone_monk", place)
+    rig = -np.array(plan.center)
+    assert np.abs(rig).max() + 2 < plan.front - 1  # the arcades
+    assert np.abs(rig).max() - 2 > 1.25  # the middle
+    assert np.abs(rig - plan.monk[:2]).max() > 2.3
+    for spots, reach in ((plan.olives, 2.0), (plan.cypresses, 0.65), ((plan.chair,), 0.5)):
+        for spot in spots:
+            assert np.abs(rig - spot).max() > 2 + reach
+            assert np.abs(spot).max() < plan.front - 1
+
+
+@pytest.mark.parametrize("place", range(100))
+def test_each_side_of_a_cloister_has_a_church_a_house_or_a_low_wall(place):
+    plan = drawn("lone_monk", place)
+    sides = [house.side for house in plan.houses] + [*plan.low_sides]
+    if "church" not in plan.absent:
+        sides.append(plan.church_side)
+    assert sorted(sides) == [0, 1, 2, 3]
+    assert plan.bays % 2 == 1  # so that a gate is in the middle
+    assert plan.arch_radius + 2.45 < 3.8  # the arches end below the eaves
+
+
+def test_cloisters_differ_in_their_plan():
+    plans = [drawn("lone_monk", place) for place in range(100)]
+    assert {plan.bays for plan in plans} == {7, 9, 11}
+    assert {plan.middle for plan in plans} == {"well", "fountain", "cross", "statue", "tree"}
+    assert {plan.ground for plan in plans} == {"lawn", "gravel", "paved"}
+    assert {len(plan.houses) for plan in plans} == {1, 2, 3}
+    assert {len(house.tops) for plan in plans for house in plan.houses} == {1, 2}
 
 
 def test_a_value_is_equal_whatever_else_is_drawn():

@@ -12,6 +12,7 @@ from mathutils.bvhtree import BVHTree
 from scene_fingerprint import fingerprint
 
 from lightfield.dataset import config
+from scenes.barbershop.place import drawn as drawn_barbershop
 
 pytestmark = pytest.mark.slow
 CLEARANCE = 0.05  # free metres around every camera
@@ -41,10 +42,11 @@ MOST_PART = {"barbershop": Size(0.8, 0.25, 0.5), "still_life": Size(1, 0.4, 0.4)
 MOST_BYTES = dict.fromkeys(SCENES, 60e6) | {"still_life": 40e6}
 
 
-def built(name, detail):
-    """Build a scene. Return it as an evaluated dependency graph."""
+def built(name, detail, place=None):
+    """Build a scene, or a place of it. Return it as an evaluated dependency graph."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    import_module(f"scenes.{name}").build({"seed": 1, "detail": detail})
+    parameters = {"seed": 1, "detail": detail, "place": place}
+    import_module(f"scenes.{name}").build(parameters)
     bpy.context.scene.frame_set(1)
     return bpy.context.evaluated_depsgraph_get()
 
@@ -115,8 +117,15 @@ def test_objects_triangles_and_instancing(scene):
 
 @pytest.mark.parametrize("scene", ["barbershop", "garden", "lone_monk"], indirect=True)
 def test_cameras_keep_clear(scene):
-    """No camera of any rig has geometry within 5 cm, according to BVHs of the evaluated meshes."""
-    places, nearest = cameras(scene), np.inf
+    assert nearest_geometry(cameras(scene)) < REACH
+
+
+def nearest_geometry(places):
+    """The least distance of geometry to any place (n, 3), by BVHs of the evaluated meshes.
+
+    Asserts that no mesh comes within CLEARANCE.
+    """
+    nearest = np.inf
     for name, data, matrix in meshes():
         points = placed(values(data.vertices, "co"), matrix)
         near = (places > points.min(0) - REACH) & (places < points.max(0) + REACH)
@@ -127,7 +136,7 @@ def test_cameras_keep_clear(scene):
             least_distance = min(tree.find_nearest(Vector(place))[3] for place in close)
             assert least_distance >= CLEARANCE, name
             nearest = min(nearest, least_distance)
-    assert nearest < REACH
+    return nearest
 
 
 def test_the_file_is_small_and_complete(scene, tmp_path):
@@ -152,17 +161,21 @@ def test_the_file_is_small_and_complete(scene, tmp_path):
 
 @of("barbershop")
 def test_it_is_closed_and_rich_on_every_side(scene):
+    assert_closed_and_rich((2.501, 3.85, 3.001), rays=3000, objects=200)
+
+
+def assert_closed_and_rich(reach, rays, objects):
     """Every ray from the middle hits the room or its window, and many surfaces on each side."""
-    met, objects = {}, set()
-    for ray in np.random.default_rng(7).normal(size=(3000, 3)):
+    met, seen = {}, set()
+    for ray in np.random.default_rng(7).normal(size=(rays, 3)):
         hit, place, obj, face = ray_cast((0, 0, 1.05), ray)
         assert hit, ray
-        assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, obj)
+        assert (np.abs(place) <= reach).all() and place.z > -0.03, (place, obj)
         axis = int(np.abs(ray).argmax())
         surface = obj.name, obj.data.polygons[face].material_index
         met.setdefault((axis, bool(ray[axis] > 0)), set()).add(surface)
-        objects.add(obj.name)
-    assert len(objects) >= 200
+        seen.add(obj.name)
+    assert len(seen) >= objects
     assert len(met) == 6 and min(len(surfaces) for surfaces in met.values()) >= 12, met
 
 
@@ -290,3 +303,21 @@ def test_only_equal_seeds_give_equal_geometry_and_pixels(name):
     first = fingerprint(name, 3, "1", pixels)
     assert fingerprint(name, 3, "2", pixels) == first
     assert fingerprint(name, 4, "1") not in (first, first[:1])
+
+
+@pytest.mark.parametrize("place", [3, 15])  # stations on the right, and at the back
+def test_another_barbershop_is_closed_and_rich_and_leaves_its_cameras_clear(place):
+    built("barbershop", 0.02, place)
+    width, length, height = drawn_barbershop(place).room
+    assert_closed_and_rich((width / 2 + 1e-3, length / 2 + 0.1, height + 2e-3), 1500, 100)
+    assert nearest_geometry(cameras("barbershop")) < REACH
+
+
+def test_another_cloister_has_walls_all_round_and_leaves_its_cameras_clear():
+    built("lone_monk", 0.02, place=2)
+    middle = Vector((0, 0, 2.2))
+    for azimuth in np.linspace(0, 2 * np.pi, 72, endpoint=False):
+        for height in np.tan(np.radians([-35, -5, 0, 5, 8])):
+            hit, at, *_ = ray_cast(middle, (np.cos(azimuth), np.sin(azimuth), height))
+            assert hit and (at - middle).length < 23, (azimuth, height)
+    assert nearest_geometry(cameras("lone_monk")) < REACH

@@ -7,6 +7,8 @@ wall (+Y) has the shop window and the door, the back wall (−Y) the reception d
 
 from functools import partial
 
+import bpy
+
 from scenes.barbershop import (
     cloth,
     fittings,
@@ -23,16 +25,27 @@ from scenes.barbershop import (
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
 from scenes.barbershop.place import drawn
-from scenes.barbershop.plan import ORIGINAL
+from scenes.barbershop.plan import ORIGINAL, Barbershop
 from scenes.library.scene import Scene, fill
 
 
-def stocked(scene: Scene) -> None:
-    """The furniture that holds goods."""
+def stocked(scene: Scene[Barbershop]) -> None:
+    """The goods at the stations, in the cabinet, behind the desk, and the plants between them."""
     bottle_meshes = bottles(scene)
     pot_meshes = pots(scene)
-    for element in (stations.station_goods, stations.racks, furniture.stocked, plants.plants):
-        element(scene, bottle_meshes, pot_meshes)
+    stations.station_goods(scene, bottle_meshes, pot_meshes)
+    stations.racks(scene, bottle_meshes, pot_meshes)
+    random = scene.random("stock")
+    for owner, goods in (
+        (furniture.display_cabinet, furniture.cabinet_goods),
+        (furniture.back_cupboard, furniture.desk_goods),
+        (furniture.trolley, furniture.trolley_goods),
+    ):
+        if owner.__name__ not in scene.plan.absent:
+            earlier = set(bpy.data.objects)
+            goods(scene, random, bottle_meshes, pot_meshes)
+            scene.plan.arrange(owner.__name__, set(bpy.data.objects) - earlier)
+    plants.plants(scene, bottle_meshes, pot_meshes)
 
 
 ELEMENTS = (

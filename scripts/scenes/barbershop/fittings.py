@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.barbershop.plan import TAU, against, hanging, put, standing
+from scenes.barbershop.plan import TAU, Barbershop, put, standing
 from scenes.library.points import evenly, lattice, mirrored, polar
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, box, lettering, sheet, tube
@@ -20,8 +20,8 @@ POLE_CAP = [
 ]
 
 
-def radiator_section(scene: Scene) -> None:
-    """The radiator below the window, of many alike sections."""
+def radiator_section(scene: Scene[Barbershop]) -> None:
+    """The radiators below the windows, of many alike sections."""
     section = Model(scene)
     section.bend(
         radius=0.022,
@@ -36,14 +36,16 @@ def radiator_section(scene: Scene) -> None:
         at=[(0, 0, 0.09), (0, 0, 0.36), (0, 0, 0.63)],
         material="Cream",
     )
-    put(
-        section.mesh(name="Radiator section"),
-        where=[against("front", along=x, away=0.14, z=0.03) for x in evenly(-1.301, -0.199, 20)],
-    )
+    where = [
+        scene.plan.at_front(x, away=0.14, z=0.03)
+        for along, _ in scene.plan.windows
+        for x in evenly(along - 0.551, along + 0.551, 20)
+    ]
+    put(section.mesh(name="Radiator section"), where)
 
 
-def radiator_pipes(scene: Scene) -> None:
-    """The radiator's pipes, feet and valve."""
+def radiator_pipes(scene: Scene[Barbershop]) -> None:
+    """The radiators' pipes, feet and valves."""
     pipes = Model(scene)
     pipes.bend(
         radius=0.012,
@@ -61,10 +63,11 @@ def radiator_pipes(scene: Scene) -> None:
         at=(0.67, 0, 0.135),
         material="Brass",
     )
-    put(pipes.mesh(name="Radiator pipes"), where=against("front", along=-0.75, away=0.14))
+    where = [scene.plan.at_front(along, away=0.14) for along, _ in scene.plan.windows]
+    put(pipes.mesh(name="Radiator pipes"), where)
 
 
-def switch(scene: Scene) -> None:
+def switch(scene: Scene[Barbershop]) -> None:
     """Light switches and sockets with two levers."""
     model = Model(scene)
     model.box(size=(0.08, 0.12, 0.008), bevel=0.003, at=(0, 0, 0.004), material="Brass")
@@ -74,18 +77,11 @@ def switch(scene: Scene) -> None:
         turned=(20, 0, 0),
         material="Brass",
     )
-    put(
-        model.mesh(name="Switch"),
-        where=[
-            hanging("front", along=2.12, z=1.22),
-            hanging("back", along=-0.92, z=1.25),
-            *[hanging("left", along=y, away=0.01, z=1.03) for y in (-1.45, 1.45)],
-            hanging("left", along=0.55, away=0.01, z=1.03),
-        ],
-    )
+    where = [scene.plan.fitted(spot) for spot in scene.plan.switches]
+    put(model.mesh(name="Switch"), where)
 
 
-def vent(scene: Scene) -> None:
+def vent(scene: Scene[Barbershop]) -> None:
     """Grilles of the ventilation."""
     model = Model(scene)
     model.frame(
@@ -98,13 +94,7 @@ def vent(scene: Scene) -> None:
         turned=(35, 0, 0),
         material="Gilt",
     )
-    put(
-        model.mesh(name="Vent"),
-        where=[
-            hanging("right", along=2.9, z=2.46),
-            *[hanging("left", along=y, z=2.46) for y in (-3.52, 3.52)],
-        ],
-    )
+    put(model.mesh(name="Vent"), where=[scene.plan.fitted(spot) for spot in scene.plan.vents])
 
 
 def dustpan(scene: Scene) -> None:
@@ -117,8 +107,8 @@ def dustpan(scene: Scene) -> None:
     put(model.mesh(name="Dustpan"), where=standing(x=-1.98, y=-3.05, z=0.002, turned=100))
 
 
-def clock(scene: Scene) -> None:
-    """A railway clock beside the staff door, at ten past ten."""
+def clock(scene: Scene[Barbershop]) -> None:
+    """A railway clock, at ten past ten."""
     model = Model(scene)
     _dial_and_hands(model)
     for k in range(60):
@@ -128,7 +118,7 @@ def clock(scene: Scene) -> None:
     for k, numeral in enumerate(NUMERALS):
         at = polar(0.132, np.radians(90 - 30 * k), 0.0226)
         model.add(lettering(numeral, 0.0005), "Black", at, scale=(0.034, 0.042, 1))
-    put(model.mesh("Clock"), where=hanging("back", along=-0.88, away=0.001, z=2.5))
+    put(model.mesh("Clock"), where=scene.plan.fitted(scene.plan.clock))
 
 
 def _dial_and_hands(clock: Model) -> None:
@@ -163,7 +153,7 @@ def _dial_and_hands(clock: Model) -> None:
     clock.lathe(profile=[(0.01, 0.022), (0.01, 0.034), (0, 0.036)], material="Brass")
 
 
-def barber_pole(scene: Scene) -> None:
+def barber_pole(scene: Scene[Barbershop]) -> None:
     """The turning pole, its helix real geometry, between the window and the door."""
     model = Model(scene)
     model.lathe(profile=POLE_CAP, material="Chrome")
@@ -191,7 +181,7 @@ def barber_pole(scene: Scene) -> None:
         model.add(Shape(column.vertices, column.quads[stripe == kind]), material)
     put(
         model.mesh("Barber pole"),
-        where=against("front", along=0.78, away=0.158, z=1.38, turned=180),
+        where=scene.plan.at_front(scene.plan.pole, away=0.158, z=1.38, turned=180),
     )
 
 
@@ -207,8 +197,8 @@ def broom(scene: Scene) -> None:
     put(model.mesh(name="Broom"), where=standing(x=-2.02, y=-3.5, z=0.004), degrees=(7, -4, 35))
 
 
-def waste_bins(scene: Scene) -> None:
-    """Two bins of crumpled paper."""
+def waste_bins(scene: Scene[Barbershop]) -> None:
+    """Bins of crumpled paper."""
     waste = Model(scene)
     random = scene.random("waste")
     waste.lathe(
@@ -231,5 +221,5 @@ def waste_bins(scene: Scene) -> None:
         waste.add(crumpled, ("Paper", "White")[k % 2], at, random.uniform(0, 360, 3))
     put(
         waste.mesh(name="Waste bin"),
-        where=[standing(x=-2.28, y=-3.45), standing(x=0.72, y=-2.55, turned=70)],
+        where=[standing(x, y, turned=turn) for x, y, turn in scene.plan.bins],
     )

@@ -1,5 +1,7 @@
 """The low table with its magazines, and cabinets, cupboard and trolley full of goods."""
 
+from numpy.random import Generator
+
 from scenes.barbershop.cloth import folded_towel
 from scenes.barbershop.goods import Goods, shelf, stock
 from scenes.barbershop.plan import against, put, standing
@@ -259,19 +261,27 @@ def magazines(scene: Scene) -> None:
         put(issues[(k * 5 + 1) % 6], LOW_TABLE, at, (0, 0, random.uniform(82, 98)))
 
 
-def stocked(scene: Scene, bottles: Goods, pots: Goods) -> None:
-    """Goods in the display cabinet and on the trolley, and on shelves behind the desk."""
-    random = scene.random("stock")
+def cabinet_goods(scene: Scene, random: Generator, bottles: Goods, pots: Goods) -> None:
+    """Goods in the display cabinet."""
     wares = [*bottles, *pots]
-    board = shelf(scene, 1.4, 0.16)
     for z in (0.516, 0.89, 1.26, 1.63):
         stock(scene, random, wares, against("right", along=-1.65, away=0.065, z=z), 0.84, 0.27)
+
+
+def desk_goods(scene: Scene, random: Generator, bottles: Goods, pots: Goods) -> None:
+    """Goods on shelves behind the desk."""
+    wares = [*bottles, *pots]
+    board = shelf(scene, 1.4, 0.16)
     for z, goods in ((1.25, bottles), (1.6, wares), (1.95, wares), (2.3, wares)):
         away = 0.022 if z == 1.25 else 0  # the lowest clears the rail
         rack = against("back", along=1.68, away=away, z=z)
         put(board, rack)
         stock(scene, random, goods, rack, 1.36, 0.14)
     stock(scene, random, pots, against("back", along=1.7, away=0.1, z=0.85), 0.34, 0.18)
+
+
+def trolley_goods(scene: Scene, random: Generator, bottles: Goods, pots: Goods) -> None:
+    """Towels and pots on the trolley."""
     towel = folded_towel(scene, "Blue towel")
     for k in range(3):
         put(towel, TROLLEY, (-0.06, 0, 0.487 + 0.0455 * k), (0, 0, 2 * k))

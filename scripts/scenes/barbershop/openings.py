@@ -2,7 +2,17 @@
 
 import numpy as np
 
-from scenes.barbershop.plan import TAU, against, hanging, put, standing
+from scenes.barbershop.plan import (
+    ROOM,
+    TAU,
+    WINDOW_HEIGHT,
+    WINDOW_MIDDLE,
+    Barbershop,
+    against,
+    hanging,
+    put,
+    standing,
+)
 from scenes.library.points import evenly, lattice, mirrored, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, lettering, sheet
@@ -23,33 +33,36 @@ REVEAL = [(-0.001, -0.15), (-0.001, 0)]
 PANEL = [(-0.06, 0.022), (-0.04, 0.036), (0.02, 0.036), (0.025, 0.02)]
 
 
-def window_frame(scene: Scene) -> None:
-    """The shop window's frame with its bars and sill."""
-    model = Model(scene)
-    model.frame(size=(2.6, 1.45), profile=CASING, material="Mahogany")
-    model.frame(size=(2.6, 1.45), profile=REVEAL, material="Mahogany")
-    model.box(
-        size=(0.05, 1.45, 0.06), bevel=0.008, at=mirrored(x=0.433, z=-0.07), material="Mahogany"
-    )
-    model.box(size=(2.6, 0.05, 0.06), bevel=0.008, at=(0, 0.35, -0.07), material="Mahogany")
-    model.box(
-        size=(2.9, 0.035, 0.26),
-        bevel=0.012,
-        segments=2,
-        at=(0, -0.7425, 0.06),
-        material="Mahogany x",
-    )
-    put(model.mesh(name="Window frame"), where=hanging("front", along=-0.75, z=1.725))
+def window_frame(scene: Scene[Barbershop]) -> None:
+    """The shop windows' frames with their bars and sills."""
+    for along, width in scene.plan.windows:
+        model = Model(scene)
+        size = (width, WINDOW_HEIGHT)
+        bars = mirrored(x=round(width / 6, 3), z=-0.07)
+        model.frame(size=size, profile=CASING, material="Mahogany")
+        model.frame(size=size, profile=REVEAL, material="Mahogany")
+        model.box(size=(0.05, WINDOW_HEIGHT, 0.06), bevel=0.008, at=bars, material="Mahogany")
+        model.box(size=(width, 0.05, 0.06), bevel=0.008, at=(0, 0.35, -0.07), material="Mahogany")
+        model.box(
+            size=(width + 0.3, 0.035, 0.26),
+            bevel=0.012,
+            segments=2,
+            at=(0, -0.7425, 0.06),
+            material="Mahogany x",
+        )
+        put(model.mesh(name="Window frame"), where=scene.plan.on_front(along, z=WINDOW_MIDDLE))
 
 
-def window_pane(scene: Scene) -> None:
-    pane = Model(scene)
-    pane.plane(size=(2.6, 1.45), material="Pane")
-    put(pane.mesh(name="Window pane"), where=hanging("front", along=-0.75, away=-0.075, z=1.725))
+def window_pane(scene: Scene[Barbershop]) -> None:
+    for along, width in scene.plan.windows:
+        pane = Model(scene)
+        pane.plane(size=(width, WINDOW_HEIGHT), material="Pane")
+        where = scene.plan.on_front(along, away=-0.075, z=WINDOW_MIDDLE)
+        put(pane.mesh(name="Window pane"), where)
 
 
-def window_letters(scene: Scene) -> None:
-    """The shop's name, to be read from outside."""
+def window_letters(scene: Scene[Barbershop]) -> None:
+    """The shop's name on each window, to be read from outside."""
     letters = Model(scene)
     letters.word(
         letters="BARBER SHOP",
@@ -67,21 +80,21 @@ def window_letters(scene: Scene) -> None:
         turned=(90, 0, 0),
         material="Gilt",
     )
-    put(
-        letters.mesh(name="Window letters"),
-        where=against("front", along=-0.75, away=-0.078, z=1.725),
-    )
+    name = letters.mesh(name="Window letters")
+    for along, width in scene.plan.windows:
+        where = scene.plan.at_front(along, away=-0.078, z=WINDOW_MIDDLE)
+        put(name, where, scale=min(1.0, width / 2.6))
 
 
-def door_frame(scene: Scene) -> None:
+def door_frame(scene: Scene[Barbershop]) -> None:
     model = Model(scene)
     model.frame(size=(0.95, 2.45), profile=CASING, material="Mahogany")
     model.frame(size=(0.95, 2.45), profile=REVEAL, material="Mahogany")
     model.box(size=(0.95, 0.06, 0.07), bevel=0.008, at=(0, 0.905, -0.06), material="Mahogany")
-    put(model.mesh(name="Door frame"), where=hanging("front", along=1.475, z=1.225))
+    put(model.mesh(name="Door frame"), where=scene.plan.on_front(scene.plan.door, z=1.225))
 
 
-def door(scene: Scene) -> None:
+def door(scene: Scene[Barbershop]) -> None:
     """A panelled door with a pane, a kick plate, a letter slot and a handle."""
     model = Model(scene)
     model.box(
@@ -99,7 +112,7 @@ def door(scene: Scene) -> None:
         material="Mahogany",
     )
     _door_brass(model)
-    put(model.mesh(name="Door"), where=against("front", along=1.475, away=-0.06))
+    put(model.mesh(name="Door"), where=scene.plan.at_front(scene.plan.door, away=-0.06))
 
 
 def _door_brass(model: Model) -> None:
@@ -115,20 +128,22 @@ def _door_brass(model: Model) -> None:
     )
 
 
-def door_pane(scene: Scene) -> None:
+def door_pane(scene: Scene[Barbershop]) -> None:
     pane = Model(scene)
     pane.plane(size=(0.95, 1.06), material="Pane")
-    put(pane.mesh(name="Door pane"), where=hanging("front", along=1.475, away=-0.062, z=1.43))
+    where = scene.plan.on_front(scene.plan.door, away=-0.062, z=1.43)
+    put(pane.mesh(name="Door pane"), where)
 
 
-def transom_pane(scene: Scene) -> None:
+def transom_pane(scene: Scene[Barbershop]) -> None:
     """The pane above the door."""
     pane = Model(scene)
     pane.plane(size=(0.95, 0.29), material="Pane")
-    put(pane.mesh(name="Transom pane"), where=hanging("front", along=1.475, away=-0.062, z=2.305))
+    where = scene.plan.on_front(scene.plan.door, away=-0.062, z=2.305)
+    put(pane.mesh(name="Transom pane"), where)
 
 
-def door_sign(scene: Scene) -> None:
+def door_sign(scene: Scene[Barbershop]) -> None:
     """A sign that hangs on a cord: closed inside, open outside."""
     sign = Model(scene)
     sign.box(size=(0.3, 0.16, 0.006), bevel=0.002, material="Cream")
@@ -143,10 +158,10 @@ def door_sign(scene: Scene) -> None:
     )
     sign.tube(radius=0.0015, path=[(-0.13, 0.075, 0), (0, 0.28, -0.01)], material="Iron")
     sign.tube(radius=0.0015, path=[(0.13, 0.075, 0), (0, 0.28, -0.01)], material="Iron")
-    put(sign.mesh(name="Door sign"), where=hanging("front", along=1.475, away=-0.04, z=1.5))
+    put(sign.mesh(name="Door sign"), where=scene.plan.on_front(scene.plan.door, away=-0.04, z=1.5))
 
 
-def door_bell(scene: Scene) -> None:
+def door_bell(scene: Scene[Barbershop]) -> None:
     """The bell that the door rings."""
     bell = Model(scene)
     bell.lathe(
@@ -159,14 +174,15 @@ def door_bell(scene: Scene) -> None:
         path=[(0, 0, 0.02), (0, 0.03, 0.12), (0, 0.1, 0.12), (0, 0.12, 0.06)],
         material="Brass",
     )
-    put(bell.mesh(name="Door bell"), where=against("front", along=1.675, z=2.2))
+    put(bell.mesh(name="Door bell"), where=scene.plan.at_front(scene.plan.door + 0.2, z=2.2))
 
 
-def house_number(scene: Scene) -> None:
+def house_number(scene: Scene[Barbershop]) -> None:
     """The number on the transom, to be read from outside."""
     number = Model(scene)
     number.word(letters="27", size=0.2, depth=0.01, turned=(0, 180, 0), material="Gilt")
-    put(number.mesh(name="House number"), where=hanging("front", along=1.475, away=-0.07, z=2.305))
+    where = scene.plan.on_front(scene.plan.door, away=-0.07, z=2.305)
+    put(number.mesh(name="House number"), where)
 
 
 def staff_door_frame(scene: Scene) -> None:
@@ -235,7 +251,7 @@ def _staff_door_sign(door: Model) -> None:
     door.box(size=(0.05, 0.006, 0.2), bevel=0.002, at=(-0.37, 0.022, 0.98), material="Brass")
 
 
-def street_lamp(scene: Scene) -> None:
+def street_lamp(scene: Scene[Barbershop]) -> None:
     """A lamp on the pavement."""
     lamp = Model(scene)
     lamp.lathe(
@@ -244,24 +260,32 @@ def street_lamp(scene: Scene) -> None:
     lamp.lathe(
         profile=[(0.08, 3.0), (0.17, 3.4), (0.19, 3.42), (0.03, 3.6), (0, 3.66)], material="Cream"
     )
-    put(lamp.mesh(name="Street lamp"), where=standing(x=-2.6, y=6.2))
+    put(lamp.mesh(name="Street lamp"), where=standing(x=-2.6, y=scene.plan.half_y + 2.45))
 
 
-def valance(scene: Scene) -> None:
-    """A scalloped red curtain on a brass rod above the window."""
-    x = np.linspace(-1.4, 1.4, scene.segments(160, 24))
+def valance(scene: Scene[Barbershop]) -> None:
+    """A scalloped curtain on a brass rod above each window."""
+    for along, width in scene.plan.windows:
+        where = scene.plan.on_front(along, away=0.09, z=2.51)
+        put(_curtain(scene, width / 2 + 0.1).mesh("Valance"), where)
+
+
+def _curtain(scene: Scene, half: float) -> Model:
+    """A valance: half of its width."""
+    x = np.linspace(-half, half, scene.segments(160, 24))
     drop = np.linspace(-1, 0, scene.segments(10))[:, None]
     scallops = drop * (0.26 + 0.05 * np.cos(x * TAU / 0.35))
     model = Model(scene)
-    model.tube(radius=0.014, path=[(-1.44, 0, 0), (1.44, 0, 0)], material="Brass")
-    model.ball(radius=0.028, at=mirrored(x=1.44), material="Brass")
-    model.tube(radius=0.008, path=[(0, 0, 0), (0, 0, -0.09)], at=mirrored(x=1.42), material="Brass")
+    model.tube(radius=0.014, path=[(-half - 0.04, 0, 0), (half + 0.04, 0, 0)], material="Brass")
+    model.ball(radius=0.028, at=mirrored(x=half + 0.04), material="Brass")
+    holders = mirrored(x=half + 0.02)
+    model.tube(radius=0.008, path=[(0, 0, 0), (0, 0, -0.09)], at=holders, material="Brass")
     folds = 0.025 * np.sin(x * 40) * (0.4 - 0.6 * drop)
     model.add(sheet(xyz(x, scallops, folds)), "Red towel")
-    put(model.mesh("Valance"), where=hanging("front", along=-0.75, away=0.09, z=2.51))
+    return model
 
 
-def street(scene: Scene) -> None:
+def street(scene: Scene[Barbershop]) -> None:
     """The view through the window: pavement, road, a row of brick houses with shops."""
     model = Model(scene)
     _houses(model)
@@ -273,7 +297,7 @@ def street(scene: Scene) -> None:
         for k, color in enumerate((("Green", "Red")[i // 2 % 2], "White")):  # the awning's stripes
             stripes = xyz(x + np.arange(k - 3, 4, 2) * 0.25, 12.6, 2.55)
             model.add(box((0.25, 1.0, 0.02)), color, stripes, (25, 0, 0))
-    put(model.mesh("Street"), where=standing())
+    put(model.mesh("Street"), where=standing(y=scene.plan.half_y - ROOM[1] / 2))
 
 
 def _houses(street: Model) -> None:

@@ -1,10 +1,11 @@
-"""Draws barbershops: another size, other colours and woods, another hour, other furniture."""
+"""Draws barbershops: another layout, other colours and woods, another hour, other furniture."""
 
 from collections.abc import Mapping
 
-from scenes.barbershop.plan import WARM, Barbershop, Light
+from scenes.barbershop.layout import drawn_layout
+from scenes.barbershop.plan import WARM, Barbershop, Light, Room, Wall
 from scenes.library.materials import Color
-from scenes.library.variation import Draw, Factors
+from scenes.library.variation import Draw, Factors, Move
 
 AS_IT_IS: Factors = (1.0, 1.0, 1.0)
 
@@ -64,7 +65,6 @@ PROBABILITIES: Mapping[str, float] = {
     "wall_lettering": 0.6,
     "beam": 0.6,
     "palmette": 0.6,
-    "medallion": 0.6,
     "rug": 0.6,
     "hair_clippings": 0.6,
     "fan_blade": 0.8,
@@ -101,49 +101,6 @@ TOGETHER = {
     "umbrella_stand": ("umbrellas",),
     "fan_blade": ("fan_motor",),
 }
-# What belongs to the walls, the floor and the ceiling, or is built in, and takes their size.
-STRETCHED = frozenset(
-    [
-        "walls",
-        "wall_lettering",
-        "grout",
-        "beam",
-        "picture_rail",
-        "palmette",
-        "tiles",
-        "metro_tiles",
-        "wainscot",
-        "ceiling",
-        "window_frame",
-        "window_pane",
-        "window_letters",
-        "door_frame",
-        "door",
-        "door_pane",
-        "transom_pane",
-        "staff_door_frame",
-        "staff_door",
-        "valance",
-        "street",
-        "reception_desk",
-        "waiting_bench",
-        "display_cabinet",
-        "back_cupboard",
-        "low_table",
-        "lights",
-        "counter_drawers",
-        "counter_doors",
-        "counter_top",
-        "bulb_strip",
-        "mirror_tube",
-        "tool_mat",
-        "towel_rail",
-        "mirrors",
-        "towel_shelves",
-        "radiator_section",
-        "radiator_pipes",
-    ]
-)
 # Sky, its colour, sun and daylight in watts, the colour of both, and the lamps' factor.
 Hour = tuple[float, Color, float, float, Color, float]
 HOURS: tuple[Hour, ...] = (
@@ -157,27 +114,77 @@ HOURS: tuple[Hour, ...] = (
 LAMP_COLORS: tuple[Color, ...] = (WARM, (1.0, 0.68, 0.40), (1.0, 0.92, 0.82), (0.85, 0.95, 1.0))
 
 
+PAPERED: tuple[tuple[Wall, ...], ...] = (
+    ("right", "back"),
+    ("left", "back"),
+    ("left", "right", "back", "front"),
+    ("front", "back"),
+    (),
+)
+BOARDS = ("Oak", "Cream", "Mahogany")  # materials of ceilings
+FLOORS = ("checker", "checker", "large checker", "stripes", "diagonal", "dots", "rings")
+
+
 def drawn(place: int) -> Barbershop:
     """The plan of a place. Its rooms are never narrower than the rigs need."""
     draw = Draw(place)
-    absent = draw.absent(PROBABILITIES)
+    layout = drawn_layout(draw)
+    absent = draw.absent(PROBABILITIES) | layout.missing
     absent |= {name for owner in absent for name in TOGETHER.get(owner, ())}
     sky, sky_color, sun, daylight, color, lamps = draw.choice("hour", HOURS)
+    window = layout.windows[0].along
+    stations = layout.stations
     return Barbershop(
         absent=absent,
+        moves=layout.moves | {"medallion": _medallion(draw)},
         tints=draw.tints(TINTS),
-        stretch=(draw.uniform("width", 1.0, 1.16), draw.uniform("length", 1.0, 1.2)),
-        stretched=STRETCHED,
-        chair_turns=tuple(draw.uniform(f"chair {number}", 30, 150) for number in range(3)),
+        room=layout.room,
+        counter_wall=layout.counter_wall,
+        stations=stations,
+        pitch=layout.pitch,
+        chair_turns=tuple(draw.uniform(f"chair {i}", 30, 150) for i in range(len(stations))),
+        windows=layout.windows,
+        door=layout.door,
+        staff_door=layout.staff_door,
+        pole=layout.pole,
+        papered=frozenset(draw.choice("papered", PAPERED)) - {layout.counter_wall},
+        paper=draw.choice("paper", ("Wallpaper", "Wallpaper", "Brick")),
+        floor=draw.choice("floor", FLOORS),
+        green_rows=draw.choice("green rows", (0, 4, 7, 11, 11, 16, 23)),
+        ceiling="tin" if draw.chance("tin ceiling", 0.6) else draw.choice("boards", BOARDS),
+        pendants=_pendants(draw, layout.room),
+        lamp_shade=draw.choice("lamp shade", ("globe", "enamel")),
+        prints=layout.prints,
+        wall_lamps=layout.wall_lamps,
+        switches=layout.switches,
+        vents=layout.vents,
+        clock=layout.clock,
+        bins=layout.bins,
+        hanging_corner=layout.corners.get("hanging"),
+        tree_corner=layout.corners.get("tree"),
         light=Light(
             sky=round(sky * draw.uniform("sky", 0.8, 1.2), 4),
             sky_color=sky_color,
             sun=round(sun * draw.uniform("sun", 0.7, 1.3), 4),
             sun_color=color,
-            sun_x=draw.uniform("sun x", -3.5, 2.5),
+            sun_x=round(window + draw.uniform("sun x", -2.8, 2.8), 4),
             daylight=daylight,
             daylight_color=color if sun else sky_color,
             lamps=round(lamps * draw.uniform("lamps", 0.75, 1.3), 4),
             lamp_color=draw.choice("lamp color", LAMP_COLORS),
         ),
     )
+
+
+def _medallion(draw: Draw) -> Move:
+    """The mosaic in the middle of the floor, larger or smaller."""
+    return Move(
+        turned=draw.uniform("medallion turn", 0, 360), scale=draw.uniform("medallion", 0.7, 1.5)
+    )
+
+
+def _pendants(draw: Draw, room: Room) -> tuple[tuple[float, float], ...]:
+    """Lamps in one row or in two, away from the ceiling fan."""
+    columns = draw.choice("pendant columns", ((0.0,), (-0.23, 0.23), (-0.23, 0.23), (-0.32, 0.32)))
+    rows = draw.choice("pendant rows", ((-0.2, 0.2), (-0.2, 0.2), (-0.36, -0.15, 0.15, 0.36)))
+    return tuple((round(x * room[0], 3), round(y * room[1], 3)) for x in columns for y in rows)

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from scenes.barbershop.goods import Goods, stock
-from scenes.barbershop.plan import against, put, standing
+from scenes.barbershop.plan import Barbershop, put, standing
 from scenes.library.points import evenly, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, sheet
@@ -12,24 +12,33 @@ from scenes.library.shapes import Shape, sheet
 POTTED = {"Fern": ("Terracotta", 44), "Snake plant": ("Navy", 16), "Rubber tree": ("Brass", 26)}
 
 
-def plant_cord(scene: Scene) -> None:
+def in_corner(plan: Barbershop, corner: tuple[int, int], x: float, y: float) -> tuple[float, float]:
+    """A place x and y metres from the walls of a corner, which is given by its signs."""
+    return corner[0] * (plan.half_x - x), corner[1] * (plan.half_y - y)
+
+
+def plant_cord(scene: Scene[Barbershop]) -> None:
     """The cords of the hanging plant."""
     cord = Model(scene)
     cord.tube(radius=0.003, path=[(0.105, 0, 0.165), (0, 0, 0.78)], material="Brass")
     cord.bend(
         radius=0.003, path=[(0.105, 0, 0.165), (0.084, 0, 0), (0, 0, -0.01)], material="Brass"
     )
+    x, y = in_corner(scene.plan, scene.plan.hanging_corner, 0.26, 0.33)
     put(
         cord.mesh(name="Plant cord"),
-        where=[standing(x=-2.24, y=3.42, z=1.62, turned=turn) for turn in evenly(0, 240, 3)],
+        where=[
+            standing(x, y, z=1.62 + scene.plan.raised, turned=turn) for turn in evenly(0, 240, 3)
+        ],
     )
 
 
-def plant_hook(scene: Scene) -> None:
+def plant_hook(scene: Scene[Barbershop]) -> None:
     """The rod that they hang from."""
     hook = Model(scene)
     hook.tube(radius=0.003, path=[(0, 0, 0.77), (0, 0, 1.38)], material="Brass")
-    put(hook.mesh(name="Plant hook"), where=standing(x=-2.24, y=3.42, z=1.62))
+    x, y = in_corner(scene.plan, scene.plan.hanging_corner, 0.26, 0.33)
+    put(hook.mesh(name="Plant hook"), where=standing(x, y, z=1.62 + scene.plan.raised))
 
 
 def leaf(scene: Scene, length: float, width: float, droop: float) -> Shape:
@@ -83,20 +92,27 @@ def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
     return model.mesh(kind)
 
 
-def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
-    """Plants on the sill, bottles between them; others in the corners, one hanging."""
+def plants(scene: Scene[Barbershop], bottles: Goods, pots: Goods) -> None:
+    """Plants on the sills, bottles between them; others in the corners, one hanging."""
+    plan = scene.plan
     random = scene.random("plants")
     fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
-    for x, data in ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber)):
-        turn = (0, 0, random.uniform(0, 360))
-        put(
-            data,
-            against("front", along=x, away=0.08, z=1),
-            degrees=turn,
-            scale=random.uniform(0.5, 0.6),
-        )
-    for x in (-1.4, -0.63, 0.03):
-        stock(scene, random, bottles, against("front", along=x, away=0.05, z=1), 0.34, 0.12)
-    put(rubber, standing(x=2.18, y=3.38, turned=40), scale=1.5)
-    put(snake, standing(x=-2.22, y=3.46, turned=10), scale=1.3)
-    put(fern, standing(x=-2.24, y=3.42, z=1.62, turned=200), scale=0.8)
+    for along, width in plan.windows:
+        for aside, data in ((-1.05, fern), (-0.2, snake), (0.45, fern), (1.1, rubber)):
+            if abs(aside) > width / 2 - 0.15:
+                continue
+            turn = (0, 0, random.uniform(0, 360))
+            size = random.uniform(0.5, 0.6)
+            put(data, plan.at_front(along + aside, away=0.08, z=1), degrees=turn, scale=size)
+        for aside in (-0.65, 0.12, 0.78):
+            if abs(aside) < width / 2 - 0.15:
+                sill = plan.at_front(along + aside, away=0.05, z=1)
+                stock(scene, random, bottles, sill, 0.34, 0.12)
+    if plan.tree_corner:
+        x, y = in_corner(plan, plan.tree_corner, 0.32, 0.37)
+        put(rubber, standing(x, y, turned=40), scale=1.5)
+    if plan.hanging_corner:
+        x, y = in_corner(plan, plan.hanging_corner, 0.28, 0.29)
+        put(snake, standing(x, y, turned=10), scale=1.3)
+        x, y = in_corner(plan, plan.hanging_corner, 0.26, 0.33)
+        put(fern, standing(x, y, z=1.62 + plan.raised, turned=200), scale=0.8)

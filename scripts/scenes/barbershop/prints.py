@@ -5,7 +5,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import HAIR, INKS, Wall, hanging, put
+from scenes.barbershop.plan import HAIR, INKS, SIZES, Barbershop, hanging, put
 from scenes.library.points import circle, evenly, lattice, points
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, prism, transform
@@ -222,44 +222,16 @@ def portrait(model: Model) -> None:
     model.add(moustache(scene, 0), hair, (0, -0.018, 4), scale=(0.07, 0.07, 1))
 
 
-PICTURES = (  # the print, its name, the frame's material, the size
-    (masters, "Picture masters", "Ebony", (0.6, 0.8)),
-    (moustaches, "Picture moustaches", "Gilt", (0.5, 0.7)),
-    (prices, "Picture prices", "Oak", (0.7, 1.0)),
-    (haircuts, "Picture haircuts", "Ebony", (0.7, 0.5)),
-    (pole, "Picture pole", "Mahogany", (0.4, 0.7)),
-    (deco, "Picture deco", "Gilt", (0.5, 0.7)),
-    (landscape, "Picture landscape", "Gilt", (0.62, 0.42)),
-    (certificate, "Picture certificate", "Ebony", (0.44, 0.32)),
-    (portrait, "Picture portrait", "Gilt", (0.26, 0.34)),
-)
-HUNG: tuple[tuple[Picture, Wall, float, float], ...] = (  # picture, wall, along it, height
-    (masters, "right", -0.45, 1.68),
-    (moustaches, "right", 0.25, 1.62),
-    (landscape, "right", 0.25, 2.24),
-    (deco, "right", 0.88, 1.66),
-    (certificate, "right", -0.45, 2.36),
-    (portrait, "right", 0.88, 2.28),
-    (pole, "right", 1.72, 2.18),
-    (portrait, "right", 1.35, 1.5),
-    (certificate, "right", 2.25, 2.45),
-    (haircuts, "right", -1.65, 2.45),
-    (pole, "right", -3.35, 1.75),
-    (portrait, "right", -2.75, 1.5),
-    (landscape, "right", -2.8, 1.98),
-    (certificate, "right", -2.75, 2.42),
-    (deco, "right", 3.2, 1.9),
-    (prices, "back", 0.45, 1.68),
-    (haircuts, "back", 0.45, 2.55),
-    (moustaches, "back", -2.27, 1.7),
-    (landscape, "back", -1.52, 2.48),
-    (certificate, "back", -2.25, 2.35),
-    (portrait, "back", -0.35, 2.55),
-    (certificate, "front", 2.25, 1.55),
-    (portrait, "front", 2.25, 1.95),
-    (portrait, "front", -2.3, 1.5),
-    (pole, "front", -2.28, 2.15),
-    (certificate, "front", 2.25, 2.35),
+PICTURES: tuple[tuple[Picture, str, str], ...] = (  # the print, its name, the frame's material
+    (masters, "masters", "Ebony"),
+    (moustaches, "moustaches", "Gilt"),
+    (prices, "prices", "Oak"),
+    (haircuts, "haircuts", "Ebony"),
+    (pole, "pole", "Mahogany"),
+    (deco, "deco", "Gilt"),
+    (landscape, "landscape", "Gilt"),
+    (certificate, "certificate", "Ebony"),
+    (portrait, "portrait", "Gilt"),
 )
 
 
@@ -287,17 +259,17 @@ def _frame(model: Model, border: str, size: tuple[float, float]) -> None:
     )
 
 
-def pictures(scene: Scene) -> None:
+def pictures(scene: Scene[Barbershop]) -> None:
     """The framed prints on the walls."""
     meshes = {}
-    for picture, name, border, size in PICTURES:
+    for picture, name, border in PICTURES:
         model = Model(scene)
         picture(model)
         printed(model, 0.011)
-        _frame(model, border, size)
-        meshes[picture] = model.mesh(name)
-    for picture, wall, along, z in HUNG:
-        put(meshes[picture], hanging(wall, along=along, away=0.001, z=z))
+        _frame(model, border, SIZES[name])
+        meshes[name] = model.mesh(f"Picture {name}")
+    for name, wall, along, z in scene.plan.prints:
+        put(meshes[name], hanging(wall, along=along, away=0.001, z=z, room=scene.plan.room))
 
 
 def magazine(scene: Scene, number: int) -> bpy.types.Mesh:

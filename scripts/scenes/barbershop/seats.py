@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import STATIONS, Barbershop, against, put, standing
+from scenes.barbershop.plan import HEADINGS, Barbershop, against, position, put, standing
 from scenes.library.points import evenly, lattice, mirrored, rectangle, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, copies, join, prism, sheet
@@ -31,13 +31,18 @@ def cushion(scene: Scene, size: Sequence[float], tufts: Sequence[int]) -> Shape:
 
 
 def barber_chairs(scene: Scene[Barbershop]) -> None:
-    """Three hydraulic chairs, turned to their mirrors, on mats of ribbed rubber."""
-    seat, back = chair_seat(scene), chair_back(scene)
-    for y, turn in zip(STATIONS, scene.plan.chair_turns, strict=True):
-        where = standing(x=-1.38, y=y, z=0.009, turned=turn)
+    """Hydraulic chairs, turned to their mirrors, on mats of ribbed rubber."""
+    plan = scene.plan
+    seat = chair_seat(scene)
+    back = chair_back(scene)
+    heading = HEADINGS[plan.counter_wall] - HEADINGS["left"]
+    for along, turn in zip(plan.stations, plan.chair_turns, strict=True):
+        x, y = position(plan.counter_wall, along, away=1.12, room=plan.room)
+        where = standing(x, y, z=0.009, turned=heading + turn)
         put(seat, where)
         put(back, where, (0, -0.25, 0.58), (14, 0, 0))
-    put(chair_mat(scene), where=[standing(x=-1.4, y=y) for y in STATIONS])
+    spots = [position(plan.counter_wall, y, away=1.1, room=plan.room) for y in plan.stations]
+    put(chair_mat(scene), where=[standing(x, y) for x, y in spots])
 
 
 def chair_seat(scene: Scene) -> bpy.types.Mesh:

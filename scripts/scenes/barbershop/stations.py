@@ -5,7 +5,7 @@ import numpy as np
 
 from scenes.barbershop.cloth import folded_towel, rolled_towel
 from scenes.barbershop.goods import Goods, shelf, stock
-from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, against, hanging, put
+from scenes.barbershop.plan import COUNTER_TOP, TOWELS, Barbershop, put
 from scenes.library.points import circle, evenly, lattice, mirrored, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, prism, sheet, transform, tube
@@ -18,6 +18,7 @@ PANEL = [
     (0.015, 0.006),
     (0.02, 0),
 ]
+CABINET = 0.64  # its width
 KNOB = [(0.008, 0), (0.008, 0.014), (0.017, 0.02), (0.014, 0.03), (0, 0.032)]
 BLADE = [(-0.005, -0.01), (0.006, -0.01), (0.007, 0.02), (0.001, 0.1), (-0.002, 0.1)]  # of scissors
 
@@ -34,7 +35,14 @@ def _cabinet(model: Model) -> None:
     model.box(size=(0.64, 0.35, 0.09), at=(0, 0.175, 0.045), material="Ebony")
 
 
-def counter_drawers(scene: Scene) -> None:
+def _cabinets(plan: Barbershop) -> list[float]:
+    """Where the cabinets stand along their wall, side by side below all stations."""
+    count = round((plan.pitch * len(plan.stations) + 0.4) / CABINET)
+    half = CABINET * (count - 1) / 2
+    return evenly(plan.counter_middle - half, plan.counter_middle + half, count)
+
+
+def counter_drawers(scene: Scene[Barbershop]) -> None:
     """Cabinets of four drawers."""
     drawers = Model(scene)
     _cabinet(drawers)
@@ -53,11 +61,11 @@ def counter_drawers(scene: Scene) -> None:
     )
     put(
         drawers.mesh(name="Counter drawers"),
-        where=[against("left", along=y) for y in evenly(-2.88, 2.24, 5)],
+        where=[scene.plan.at_counter(along) for along in _cabinets(scene.plan)[::2]],
     )
 
 
-def counter_doors(scene: Scene) -> None:
+def counter_doors(scene: Scene[Barbershop]) -> None:
     """Cabinets of two doors."""
     doors = Model(scene)
     _cabinet(doors)
@@ -73,21 +81,23 @@ def counter_doors(scene: Scene) -> None:
     )
     put(
         doors.mesh(name="Counter doors"),
-        where=[against("left", along=y) for y in evenly(-2.24, 2.88, 5)],
+        where=[scene.plan.at_counter(along) for along in _cabinets(scene.plan)[1::2]],
     )
 
 
-def counter_top(scene: Scene) -> None:
+def counter_top(scene: Scene[Barbershop]) -> None:
     """One marble top over all cabinets, with a ledge at the wall."""
     top = Model(scene)
+    width = CABINET * len(_cabinets(scene.plan)) + 0.04
     top.box(
-        size=(6.44, 0.44, 0.04), bevel=0.012, segments=3, at=(0, 0.22, -0.02), material="Marble"
+        size=(width, 0.44, 0.04), bevel=0.012, segments=3, at=(0, 0.22, -0.02), material="Marble"
     )
-    top.box(size=(6.44, 0.022, 0.09), bevel=0.006, at=(0, 0.023, 0.045), material="Marble")
-    put(top.mesh(name="Counter top"), where=against("left", z=COUNTER_TOP))
+    top.box(size=(width, 0.022, 0.09), bevel=0.006, at=(0, 0.023, 0.045), material="Marble")
+    where = scene.plan.at_counter(scene.plan.counter_middle, z=COUNTER_TOP)
+    put(top.mesh(name="Counter top"), where)
 
 
-def bulb_strip(scene: Scene) -> None:
+def bulb_strip(scene: Scene[Barbershop]) -> None:
     """Strips of round bulbs beside the mirrors."""
     strip = Model(scene)
     strip.box(size=(0.07, 1.1, 0.03), bevel=0.008, segments=2, at=(0, 0, 0.015), material="Brass")
@@ -100,13 +110,14 @@ def bulb_strip(scene: Scene) -> None:
     put(
         strip.mesh(name="Bulb strip"),
         where=[
-            *[hanging("left", along=y, away=0.012, z=1.62) for y in evenly(-2.625, 1.375, 3)],
-            *[hanging("left", along=y, away=0.012, z=1.62) for y in evenly(-1.375, 2.625, 3)],
+            scene.plan.over_counter(along + aside, away=0.012, z=1.62)
+            for aside in (-0.625, 0.625)
+            for along in scene.plan.stations
         ],
     )
 
 
-def mirror_tube(scene: Scene) -> None:
+def mirror_tube(scene: Scene[Barbershop]) -> None:
     """A lamp above each mirror."""
     lamp = Model(scene)
     lamp.box(size=(0.98, 0.07, 0.05), bevel=0.012, segments=2, at=(0, 0, 0.025), material="Chrome")
@@ -118,10 +129,11 @@ def mirror_tube(scene: Scene) -> None:
         material="Chrome",
     )
     lamp.box(size=(0.03, 0.04, 0.06), at=mirrored(x=0.47, z=0.05), material="Chrome")
-    put(lamp.mesh(name="Mirror tube"), where=[hanging("left", along=y, z=2.41) for y in STATIONS])
+    where = [scene.plan.over_counter(along, z=2.41) for along in scene.plan.stations]
+    put(lamp.mesh(name="Mirror tube"), where)
 
 
-def basin(scene: Scene) -> None:
+def basin(scene: Scene[Barbershop]) -> None:
     model = Model(scene)
     model.lathe(
         profile=[
@@ -142,11 +154,13 @@ def basin(scene: Scene) -> None:
     model.lathe(profile=[(0.026, 0.021), (0.026, 0.026), (0, 0.026)], material="Chrome")
     put(
         model.mesh(name="Basin"),
-        where=[against("left", along=y, away=0.24, z=COUNTER_TOP) for y in STATIONS],
+        where=[
+            scene.plan.at_counter(along, away=0.24, z=COUNTER_TOP) for along in scene.plan.stations
+        ],
     )
 
 
-def tap(scene: Scene) -> None:
+def tap(scene: Scene[Barbershop]) -> None:
     model = Model(scene)
     model.lathe(profile=[(0.028, 0), (0.028, 0.012), (0.014, 0.03)], material="Chrome")
     model.bend(
@@ -173,20 +187,25 @@ def tap(scene: Scene) -> None:
     )
     put(
         model.mesh(name="Tap"),
-        where=[against("left", along=y, away=0.06, z=COUNTER_TOP) for y in STATIONS],
+        where=[
+            scene.plan.at_counter(along, away=0.06, z=COUNTER_TOP) for along in scene.plan.stations
+        ],
     )
 
 
-def tool_mat(scene: Scene) -> None:
+def tool_mat(scene: Scene[Barbershop]) -> None:
     mat = Model(scene)
     mat.box(size=(0.3, 0.2, 0.006), bevel=0.002, at=(0, 0, 0.003), material="White towel")
     put(
         mat.mesh(name="Tool mat"),
-        where=[against("left", along=y, away=0.26, z=COUNTER_TOP) for y in evenly(-2.44, 1.56, 3)],
+        where=[
+            scene.plan.at_counter(along, away=0.26, z=COUNTER_TOP, x=0.44)
+            for along in scene.plan.stations
+        ],
     )
 
 
-def towel_rail(scene: Scene) -> None:
+def towel_rail(scene: Scene[Barbershop]) -> None:
     """Rails at the counter's front."""
     rail = Model(scene)
     rail.bend(
@@ -204,7 +223,10 @@ def towel_rail(scene: Scene) -> None:
     )
     put(
         rail.mesh(name="Towel rail"),
-        where=[against("left", along=y, away=0.43, z=0.72) for y in (-1, 1)],
+        where=[
+            scene.plan.at_counter(along, away=0.43, z=0.72)
+            for along in scene.plan.beside_stations[1:-1]
+        ],
     )
 
 
@@ -319,7 +341,7 @@ def hair_brush(scene: Scene) -> bpy.types.Mesh:
     return model.mesh("Hair brush")
 
 
-def mirrors(scene: Scene) -> None:
+def mirrors(scene: Scene[Barbershop]) -> None:
     """A mirror at each station in a gilt frame with beads, a crest and scrolls."""
     model = Model(scene)
     model.plane(size=(0.92, 1.1), at=(0, 0, 0.026), material="Mirror")
@@ -351,20 +373,20 @@ def mirrors(scene: Scene) -> None:
         model.add(scene.bend(spiral * (side, 1, 1), 0.008, 30), "Gilt")
     put(
         model.mesh("Station mirror"),
-        [hanging("left", along=y, away=0.012, z=1.62) for y in STATIONS],
+        [scene.plan.over_counter(along, away=0.012, z=1.62) for along in scene.plan.stations],
     )
 
 
-def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
-    """The tools, bottles and pots of the three stations."""
+def station_goods(scene: Scene[Barbershop], bottles: Goods, pots: Goods) -> None:
+    """The tools, bottles and pots of the stations."""
     random = scene.random("station goods")
     cutter = scissors(scene)
     clipper = clippers(scene)
     dryer = hair_dryer(scene)
     kit = [cutter, comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
     kit += [razor(scene), cutter]
-    for y in STATIONS:
-        where = against("left", along=y, z=COUNTER_TOP)
+    for along in scene.plan.stations:
+        where = scene.plan.at_counter(along, z=COUNTER_TOP)
         for k, tool in enumerate(kit):
             put(tool, where, (0.33 + 0.045 * k, 0.26, 0.0065), (0, 0, random.uniform(-7, 7)))
         put(clipper, where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
@@ -374,22 +396,22 @@ def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
             stock(scene, random, [*pots, *some], strip, 0.42, 0.14)
 
 
-def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
+def racks(scene: Scene[Barbershop], bottles: Goods, pots: Goods) -> None:
     """The shelves between the mirrors, with pots and towels below them, and towels over rails."""
     random = scene.random("racks")
     board = shelf(scene, 0.56, 0.14)
     folded = [folded_towel(scene, towel) for towel in TOWELS]
     rolled = [rolled_towel(scene, towel) for towel in TOWELS[:2]]
-    for y in (-3, -1, 1, 3):
+    for number, along in enumerate(scene.plan.beside_stations):
         for z, goods in ((1.24, 1), (1.58, 1), (1.92, 1), (2.26, 0)):
-            rack = against("left", along=y, away=0.012, z=z)
+            rack = scene.plan.at_counter(along, away=0.012, z=z)
             put(board, rack)
             stock(scene, random, [*bottles, *pots] if goods else bottles, rack, 0.54, 0.125)
-        side = against("left", along=y, away=0.04, z=COUNTER_TOP)
+        side = scene.plan.at_counter(along, away=0.04, z=COUNTER_TOP)
         stock(scene, random, pots, side, 0.72, 0.14)
         for k in range(3):
             turn = (0, 0, random.uniform(-4, 4))
-            put(folded[(k + y) % 4], side, (-0.22, 0.26, 0.045 * k), turn)
+            put(folded[(k + 2 * number + 1) % 4], side, (-0.22, 0.26, 0.045 * k), turn)
         for k, (x, z) in enumerate(((0.13, 0), (0.225, 0), (0.1775, 0.076))):
             put(rolled[k % 2], side, (x, 0.26, z))
     x = np.linspace(-0.16, 0.16, scene.segments(28, 6))
@@ -397,6 +419,7 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
     bow = np.clip(s / 0.022, -np.pi / 2, np.pi / 2)
     y = 0.022 * np.sin(bow) + 0.016 * np.sin(38 * x + 2) * np.abs(s) / 0.4
     draped = sheet(xyz(x, y, 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)))
-    for along, color in ((-1, "red"), (1, "blue")):
+    rails = scene.plan.beside_stations[1:-1]
+    for number, color in enumerate(("red", "blue")):
         towel = scene.mesh(f"Draped {color} towel", draped, f"{color.capitalize()} towel")
-        put(towel, against("left", along=along, away=0.5, z=0.706))
+        put(towel, [scene.plan.at_counter(along, away=0.5, z=0.706) for along in rails[number::2]])

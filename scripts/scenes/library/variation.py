@@ -85,29 +85,16 @@ class Variation:
     """What a place changes in any scene. Without arguments it changes nothing.
 
     absent: names of elements. moves: by the names of elements. tints: by the names of materials.
-    stretch: along x and y, about the origin. It moves all objects, and stretches the elements that
-    are named in `stretched`.
     """
 
     absent: frozenset[str] = frozenset()
     moves: Mapping[str, Move] = field(default_factory=dict)
     tints: Mapping[str, Factors] = field(default_factory=dict)
-    stretch: tuple[float, float] = (1.0, 1.0)
-    stretched: frozenset[str] = frozenset()
 
     def arrange(self, element: str, objects: Iterable[bpy.types.Object]) -> None:
         """Bring the objects of an element to where this place has them."""
         if element in self.moves:
             move(objects, self.moves[element].matrix())
-        if self.stretch == (1.0, 1.0):
-            return
-        wider = Matrix.Diagonal((*self.stretch, 1.0, 1.0))
-        for obj in objects:
-            if element in self.stretched:
-                move([obj], wider)
-            else:
-                spot = obj.matrix_world.translation
-                move([obj], Matrix.Translation(wider @ spot - spot))
 
 
 AS_IT_IS = Variation()

@@ -9,7 +9,6 @@ from scenes.library.shapes import Shape, copies, grid, join, sheet
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE_WALL, SPRINGING, VAULT_RISE, Cloister
 
-ARCH_RADIUS = 0.92
 # A column's base, shaft and neck, and the bell of its capital: radius and height.
 SHAFT = [
     (0.125, 0.115),
@@ -64,11 +63,11 @@ PIER_HEAD = [
     (0.78, 0.78, -0.01),
     (0.75, 0.75, 0),
 ]
-# Courses of the low wall: stones, how far they leave the gate open, depth, middle z, and height.
+# Courses of the low wall: stones, how far they reach into the gate's bay, depth, middle z, height.
 LOW_WALL = [
-    (10, 0.9, 0.54, 0.13, 0.246),
-    (10, 0.9, 0.54, 0.38, 0.246),
-    (6, 0.87, 0.66, 0.552, 0.096),
+    (10, 0.2, 0.54, 0.13, 0.246),
+    (10, 0.2, 0.54, 0.38, 0.246),
+    (6, 0.23, 0.66, 0.552, 0.096),
 ]
 
 
@@ -77,10 +76,11 @@ def arcades(scene: Scene[Cloister]) -> None:
     # The wall over one arch, with voussoirs and hood moulds; its origin is at the springing.
     bay = Model(scene)
     n = scene.segments(24)
-    opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
+    radius = scene.plan.arch_radius
+    opening = arch_outline(radius, 0.0, 0.0, radius, n)
     wall = panel(scene.plan.bay, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
-    bay.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
-    bay.add(arch_stones(ARCH_RADIUS - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
+    bay.add(wall, scene.plan.arcade_stuff, (0, 0.03 - ARCADE_WALL / 2, 0))
+    bay.add(arch_stones(radius - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
     x, z = arch_outline(scene.plan.bay / 2 - 0.001, 0.0, 0.0, scene.plan.bay / 2 - 0.001, n).T
     hood = scene.tube(xyz(x, 0, z), 0.035)
     for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
@@ -104,7 +104,8 @@ def arcades(scene: Scene[Cloister]) -> None:
     pier.add(pillar(PIER_HEAD), "Carved stone", (0, 0, SPRINGING))
     scene.plan.on_sides("Pier", [pier.mesh("Pier")], -scene.plan.arcade, scene.plan.arcade)
     random = scene.random("low wall")
-    for count, gate, depth, z, height in points(LOW_WALL):
+    for count, into_gate, depth, z, height in points(LOW_WALL):
+        gate = round(scene.plan.bay / 2 - into_gate, 4)
         for sign in (-1, 1):
             middle, length = cut(random, gate, scene.plan.arcade - 0.38, int(count))
             places = xyz(sign * middle, scene.plan.arcade, z)

@@ -6,7 +6,7 @@ from scenes.library.architecture import arch_outline, blocks, filled, panel, sto
 from scenes.library.points import Array, circle, polar, xyz
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import box, join, lathe, transform
-from scenes.lone_monk.plan import EAST, NORTH, SIDES, Cloister
+from scenes.lone_monk.plan import SIDES, Cloister
 from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
 from scenes.lone_monk.walls import glaze, wall
 
@@ -40,6 +40,7 @@ MINUTE_HAND = [(0, -0.05, 0.22, 0.035, 0.015, 0.54)]
 
 def church(scene: Scene[Cloister]) -> None:
     """Seven bays of brick between pilaster strips, with lancets and a rose, under a frieze."""
+    side = scene.plan.church_side
     width = _bay_width(scene)
     area = (width, scene.plan.lean_to_top, TOP, 0.5)
     hole = arch_outline(*LANCET, scene.segments(20))
@@ -59,8 +60,8 @@ def church(scene: Scene[Cloister]) -> None:
     rose.add(upright(join(parts)), "Limestone", (0, 0.16, height))
     rose.add(filled(hole, 0.3), "Glass")
     x = np.delete(in_row(scene, BAYS), BAYS // 2)
-    scene.plan.on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, scene.plan.back, sides=[EAST])
-    scene.plan.on_sides("Rose bay", [rose.mesh("Rose bay")], 0, scene.plan.back, sides=[EAST])
+    scene.plan.on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, scene.plan.back, sides=[side])
+    scene.plan.on_sides("Rose bay", [rose.mesh("Rose bay")], 0, scene.plan.back, sides=[side])
     frieze = Model(scene)
     strip = Model(scene)
     low = TOP - 0.62
@@ -72,7 +73,7 @@ def church(scene: Scene[Cloister]) -> None:
         [frieze.mesh("Frieze")],
         in_row(scene, 7 * BAYS) / 7,
         scene.plan.back - 0.13,
-        sides=[EAST],
+        sides=[side],
     )
     height = TOP - scene.plan.lean_to_top - 0.1
     strip.add(
@@ -81,9 +82,9 @@ def church(scene: Scene[Cloister]) -> None:
         (0, scene.plan.back - 0.06, scene.plan.lean_to_top + height / 2),
     )
     scene.plan.on_sides(
-        "Pilaster strip", [strip.mesh("Pilaster strip")], in_row(scene, BAYS + 1), sides=[EAST]
+        "Pilaster strip", [strip.mesh("Pilaster strip")], in_row(scene, BAYS + 1), sides=[side]
     )
-    house(scene, EAST, (-scene.plan.back, scene.plan.back + 3.5), TOP, 14, "Brick")
+    house(scene, side, (-scene.plan.back, scene.plan.back + 3.5), TOP, 14, "Brick")
 
 
 def in_row(scene: Scene[Cloister], count: int) -> Array:
@@ -97,7 +98,8 @@ def _bay_width(scene: Scene[Cloister]) -> float:
 
 def tower(scene: Scene[Cloister]) -> None:
     """The tower: four sides alike about one core, under a pyramid of tiles."""
-    at = scene.plan.side(NORTH, (scene.plan.back + HALF, scene.plan.back + HALF, 0))
+    beside_church = (scene.plan.church_side + 1) % 4
+    at = scene.plan.side(beside_church, (scene.plan.back + HALF, scene.plan.back + HALF, 0))
     place("Tower", core(scene).mesh("Tower"), at)
     opening = arch_outline(0.62, BELFRY + 0.5, TOWER_TOP - 1.3, 0.62, scene.segments(20))
     belfry = wall(scene, "Brick", (HALF, BELFRY, TOWER_TOP, 0.45), opening, (0.14, 0.05))

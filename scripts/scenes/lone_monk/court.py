@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
+import bpy
 import numpy as np
 from numpy.random import Generator
 
@@ -10,7 +11,7 @@ from scenes.library.architecture import blocks, cut, ring_of_stones, stones
 from scenes.library.plants import blade, folded_leaf
 from scenes.library.points import noise, polar, xyz
 from scenes.library.scene import Model, Scene
-from scenes.library.shapes import Shape, copies, grid, join, transform
+from scenes.library.shapes import Shape, copies, grid, icosphere, join, transform
 from scenes.lone_monk.plan import CROSS_PATH, PLAZA, WALK_FLOOR, Cloister
 
 CELLS = 16  # of grass along a lawn's edge
@@ -61,14 +62,19 @@ def slabs(random: Generator, area: Sequence[float], size: Sequence[float], top: 
 
 
 def lawns(scene: Scene[Cloister]) -> None:
-    """Turf and grass; the corner of each lawn next to the well is cut round."""
+    """Turf and grass, gravel, or slabs; the corner of each lawn next to the middle is cut round."""
     random = scene.random("lawns")
     cell = (scene.plan.lawn - CROSS_PATH) / CELLS
     lawn = Model(scene)
     along = np.linspace(CROSS_PATH, scene.plan.lawn, 25)
     x, y = np.meshgrid(along, along)
     bumps = 0.012 * noise(xyz(x, y) * 1.5, scene.seed) - 0.01
-    lawn.add(grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps)), "Turf")
+    surface = grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps))
+    lawn.add(surface, "Turf" if scene.plan.ground == "lawn" else "Dry earth")
+    if scene.plan.ground == "paved":
+        quarter = (CROSS_PATH, scene.plan.lawn, CROSS_PATH, scene.plan.lawn)
+        coarser = min(1.0, scene.detail) ** -0.5
+        lawn.add(slabs(scene.random("slabs"), quarter, (0.9 * coarser, 0.75), 0.02), "Paving")
     # Kerb stones round it, and round its cut corner.
     corner = np.arcsin(CROSS_PATH / PLAZA)
     arc = ring_of_stones(5, PLAZA + 0.05, 0.1, 0.0, 0.14, np.pi / 2 - 2 * corner)
@@ -79,24 +85,36 @@ def lawns(scene: Scene[Cloister]) -> None:
         lawn.add(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)), "Limestone")
         lawn.add(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)), "Limestone")
     scene.plan.on_sides("Lawn", [lawn.mesh("Lawn")])
-    patches = []
-    count = scene.count(150)
-    for _ in range(6):  # squares of grass, with a daisy here and there
-        foot = xyz(*random.uniform(-cell / 2, cell / 2, (2, count)), -0.01)
-        forward = random.normal(0, (1, 1, 0), (count, 3))
-        up = random.normal((0, 0, 1), 0.3, (count, 3))
-        parts = [
-            copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))
-        ]
-        for _ in range(random.integers(2)):
-            petals = polar(1, np.arange(8) * np.pi / 4, 0.25)
-            middle = foot[0] + (0, 0, 0.08)
-            parts.append(
-                copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1)
-            )
-        patches.append(scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False))
+    if scene.plan.ground == "paved":
+        return
+    random_patch = {"lawn": grass, "gravel": pebbles}[scene.plan.ground]
+    patches = [random_patch(scene, random, cell) for _ in range(6)]
     x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * cell
     x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
     turn = 90 * random.integers(4, size=len(x))
     size = random.uniform(0.95, 1.15, len(x))
     scene.plan.on_sides("Grass", patches, x, y, 0, turn, size)
+
+
+def grass(scene: Scene, random: Generator, cell: float) -> bpy.types.Mesh:
+    """A square of grass, with a daisy here and there."""
+    count = scene.count(150)
+    foot = xyz(*random.uniform(-cell / 2, cell / 2, (2, count)), -0.01)
+    forward = random.normal(0, (1, 1, 0), (count, 3))
+    up = random.normal((0, 0, 1), 0.3, (count, 3))
+    parts = [copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))]
+    for _ in range(random.integers(2)):
+        petals = polar(1, np.arange(8) * np.pi / 4, 0.25)
+        middle = foot[0] + (0, 0, 0.08)
+        parts.append(copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1))
+    return scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False)
+
+
+def pebbles(scene: Scene, random: Generator, cell: float) -> bpy.types.Mesh:
+    """A square of loose pebbles."""
+    count = scene.count(260)
+    at = xyz(*random.uniform(-cell / 2, cell / 2, (2, count)), 0.0)
+    stone = icosphere(1).scaled(1.0, 0.8, 0.45)
+    forward = random.normal(0, (1, 1, 0), (count, 3))
+    scattered = copies(stone, at, forward, (0, 0, 1), random.uniform(0.008, 0.03, count))
+    return scene.mesh("Pebbles", scattered, "Limestone")

@@ -49,12 +49,7 @@ HAIR = [
 def monk(scene: Scene[Cloister]) -> None:
     """The monk, 1.8 m high, facing +X."""
     model = Model(scene)
-    around = np.linspace(0, 2 * np.pi, scene.segments(72, 12), endpoint=False)
-    z = points(ROBE)[:, :1]
-    swing = 9 * around + 1.3 * np.sin(2 * around)
-    folds = np.sin(swing + 0.8 * z) + np.sin(14 * around + 2 * z) / 2
-    model.add(garment(ROBE, around, folds, 0.88), "Robe")
-    model.add(garment(CAPE, around, np.sin(7 * around + 0.6), 0.82), "Robe")
+    add_robe(scene, model, "Robe")
     t = np.linspace(0, 1, 9)[:, None]
     shoulder, elbow, hand = points(SLEEVE)
     arm = (1 - t) ** 2 * shoulder + 2 * t * (1 - t) * elbow + t**2 * hand
@@ -79,6 +74,16 @@ def monk(scene: Scene[Cloister]) -> None:
     x, y, turn = scene.plan.monk
     mesh = model.mesh("Monk", smooth=np.radians(50))
     place("Monk", mesh, scene.plan.side(NORTH, (x, y, 0.015), turn, 1.06))
+
+
+def add_robe(scene: Scene, model: Model, material: str) -> None:
+    """Add robe and cape, in folds."""
+    around = np.linspace(0, 2 * np.pi, scene.segments(72, 12), endpoint=False)
+    z = points(ROBE)[:, :1]
+    swing = 9 * around + 1.3 * np.sin(2 * around)
+    folds = np.sin(swing + 0.8 * z) + np.sin(14 * around + 2 * z) / 2
+    model.add(garment(ROBE, around, folds, 0.88), material)
+    model.add(garment(CAPE, around, np.sin(7 * around + 0.6), 0.82), material)
 
 
 def garment(profile: Points, around: Array, folds: Array, depth: float) -> Shape:

@@ -8,6 +8,7 @@ the well, x runs along the side, and y points out of the court.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -37,11 +38,22 @@ SLOPE = np.radians(24)
 SIDES = NORTH, WEST, SOUTH, EAST = range(4)  # each a quarter turn on from the north
 
 
+class House(NamedTuple):
+    """The storeys over the walk of a side: the heights of their tops, from below."""
+
+    side: int
+    tops: tuple[float, ...]
+
+
 @dataclass(frozen=True)
 class Cloister(Variation):
     """The measures of a cloister. Without arguments they are the original's.
 
-    A bay of an arcade reaches from column to column. The middle one is the gate.
+    A bay of an arcade reaches from column to column. The middle one is the gate. A side has the
+    church, a house, or a low wall over its walk. middle: what stands in the court's middle, a name
+    in `middles.MIDDLES`. ground: of the four quarters of the court, "lawn", "gravel" or "paved".
+    arcade_stuff, walk_stuff, house_stuff: materials of the arcades over the columns, of the walls
+    behind the walks, and of the storeys.
     """
 
     center: tuple[float, float] = (
@@ -51,9 +63,18 @@ class Cloister(Variation):
     bay: float = 2.2
     bays: int = 7
     walk: float = 2.7  # clear width of the vaulted walks
+    church_side: int = EAST
+    houses: tuple[House, ...] = (House(NORTH, (7.7,)), House(SOUTH, (7.2,)))
+    middle: str = "well"
+    ground: str = "lawn"
+    has_hedges: bool = False
+    arcade_stuff: str = "Plaster"
+    walk_stuff: str = "Whitewash"
+    house_stuff: str = "Plaster"
+    ivy_side: int = SOUTH
     # In the court's frame: x, y, and turn in degrees.
-    olive: tuple[float, float] = (-3.5, 3.5)
-    cypress: tuple[float, float] = (3.6, 3.7)
+    olives: tuple[tuple[float, float], ...] = ((-3.5, 3.5),)
+    cypresses: tuple[tuple[float, float], ...] = ((3.6, 3.7),)
     chair: tuple[float, float] = (4.5, -2.2)
     monk: tuple[float, float, float] = (4.35, -0.25, 177)
     sun_azimuth: float = np.radians(204)
@@ -61,7 +82,20 @@ class Cloister(Variation):
     sun: float = 16.0
     sun_color: Color = (1.0, 0.80, 0.56)
     sky: float = 0.34
+    cloud_color: Color = (9.0, 8.6, 8.2)  # before the sky's strength
     clouds: tuple[float, float] = (0.50, 0.78)  # the noise at which they begin and are full
+
+    @property
+    def low_sides(self) -> tuple[int, ...]:
+        """The sides with neither church nor house."""
+        built = {house.side for house in self.houses}
+        if "church" not in self.absent:
+            built.add(self.church_side)
+        return tuple(side for side in SIDES if side not in built)
+
+    @property
+    def arch_radius(self) -> float:
+        return round(self.bay / 2 - 0.18, 4)
 
     @property
     def arcade(self) -> float:

@@ -1,5 +1,6 @@
 """The plants in and over the court, and fallen leaves."""
 
+import bpy
 import numpy as np
 
 from scenes.library.plants import Growth, branches, folded_leaf, leaf_cloud, leaves_at, leaves_on
@@ -16,7 +17,7 @@ from scenes.library.points import (
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import copies, icosphere
 from scenes.lone_monk import plan
-from scenes.lone_monk.plan import ARCADE_TOP, EAST, NORTH, SOUTH, WEST, Cloister
+from scenes.lone_monk.plan import ARCADE_TOP, CROSS_PATH, EAST, NORTH, PLAZA, WEST, Cloister
 
 OLIVE = Growth((1.35, 2.0, 0.95), (6, 9), (0.9, 0.9), (0.1, 0.12, 0.02), 0.27, 0.22, bare=0.75)
 # x, y, size
@@ -42,7 +43,9 @@ def olive_tree(scene: Scene[Cloister]) -> None:
     leaf = folded_leaf(0.24)
     count = scene.count(320)
     tree.add(leaves_on(random, twigs, leaf, count, (0.05, 0.07), 0.1, 0.09), "Olive leaf")
-    place("Olive", tree.mesh("Olive"), scene.plan.side(NORTH, (*scene.plan.olive, 0)))
+    mesh = tree.mesh("Olive")
+    for number, spot in enumerate(scene.plan.olives):
+        place("Olive", mesh, scene.plan.side(NORTH, (*spot, 0), 77 * number))
 
 
 def flame(t: Array) -> Array:
@@ -50,8 +53,10 @@ def flame(t: Array) -> Array:
     return np.sin(np.pi * (t * 0.93 + 0.05)) ** 0.6 * (1 - 0.45 * t)
 
 
-def cypresses(scene: Scene[Cloister]) -> None:
-    """A slim cypress on a lawn, and tall ones beyond the western wall."""
+def cypress(scene: Scene[Cloister]) -> bpy.types.Mesh:
+    """A slim cypress, 5.6 m tall. It is made once."""
+    if "Cypress" in bpy.data.meshes:
+        return bpy.data.meshes["Cypress"]
     random = scene.random("cypresses")
     count = scene.count(16000)
     tree = Model(scene)
@@ -65,14 +70,20 @@ def cypresses(scene: Scene[Cloister]) -> None:
     t = np.linspace(0, 1, 9)
     tree.add(scene.lathe(np.column_stack([0.36 * flame(t), 0.45 + 4.9 * t]), 10), "Cypress leaf")
     tree.add(scene.tube([(0, 0, -0.1), (0, 0, 2.5), (0, 0, 5.2)], [0.10, 0.08, 0.01]), "Bark")
-    mesh = tree.mesh("Cypress")
-    place("Cypress", mesh, scene.plan.side(NORTH, (*scene.plan.cypress, 0), 57, 0.95))
+    return tree.mesh("Cypress")
+
+
+def cypresses(scene: Scene[Cloister]) -> None:
+    """Slim cypresses in the court, and tall ones beyond the low walls."""
+    mesh = cypress(scene)
+    for spot in scene.plan.cypresses:
+        place("Cypress", mesh, scene.plan.side(NORTH, (*spot, 0), 57, 0.95))
     x, y, size = points(BEYOND).T
-    scene.plan.on_sides("Cypress", [mesh], x, y, 0, 70 * x, size, sides=[WEST])
+    scene.plan.on_sides("Cypress", [mesh], x, y, 0, 70 * x, size, sides=scene.plan.low_sides)
 
 
 def ivy(scene: Scene[Cloister]) -> None:
-    """Ivy that climbs the south-western pier, spreads over two bays, and hangs from the eaves."""
+    """Ivy that climbs a pier, spreads over two bays, and hangs from the eaves."""
     random = scene.random("ivy")
     count = scene.count(26000)
     model = Model(scene)
@@ -95,7 +106,7 @@ def ivy(scene: Scene[Cloister]) -> None:
     for _ in range(9):
         x = scene.plan.arcade - np.cumsum(random.uniform(0.0, 0.5, 7))
         model.add(scene.bend(xyz(x, ivy_face(scene.plan, x, z + 1), z), 0.012, 20, 6), "Bark")
-    place("Ivy", model.mesh("Ivy"), scene.plan.side(SOUTH))
+    place("Ivy", model.mesh("Ivy"), scene.plan.side(scene.plan.ivy_side))
 
 
 def ivy_face(plan: Cloister, x: Array, z: Array) -> Array:
@@ -163,6 +174,27 @@ def shrubs(scene: Scene[Cloister]) -> None:
     size = random.uniform(0.8, 1.1, len(x))
     sunny = (NORTH, EAST, WEST)
     scene.plan.on_sides("Lavender", bushes, x, scene.plan.lawn - 0.3, 0, 200 * x, size, sides=sunny)
+
+
+def hedges(scene: Scene[Cloister]) -> None:
+    """Low hedges of box along the paths, where no rig is near."""
+    if not scene.plan.has_hedges:
+        return
+    random = scene.random("hedges")
+    model = Model(scene)
+    model.add(leaf_cloud(random, scene.count(2000), (0.42, 0.24, 0.28), 0.038, 0.65), "Box leaf")
+    model.add(icosphere(2, 1.0).scaled(0.38, 0.2, 0.24), "Turf")
+    mesh = model.mesh("Hedge")
+    along = np.arange(PLAZA + 0.6, scene.plan.lawn - 0.3, 0.62)
+    path = np.full_like(along, CROSS_PATH + 0.3)
+    edge = np.full_like(along, scene.plan.lawn - 0.3)
+    x = np.concatenate([path, along, edge, along])
+    y = np.concatenate([along, path, along, edge])
+    turn = np.where(np.arange(len(x)) // len(along) % 2, 0, 90)
+    for number in plan.SIDES:
+        spots = [scene.plan.side(number, (*spot, 0)).translation for spot in zip(x, y, strict=True)]
+        away = np.array([max(abs(spot.x), abs(spot.y)) > 2.6 for spot in spots])
+        scene.plan.on_sides("Hedge", [mesh], x[away], y[away], 0.2, turn[away], sides=[number])
 
 
 def fallen_leaves(scene: Scene[Cloister]) -> None:

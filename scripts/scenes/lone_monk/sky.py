@@ -26,7 +26,7 @@ def sky(scene: Scene[Cloister]) -> None:
     plane = graph.vector_math("DIVIDE", direction, height)[0]
     drawn_out = graph.vector_math("MULTIPLY", plane, (0.5, 1.3, 1.0))[0]
     cover = graph.span(graph.noise(drawn_out, 1.1, 6.0, 0.62, 0.35), 0.0, 0.7, *plan.clouds)
-    clouded = graph.mix(cover, blue, (9.0, 8.6, 8.2))
+    clouded = graph.mix(cover, blue, plan.cloud_color)
     camera = graph.add("LightPath").outputs["Is Camera Ray"]
     graph.finish(graph.mix(camera, blue, clouded), plan.sky)
 

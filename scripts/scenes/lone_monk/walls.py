@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import bpy
 import numpy as np
 
 from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
@@ -16,6 +17,7 @@ from scenes.lone_monk.roofs import house, ridge
 DOORWAY = (0.56, WALK_FLOOR, 1.85, 0.42)
 WINDOW = (0.38, 1.15, 1.80, 0.38)
 UPPER_WINDOW = (0.42, 6.0, 6.62, 0.12)
+STOREY = 2.4  # from storey to storey
 # A shutter's frame: middle x, y, z and width, depth, height.
 SHUTTER = [
     (-0.19, 0, 0, 0.05, 0.035, 0.74),
@@ -63,7 +65,7 @@ def doorway(scene: Scene, y: float) -> Model:
     """A wall of the walks with a door of planks, iron straps, nails and a ring at depth y."""
     half, sill, springing, rise = DOORWAY
     hole = arch_outline(*DOORWAY, scene.segments(16))
-    model = wall(scene, "Whitewash", _walk_wall(scene), hole, (0.16, 0.05))
+    model = wall(scene, scene.plan.walk_stuff, _walk_wall(scene), hole, (0.16, 0.05))
     model.add(filled(hole, y + 0.03), "Wood")
     edges = np.linspace(-half, half, 8)
     for x in zip(edges[:-1] + 0.004, edges[1:] - 0.004, strict=True):
@@ -81,7 +83,7 @@ def doorway(scene: Scene, y: float) -> Model:
 def back_walls(scene: Scene[Cloister]) -> None:
     """The walls behind the walks: whitewashed, with doors and windows by turns."""
     hole = arch_outline(*WINDOW, scene.segments(16))
-    window = wall(scene, "Whitewash", _walk_wall(scene), hole, (0.1, 0.03))
+    window = wall(scene, scene.plan.walk_stuff, _walk_wall(scene), hole, (0.1, 0.03))
     window.add(stones([(0, -0.02, 1.11, 1.0, 0.16, 0.08)]), "Limestone")
     glaze(window, hole, 0.3, 3, "Lead")
     bays = window.mesh("Wall with window"), doorway(scene, 0.22).mesh("Wall with door")
@@ -92,10 +94,9 @@ def back_walls(scene: Scene[Cloister]) -> None:
     ends = Model(scene)
     width = scene.plan.back - scene.plan.arcade
     top = scene.plan.lean_to_top
+    y = scene.plan.back + BACK_WALL / 2
     for x in (-scene.plan.arcade - width / 2, scene.plan.arcade + width / 2):
-        ends.add(
-            box((width, BACK_WALL, top)), "Whitewash", (x, scene.plan.back + BACK_WALL / 2, top / 2)
-        )
+        ends.add(box((width, BACK_WALL, top)), scene.plan.walk_stuff, (x, y, top / 2))
     ends.add(
         stones([(0, scene.plan.back - 0.02, WALK_FLOOR + 0.1, 2 * scene.plan.back, 0.06, 0.2)]),
         "Limestone",
@@ -104,39 +105,57 @@ def back_walls(scene: Scene[Cloister]) -> None:
 
 
 def upper_storeys(scene: Scene[Cloister]) -> None:
-    """The storeys above the walks in the north and south, with shutters at their windows."""
-    hole = arch_outline(*UPPER_WINDOW, scene.segments(16))
+    """The storeys over the walks, with shutters at their windows: in the north and south."""
+    walk = scene.plan.back
     bays = 8
-    width = 2 * scene.plan.back / bays
+    x = (np.arange(bays) + 0.5) * (2 * walk / bays) - walk
+    for number, tops in scene.plan.houses:
+        foot = scene.plan.lean_to_top
+        for storey, top in enumerate(tops):
+            meshes = [
+                upper_wall(scene, 2 * walk / bays, (foot, top), storey * STOREY, swing)
+                for swing in (21, 7, 7, 7)
+            ]
+            scene.plan.on_sides("Upper wall", meshes, x, walk, sides=[number])
+            foot = top
+        # The house covers the ends of low walls beside it.
+        left = -walk - 0.5 * ((number + 1) % 4 in scene.plan.low_sides)
+        right = walk + 0.5 * ((number - 1) % 4 in scene.plan.low_sides)
+        house(scene, number, (left, right), tops[-1], 12, scene.plan.house_stuff)
+
+
+def upper_wall(
+    scene: Scene[Cloister],
+    width: float,
+    between: tuple[float, float],
+    raised: float,
+    swing: float,
+) -> bpy.types.Mesh:
+    """A bay of a storey's wall, and its window, `raised` over the lowest storey's.
+
+    between: foot and top of the wall. swing: degrees by which the shutters stand off the wall.
+    """
+    half, sill, springing, rise = UPPER_WINDOW
+    outline = (half, sill + raised, springing + raised, rise)
+    hole = arch_outline(*outline, scene.segments(16))
+    bay = wall(scene, scene.plan.house_stuff, (width, *between, 0.4), hole, (0.1, 0.03))
+    bay.add(stones([(0, -0.03, 5.95 + raised, 1.1, 0.18, 0.1)], 0.015), "Limestone")
+    glaze(bay, hole, 0.22, 1, "Wood")
     slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
     slats = copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))
     shutter = join([stones(SHUTTER, 0.006), slats])  # one wing, 0.42 by 0.72 m, about its middle
-    for number, top, left in (
-        (plan.NORTH, 7.7, -scene.plan.back - 0.5),
-        (plan.SOUTH, 7.2, -scene.plan.back),
-    ):
-        meshes = []
-        for swing in (21, 7, 7, 7):
-            bay = wall(
-                scene, "Plaster", (width, scene.plan.lean_to_top, top, 0.4), hole, (0.1, 0.03)
-            )
-            bay.add(stones([(0, -0.03, 5.95, 1.1, 0.18, 0.1)], 0.015), "Limestone")
-            glaze(bay, hole, 0.22, 1, "Wood")
-            for sign in (-1, 1):
-                wing = shutter.moved(0.22 * sign, 0, 0)
-                bay.add(wing, "Wood", (0.53 * sign, -0.05, 6.36), (0, 0, sign * swing))
-            meshes.append(bay.mesh("Upper wall"))
-        x = (np.arange(bays) + 0.5) * width - scene.plan.back
-        scene.plan.on_sides("Upper wall", meshes, x, scene.plan.back, sides=[number])
-        house(scene, number, (left, left + 2 * scene.plan.back + 0.5), top, 12, "Plaster")
+    for sign in (-1, 1):
+        wing = shutter.moved(0.22 * sign, 0, 0)
+        bay.add(wing, "Wood", (0.53 * sign, -0.05, 6.36 + raised), (0, 0, sign * swing))
+    return bay.mesh("Upper wall")
 
 
-def west_wall(scene: Scene[Cloister]) -> None:
-    """The low western wall, over which the sun comes in, under a row of ridge tiles."""
+def low_walls(scene: Scene[Cloister]) -> None:
+    """Low walls, over which the sun comes in, under a row of ridge tiles: in the west."""
     model = Model(scene)
     y = scene.plan.back + BACK_WALL / 2
     z = scene.plan.lean_to_top + 0.2
     model.add(box((2 * scene.plan.back + 1, BACK_WALL, 0.4)), "Plaster", (0, y, z - 0.1))
     coping = ridge(scene, (-scene.plan.back - 0.3, scene.plan.back + 0.3), 0.28)
     model.add(coping, "Roof tile", (0, y, z + 0.1), scale=(1, 1, 0.55))
-    scene.plan.on_sides("West wall", [model.mesh("West wall")], sides=[plan.WEST])
+    scene.plan.on_sides("West wall", [model.mesh("West wall")], sides=scene.plan.low_sides)

@@ -193,7 +193,7 @@ def furniture(scene: Scene[Room]) -> None:
 def pictures(scene: Scene[Room]) -> None:
     """Some of the barbershop's framed prints on the walls."""
     earlier = set(bpy.data.objects)
-    prints.pictures(scene)
+    prints.pictures(Scene(scene.seed, scene.detail, SHOP))
     hung = sorted(set(bpy.data.objects) - earlier, key=lambda obj: obj.name)
     upright = transform(rotation=(np.pi / 2, 0, np.pi))
     for picture, obj in zip(scene.plan.pictures, hung, strict=False):
