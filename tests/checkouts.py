@@ -13,6 +13,8 @@ from pathlib import Path
 
 import forks
 
+from lightfield.core.files import locked
+
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
 
@@ -40,7 +42,7 @@ def checkout(folder, **scenes):
     Also copies compiled files, but not those that another process is writing.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
+    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*", "*.tmp")
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():
@@ -84,14 +86,13 @@ def keep_kernels(folder):
     """Copy the kernels that a checkout compiled to the repository, for the next checkouts."""
     for index in folder.glob("scripts/lightfield/*/__pycache__/*.nbi"):
         cache = ROOT / index.parent.relative_to(folder)
-        source = Path(f"{index.name.partition('.')[0]}.py")
-        is_same_source = filecmp.cmp(index.parents[1] / source, cache.parent / source)
-        if is_same_source and not (cache / index.name).exists():
-            # The index comes last, because it names the others.
-            for path in [*index.parent.glob(f"{index.stem}.*.nbc"), index]:
-                temporary = cache / f"{path.name}.tmp.{os.getpid()}"
-                shutil.copy2(path, temporary)
-                temporary.replace(cache / path.name)
+        source = f"{index.name.partition('.')[0]}.py"
+        with locked(cache / "kernels"):
+            is_missing = not (cache / index.name).exists()
+            if is_missing and filecmp.cmp(index.parents[1] / source, cache.parent / source):
+                for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
+                    shutil.copy2(path, cache / f"{path.name}.tmp")
+                    (cache / f"{path.name}.tmp").replace(cache / path.name)
 
 
 def wait_until(condition, process, seconds=600, log=None):

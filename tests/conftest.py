@@ -5,6 +5,7 @@ import fcntl
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -56,12 +57,16 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def run_program():
-    """Run a program of scripts/, or at a path. Return its CompletedProcess."""
+    """Run a program of scripts/, or at a path. Return its CompletedProcess.
 
-    def run(name, *arguments, check=True, **options):
+    With ``in_fork`` False it imports the libraries itself.
+    """
+
+    def run(name, *arguments, check=True, in_fork=True, **options):
         program = name if isinstance(name, Path) else SCRIPTS / name
+        python = forks.python() if in_fork else sys.executable
         result = subprocess.run(
-            [forks.python(), program, *map(str, arguments)],
+            [python, program, *map(str, arguments)],
             capture_output=True,
             text=True,
             check=False,

@@ -188,7 +188,8 @@ def test_a_reprojected_view_has_the_same_bytes_without_numbas_compiler(reproject
 def test_numbas_options_in_the_current_folder_are_not_read(run_program, tmp_path, first_import):
     written(tmp_path / ".numba_config.yaml", "disable_jit: 1")
     (tmp_path / "kernel.py").write_text(f"import {first_import}\n{KERNEL}")
-    assert run_program(tmp_path / "kernel.py", cwd=tmp_path).stdout == "True\n"
+    run = run_program(tmp_path / "kernel.py", in_fork=False, cwd=tmp_path)
+    assert run.stdout == "True\n"
 
 
 # Compiled kernels have signatures.
@@ -209,7 +210,7 @@ def test_a_users_matplotlib_settings_do_not_change_a_plot(run_program, tmp_path)
     (tmp_path / "clean").mkdir()
     (tmp_path / "draw.py").write_text(DRAW)
     for folder in (tmp_path, tmp_path / "clean"):
-        run_program(tmp_path / "draw.py", cwd=folder)
+        run_program(tmp_path / "draw.py", in_fork=False, cwd=folder)
     first, second = tmp_path / "line.png", tmp_path / "clean/line.png"
     assert first.read_bytes() == second.read_bytes()
 

@@ -3,7 +3,10 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar, cast
+
+from lightfield.core.files import locked
 
 
 @contextmanager
@@ -42,7 +45,8 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     """Loads a kernel's machine code at once.
 
     Numba's own cache first loads all types and functions that numba can compile. That takes longer
-    than anything else, and only compiling needs them.
+    than anything else, and only compiling needs them. It also mixes up the kernels of two processes
+    that save them at the same time: its index then names the machine code of other arguments.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -55,6 +59,12 @@ class _Cache(FunctionCache):  # type: ignore[misc]
                     return loaded
             target_context.refresh()
         return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save the machine code for the signature ``sig``."""
+        self._impl.locator.ensure_cache_path()
+        with locked(Path(self.cache_path, "kernels")):
+            super().save_overload(sig, data)
 
 
 def kernel(function: _F) -> _F:

@@ -215,6 +215,14 @@ def is_locked(path: Path, flags: int) -> bool:
         os.close(file)
 
 
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold the lock of ``path``, which several processes may change at the same time."""
+    with path.with_name(f".{path.name}.lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 def absolute_path(path: Path) -> Path:
     """Return a path from the root, without ``.`` and ``..``, so that its name and parents show.
 

@@ -13,12 +13,10 @@ So the ledger knows what every file was made from, even without Snakemake's own 
 run uses it to detect damaged files, and files that were made from other inputs.
 """
 
-import fcntl
 import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -28,6 +26,7 @@ from lightfield.core.files import (
     DAMAGE,
     atomic_path,
     broken,
+    locked,
     read_problem,
     sha256,
     unreadable,
@@ -202,7 +201,7 @@ class Ledger:
 
     def compact(self) -> None:
         """Write the ledger without the lines that no longer count."""
-        with _locked(self._path):
+        with locked(self._path):
             current_jobs: list[Job] = []
             outputs: set[str] = set()
             for job in jobs(self._path):
@@ -239,7 +238,7 @@ def read(path: Path) -> dict[str, str]:
 
 def forget(path: Path, name: str) -> None:
     """Remove a file of history from every line."""
-    with _locked(path):
+    with locked(path):
         changed_jobs = []
         for job in jobs(path):
             history = {other: stamp for other, stamp in job.history.items() if other != name}
@@ -334,7 +333,7 @@ def _append(path: Path, job: Job) -> None:
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         line = _line(job)
-        with _locked(path), path.open("a+b") as file:
+        with locked(path), path.open("a+b") as file:
             if file.tell():
                 # A kill or a full disk may have cut the last line short.
                 file.seek(-1, os.SEEK_END)
@@ -342,11 +341,3 @@ def _append(path: Path, job: Job) -> None:
             file.write(line)
             file.flush()
             os.fsync(file.fileno())
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a ledger, because two runs may note jobs at the same time."""
-    with path.with_name(f".{path.name}.lock").open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
