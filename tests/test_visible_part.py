@@ -127,6 +127,19 @@ def test_a_part_has_the_model_and_a_margin(scene):
 
 
 @pytest.mark.slow
+def test_the_box_of_a_large_mesh_stands_for_its_vertices(scene, monkeypatch):
+    from lightfield.rendering import visible_part
+
+    scene.collection.objects["triangle"].rotation_euler = (0, 0, 0.5)
+    exact = visible_part.choose(visible_part.places(), np.eye(4), LENS)
+    monkeypatch.setattr(visible_part, "MOST_VERTICES", 2)
+    part = visible_part.choose(visible_part.places(), np.eye(4), LENS)
+    assert part.x <= exact.x and part.y <= exact.y
+    assert part.x + part.width >= exact.x + exact.width
+    assert part.y + part.height >= exact.y + exact.height
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", ["behind", "beside"])
 def test_a_camera_that_does_not_see_all_in_front_renders_the_whole(scene, turn):
     from lightfield.rendering import visible_part

@@ -98,7 +98,7 @@ def renders_part(lightfield: LightField) -> bool:
     Without denoising, this changes no byte.
     """
     return (
-        "unit" in lightfield.scene
+        "unit" in lightfield.content.get("scene", {})
         and lightfield.transparent
         and not lightfield.passes
         and lightfield.content["camera"]["type"] == "PERSP"

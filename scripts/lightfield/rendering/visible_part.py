@@ -82,7 +82,9 @@ def choose(visible: NDArray[np.float64] | None, world_matrix: Array, lens: Lens)
 
     ``visible`` are `places`. Return the part. Return None for the whole view.
     """
-    part = None if visible is None else _part(visible, world_matrix, lens)
+    if visible is None:
+        return None
+    part = _part(visible, world_matrix, lens)
     if part:
         set_window(part.x, part.y, part.width, part.height)
     else:
