@@ -10,26 +10,23 @@ import argparse
 import json
 import os
 import resource
-import signal
 import statistics
 import subprocess
 import sys
-import time
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
+from family_build import FamilyBuild
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_json_lines, write_json, write_text
+from lightfield.core.files import read_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import ROOT
 from lightfield.validation.corpus_integrity import corpus_faults
 
-# Angle of view, distance and elevation are those of allenai/objaverse-rendering, and its samples,
-# adaptive sampling and denoiser are the default here.
+# Angle of view, distance and elevation are those of allenai/objaverse-rendering, and so are
+# bounces, adaptive sampling and the denoiser.
 SCENE = """
 scene: {{unit: box}}
 render:
@@ -37,12 +34,13 @@ render:
   adaptive_threshold: 0.01
   max_bounces: 1
   denoise: {denoise}
+  denoise_prefilter: {prefilter}
   transparent: true
 rigs:
   ring:
     type: ring
     count: {views}
-    size: 2.4
+    size: 3
     elevation: 30
     camera: {{lens: rectilinear, fov: 49.1, resolution: [{resolution}, {resolution}]}}
 family:
@@ -52,66 +50,16 @@ family:
 RESULTS = Path("results/chairs")
 
 
-class Build:
-    """A build of the family in a folder of its own."""
-
-    def __init__(self, root: Path, models: Path, cores: int, scene: str) -> None:
-        self.root = root
-        self.cores = cores
-        write_text(root / "configs/scenes/chairs.yaml", scene)
-        settings = {"scenes": ["chairs"], "rigs": "all", "preset": "full", "device": "cpu"}
-        write_json(root / "config.yaml", settings)
-        link = root / "models"
-        if not link.exists():
-            link.symlink_to(models.resolve(), target_is_directory=True)
-
-    def start(self, *arguments: str) -> subprocess.Popen[str]:
-        """Start Snakemake in a process group of its own."""
-        snakemake = str(Path(sys.executable).with_name("snakemake"))
-        command = [snakemake, "--snakefile", str(ROOT / "Snakefile"), "--cores", str(self.cores)]
-        return subprocess.Popen(
-            [*command, *arguments],
-            cwd=self.root,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-
-    def recorded(self) -> int:
-        """Return how many members have a record."""
-        return len([*self.root.glob(f"{RESULTS}/*/member.json")])
-
-    def begun(self) -> Counter[str]:
-        """Return how often each member was begun, from the journals of the batches."""
-        lines = [
-            line
-            for journal in self.root.glob("work/chairs/batches/*.journal.jsonl")
-            for line in read_json_lines(journal)
-        ]
-        return Counter(line["member"] for line in lines if "began" in line)
-
-    def kill_after(self, members: int) -> None:
-        """Build until so many members are recorded, then kill the build."""
-        process = self.start()
-        while self.recorded() < members:
-            if process.poll() is not None:
-                raise UserError(f"the build ended before the kill:\n{process.communicate()[0]}")
-            time.sleep(0.2)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        self.start("--unlock").communicate()
-
-    def finish(self) -> str:
-        """Build to the end. Return the last line, which counts the members."""
-        output, _ = self.start().communicate()
-        lines = [line for line in output.splitlines() if "members of chairs built" in line]
-        if not lines:
-            raise UserError(f"the build failed:\n{output}")
-        return lines[-1]
+def built(root: Path, models: Path, cores: int, scene: str) -> FamilyBuild:
+    """Return a build of the family of some models."""
+    build = FamilyBuild(root, {"chairs": scene}, cores)
+    link = root / "models"
+    if not link.exists():
+        link.symlink_to(models.resolve(), target_is_directory=True)
+    return build
 
 
-def problems(build: Build, expected: dict[str, Any], kills: int) -> list[str]:
+def problems(build: FamilyBuild, expected: dict[str, Any], kills: int) -> list[str]:
     """Return what is wrong with a finished corpus."""
     content = read_json(build.root / RESULTS / "corpus.json")
     states = {Path(member["model"]).name: member["state"] for member in content["members"]}
@@ -122,13 +70,14 @@ def problems(build: Build, expected: dict[str, Any], kills: int) -> list[str]:
     ]
     valid = {member["name"] for member in content["members"] if member["state"] == "valid"}
     # Failed members are tried again with their batch. They cost little.
-    repeated = [name for name, times in build.begun().items() if times > 1 and name in valid]
+    begun = build.begun()
+    repeated = [name for (_, name), times in begun.items() if times > 1 and name in valid]
     if len(repeated) > kills * build.cores:
         faults.append(f"built more than once: {', '.join(repeated)}")
     return faults + [str(fault) for fault in corpus_faults(build.root / RESULTS)]
 
 
-def stage_seconds(build: Build) -> dict[str, float]:
+def stage_seconds(build: FamilyBuild) -> dict[str, float]:
     """Return the mean CPU seconds of each stage of the valid members."""
     times = [read_json(path) for path in build.root.glob("work/chairs/*/cpu_seconds.json")]
     stages = dict.fromkeys(stage for entry in times for stage in entry)
@@ -144,6 +93,7 @@ def main() -> None:
     add("--resolution", type=int, default=64, help="pixels of a view's side (default: 64)")
     add("--samples", type=int, default=4, help="samples of a pixel (default: 4)")
     add("--denoise", action="store_true", help="denoise the views")
+    add("--prefilter", default="accurate", help="denoise_prefilter (default: accurate)")
     add("--kills", type=int, default=2, help="how often the build is killed (default: 2)")
     add("--cores", type=int, default=os.cpu_count() or 1, help="cores (default: all)")
     arguments = parser.parse_args()
@@ -157,13 +107,14 @@ def main() -> None:
         views=arguments.views,
         resolution=arguments.resolution,
         denoise=json.dumps(arguments.denoise),
+        prefilter=arguments.prefilter,
     )
-    build = Build(arguments.output, models, arguments.cores, scene)
+    build = built(arguments.output, models, arguments.cores, scene)
     progress = Progress(arguments.kills + 1, "corpus", "runs")
     for number in range(1, arguments.kills + 1):
         build.kill_after(len(expected) * number // (arguments.kills + 1))
         progress.done()
-    last_line = build.finish()
+    last_line = build.finish()[-1]
     progress.done()
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(last_line)

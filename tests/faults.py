@@ -110,6 +110,17 @@ KINDS = {
     "array of a Zarr store": (f"{NCORE}/0/image/0", f"{NCORE}/1000000/image/0"),
     "metadata of a Zarr store": (f"{NCORE}/0/image/.zarray", f"{NCORE}/.zattrs"),
 }
+# The same for the corpus of a family, from the family's folder.
+CORPUS_KINDS = {
+    "corpus": ("corpus.json", "index.html"),
+    "page of a corpus": ("index.html", "corpus.json"),
+    "thumbnail": ("thumbnails/0001.webp", "index.html"),
+    "record of a member": ("0001/member.json", "0002/member.json"),
+    "record of a failed member": ("broken/member.json", "0001/member.json"),
+    "sums of a member": ("0001/plane/sha256sums.txt", "0002/plane/sha256sums.txt"),
+    "light field of a member": ("0001/plane/lightfield.json", "0001/plane/validation.json"),
+    "view of a member": ("0001/plane/exr/view_0000f.exr", "0002/plane/exr/view_0000f.exr"),
+}
 
 
 def flip(path, _):
@@ -181,7 +192,8 @@ FAULTS = {
 
 def spoil(root, kind, fault, number=0):
     """Apply a fault to file ``number`` of a kind. Return the files that are damaged now."""
-    names = KINDS[kind][number:] + KINDS[kind][:number]
+    files = (KINDS | CORPUS_KINDS)[kind]
+    names = files[number:] + files[:number]
     path, sibling = (root / name for name in names)
     apply, sets_time_back = FAULTS[fault]
     status = path.stat()

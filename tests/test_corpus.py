@@ -1,6 +1,7 @@
 """The corpus of a family: its split, its statistics, its page, its shards, and its sums."""
 
 import json
+import os
 import shutil
 import subprocess
 import tarfile
@@ -9,12 +10,13 @@ from pathlib import Path
 import accessibility
 import families
 import pytest
+from faults import CORPUS_KINDS, FAULTS, spoil
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.dataset.corpus import CorpusSettings, Shares
 from lightfield.dataset.lightfield import LightField
-from lightfield.report import corpus
+from lightfield.report import corpus, status
 from lightfield.validation.corpus_integrity import corpus_faults
 
 CAUSE = "models/broken.glb: is empty; must be a model"
@@ -300,29 +302,22 @@ def test_the_sums_hold_and_cover_everything(built):
     assert not [*corpus_faults(built)]
 
 
-DAMAGED = (
-    "corpus.json",
-    "index.html",
-    "thumbnails/0001.webp",
-    "0001/member.json",
-    "broken/member.json",
-    "0001/plane/sha256sums.txt",
-    "0001/plane/lightfield.json",
-    "0001/plane/exr/view_0000f.exr",
-)
-
-
-@pytest.mark.parametrize("name", DAMAGED)
-@pytest.mark.parametrize("fault", ["flip", "delete", "empty"])
-def test_every_damaged_file_of_a_corpus_is_found(built, tmp_path, name, fault):
+# Root may read a file without permissions. See `test_damage.py` for these.
+@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"unreadable"}))
+@pytest.mark.parametrize("kind", CORPUS_KINDS)
+def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, fault):
     folder = shutil.copytree(built, tmp_path / "chairs")
-    path = folder / name
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.unlink()
-    if fault != "delete":
-        path.write_bytes(content if fault == "flip" else b"")
-    assert {each.path.resolve() for each in corpus_faults(folder)} == {path}
+    damaged = {folder / name for name in spoil(folder, kind, fault)}
+    found = {folder / os.path.relpath(each.path, folder) for each in corpus_faults(folder)}
+    assert found == damaged
+
+
+@pytest.mark.parametrize("fault", ["emptied", "cut short", "deleted", "a folder"])
+def test_the_status_of_a_family_leaves_out_members_with_damaged_records(built, tmp_path, fault):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    assert status.of_family("chairs", folder, 7) == "chairs: 6 of 7 members built, 1 failed"
+    spoil(folder, "record of a member", fault)
+    assert status.of_family("chairs", folder, 7) == "chairs: 5 of 7 members built, 1 failed"
 
 
 def test_a_damaged_shard_and_a_foreign_one_are_found(built, tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from checkouts import checkout, snakemake
+from faults import FAULTS
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.config import check_member
@@ -344,3 +345,11 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     assert len([*(members / "thumbnails").iterdir()]) == 5
     found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stdout
+
+    # A plan finds damage in what jobs have recorded of all members.
+    records = ("work/rooms/batches/seeds_0000_0031.json", "work/rooms/members.json")
+    for number, path in enumerate((*records, "results/rooms/corpus.json")):
+        FAULTS[("a digit", "cut short", "a bit")[number]][0](folder / path, None)
+    plan = snakemake(folder, "--dry-run", *choice)
+    for path in (*records, "results/rooms/corpus.json"):
+        assert f"{path}: " in plan.stderr

@@ -237,6 +237,25 @@ def test_a_broken_model_is_refused_in_one_line(tmp_path, name, content, said):
     assert said in message and message.isprintable()
 
 
+@pytest.mark.parametrize("name", ["a.glb", "a.gltf"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xff" * 80 + struct.pack("<I", 1) + bytes(50),
+        b"ply\nformat ascii 1.0\n",
+        b"<html>404 not found</html>\n",
+    ],
+    ids=["STL", "PLY", "HTML"],
+)
+def test_a_file_of_another_format_is_said_not_to_be_gltf(tmp_path, name, content):
+    path = written(tmp_path / name, content)
+    with pytest.raises(UserError) as caught:
+        model_files.check(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: is not a glTF file")
+    assert "codec" not in message and message.isprintable()
+
+
 @pytest.mark.parametrize("name", ["glb", "gltf", "ply", "stl", "usda", "usdc", "usdz"])
 def test_half_a_model_is_refused_in_one_line(renders, tmp_path, monkeypatch, name):
     """Half of an OBJ is a smaller OBJ: nothing in it says how much is missing."""

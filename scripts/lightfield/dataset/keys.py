@@ -27,6 +27,8 @@ RENDER_VERSION = 4
 FLOW_VERSION = 1
 # The same for the passes of surfaces. Only their views have it in their keys.
 SURFACES_VERSION = 2
+# The same for denoised views of which only a part is rendered.
+PART_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
 MODEL_VERSION = 1
 
@@ -85,7 +87,22 @@ def render_key(lightfield: LightField, view: View) -> str:
     key = [RENDER_VERSION, version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
         key.append(SURFACES_VERSION)
+    if renders_part(lightfield) and lightfield.render["denoise"]:
+        key.append(["part", PART_VERSION])
     return _digest(key)
+
+
+def renders_part(lightfield: LightField) -> bool:
+    """Return whether views are rendered only where they can show something: a model.
+
+    Without denoising, this changes no byte.
+    """
+    return (
+        "unit" in lightfield.content.get("scene", {})
+        and lightfield.transparent
+        and not lightfield.passes
+        and lightfield.content["camera"]["type"] == "PERSP"
+    )
 
 
 def names_key(lightfield: LightField) -> str:

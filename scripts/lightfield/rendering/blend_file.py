@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +18,13 @@ from lightfield.rendering.quiet import quiet
 
 def new_scene() -> None:
     """Open an empty scene without a world, with one empty view layer."""
+    _reset_preferences()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+
+
+@cache
+def _reset_preferences() -> None:
+    """Give Blender its factory settings. Only once, because each time leaks memory of add-ons."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 

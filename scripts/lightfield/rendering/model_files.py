@@ -32,6 +32,11 @@ def check(path: Path) -> None:
         file.seek(max(0, size - 4096))
         tail = file.read()
     match path.suffix.lower():
+        case ".glb" | ".gltf" if not _begins_as_gltf(head):
+            raise UserError(
+                f"{path}: is not a glTF file: it begins with neither glTF nor {{; give it the "
+                "suffix of its format, or export it again"
+            )
         case ".stl" if head.lstrip().startswith(b"solid") and b"facet" in head + tail:
             if b"endsolid" not in tail:
                 raise UserError(f"{path}: is cut short; an STL text ends with endsolid")
@@ -46,6 +51,12 @@ def check(path: Path) -> None:
                 raise UserError(f"{path}: is cut short: it has {size} bytes of at least {least}")
         case ".usdz" if not zipfile.is_zipfile(path):
             raise UserError(f"{path}: is cut short, or not a USDZ file, which is a ZIP archive")
+
+
+def _begins_as_gltf(head: bytes) -> bool:
+    """Return whether a file may be glTF by its first bytes: a binary one, or JSON."""
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    return head.startswith(b"glTF") or text.startswith(b"{")
 
 
 # Bytes of the types of values in a PLY.

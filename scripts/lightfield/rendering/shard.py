@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
@@ -196,13 +196,14 @@ def _render_views(
     files = _ViewFiles(lightfield, folder, record)
     process = psutil.Process()
     earlier_seconds: list[float] = []
+    visible = _visible_places(lightfield)
     progress.begin()
     for view in views:
         # Use a timer of the system, because a process that hangs may run no Python.
         signal.alarm(stall)
         began = time.perf_counter()
         began_cpu = time.process_time()
-        rendered = _render_view(view, lightfield)
+        rendered = _render_view(view, lightfield, visible)
         files.write(view, rendered)
         journal.append(
             {
@@ -250,8 +251,19 @@ class _Rendered:
         }
 
 
-def _render_view(view: View, lightfield: LightField) -> _Rendered:
-    """Render the geometry of a view, if depth or a pass needs it, and then its colour."""
+def _visible_places(lightfield: LightField) -> Array | None:
+    """Return the places between which views can show something. None if they show the whole."""
+    from lightfield.rendering import visible_part
+
+    return visible_part.places() if keys.renders_part(lightfield) else None
+
+
+def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _Rendered:
+    """Render the geometry of a view, if depth or a pass needs it, and then its colour.
+
+    ``visible`` are the places of `_visible_places`.
+    """
+    from lightfield.rendering import visible_part
     from lightfield.rendering.colour_pass import render_colour
     from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
@@ -261,6 +273,7 @@ def _render_view(view: View, lightfield: LightField) -> _Rendered:
     has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in view_passes)
     began = time.perf_counter()
     choose_eye(view.name)
+    part = visible_part.choose(visible, view.matrix, lightfield.lens)
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
     if has_geometry:
@@ -268,6 +281,9 @@ def _render_view(view: View, lightfield: LightField) -> _Rendered:
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render["seed"], view.name)
     colour = render_colour(view.matrix, seed, view_passes, lightfield.transparent)
+    if part:
+        colour = replace(colour, pixels=part.in_whole(colour.pixels, 0))
+        geometry = geometry and replace(geometry, depth=part.in_whole(geometry.depth, np.inf))
     return _Rendered(colour, geometry, geometry_seconds)
 
 
