@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
+from PIL import Image
 
 from lightfield.imaging.tonemap import to_8_bit, tone_map
 
@@ -40,12 +40,17 @@ def develop(colour: Array, exposure: float) -> Array:
 
 
 def shrunk(colour: Array, width: int, height: int) -> Array:
-    """Return (…, …, 3) colour resized to ``width`` × ``height`` pixels, without aliasing."""
-    resized = oiio.ImageBufAlgo.resize(
-        oiio.ImageBuf(np.ascontiguousarray(colour, dtype=np.float32)),
-        roi=oiio.ROI(0, width, 0, height),
-    )
-    return np.asarray(resized.get_pixels(oiio.FLOAT)).clip(min=0)
+    """Return (…, …, channels) colour resized to ``width`` × ``height`` pixels, without aliasing.
+
+    The filter is Lanczos's of three lobes.
+    """
+    planes = np.moveaxis(np.asarray(colour, np.float32), -1, 0)
+    size = (width, height)
+    small = [
+        Image.fromarray(np.ascontiguousarray(plane)).resize(size, Image.Resampling.LANCZOS)
+        for plane in planes
+    ]
+    return np.stack(small, axis=-1).clip(min=0)
 
 
 def shrunk_8_bit(pixels: Array, width: int, height: int) -> Array:

@@ -85,7 +85,7 @@ def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:
     file = io.BytesIO()
     picture = Image.fromarray(np.ascontiguousarray(pixels))
     if quality is None:
-        picture.save(file, "WEBP", lossless=True, quality=40, method=3)
+        picture.save(file, "WEBP", lossless=True, quality=20, method=1)
     else:
         picture.save(file, "WEBP", quality=quality, method=4)
     return data_uri(file.getvalue(), "image/webp")
