@@ -127,11 +127,38 @@ def test_the_colour_of_an_edge_counts_only_without_other_views():
     field = Sources(lens, views, edge)
     alone = field.blended(views[0].matrix, lens, [0]).colour[8:40, green_column]
     assert (alone[:, 1] > 0.6).all()
-    assert (alone[:, 0] < 0.03).all()
+    # Inside the pixel colours blend towards its neighbour on the wall, which is red.
+    assert (alone[:, 1] > 10 * alone[:, 0]).all()
     both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
     # The harmonic mean darkens where views disagree, but the wall shows.
     assert (both[:, 0] > 100 * both[:, 1]).all()
     assert (both[:, 0] > 0.02).all()
+
+
+def test_a_single_leaf_is_a_soft_splat():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+
+    def leaf(view):
+        """A white leaf, a pixel wide, before a black wall."""
+        depth = np.full((48, 48), 4.0)
+        colour = np.zeros((48, 48, 3))
+        depth[24, 24] = 2
+        colour[24, 24] = 1
+        return colour, depth / -lens.pixel_rays()[..., 2]
+
+    views = views_along_y([0.0])
+    made = Sources(lens, views, leaf).blended(views[0].matrix, lens.resized(768, 768), [0])
+    assert not made.holes[300:500, 300:500].any()
+    # From the leaf's middle, at 392, its footprint reaches 8 pixels in each direction.
+    light = made.colour[..., 0]
+    assert light[390:394, 390:394].mean() > 0.95
+    for edge in (light[391:393, 396:404], light[380:388, 391:393]):
+        assert 0.3 < edge.mean() < 0.8
+    # It fades beyond its edges, and its corners are round.
+    assert 0.1 < light[391:393, 400:404].mean() < 0.5
+    assert light[398:400, 398:400].mean() < 0.6
+    for outside in (light[391:393, 406:408], light[376:378, 391:393], light[400:402, 400:402]):
+        assert outside.mean() < 0.1
 
 
 def test_a_wall_does_not_shine_through_a_panel_close_in_front():

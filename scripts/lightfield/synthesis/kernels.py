@@ -1,8 +1,9 @@
 """The loops of view synthesis: they tear surfaces, draw them, blend the drawings, and fill holes.
 
 A view becomes a surface. It has a vertex at each pixel's centre, and triangles between neighbours
-on one surface. Pixels beside a tear are also drawn one by one, at their own size. ``inverse`` is
-1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray. A larger inverse is nearer.
+on one surface. Pixels beside a tear are also drawn one by one, as soft splats of their own size.
+``inverse`` is 1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray. A larger
+inverse is nearer.
 """
 
 import math
@@ -26,6 +27,12 @@ EVEN = np.float32(0.5)
 SAME = np.float32(0.03)
 # A surface hides what is farther by this part. Between SAME and HIDDEN the weight falls to 0.
 HIDDEN = np.float32(0.1)
+# What is far behind the nearest drawing counts as if its inverse distance were this part of that.
+BEHIND = np.float32(0.15)
+# A pixel's splat reaches so far from its middle, in pixels across and down.
+SPLAT = np.float32(0.75)
+# Colours blend inside a splat if the inverse distances of pixels differ by less than this part.
+SPLAT_SAME = np.float32(0.05)
 # A surface hides what is behind it if its vertices have at least this certainty.
 CERTAIN = np.float32(0.5)
 # Added to the roots of colours before inverting them, so that black has an inverse.
@@ -302,15 +309,157 @@ def draw(
 
 
 @kernel
-def draw_pixels(points: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
-    """Draw single pixels of a view. Each has four corners, clockwise from the upper left.
+def _splat_sample(pixel: Any, u: Any, v: Any, surface: Array, shade: Array) -> Any:
+    """Return a splat's opacity, 0 to 1, and its R, G, B at a place.
 
-    ``points`` (4n, 2) and ``values`` (4n, 6) are those of the corners, and the other arguments as
-    in `draw`.
+    ``u`` and ``v`` lead from the middle of the view's ``pixel`` (row, column) to the place, right
+    and down in pixels. ``surface`` (h, w) is the view's inverse distance, and ``shade`` (h, w, 4)
+    its colour. The four pixels around the place are interpolated linearly. Those on other surfaces
+    do not count, but take away opacity.
     """
-    for first in range(0, len(points), 4):
-        _draw_triangle(points, values, (first, first + 1, first + 2), wraps, inverse, drawn)
-        _draw_triangle(points, values, (first, first + 2, first + 3), wraps, inverse, drawn)
+    height, width = surface.shape
+    zero, one = np.float32(0), np.float32(1)
+    row, column = pixel
+    own = surface[row, column]
+    below = row + 1 if v > 0 else row - 1
+    beside = column + 1 if u > 0 else column - 1
+    u, v = abs(u), abs(v)
+    covered = red = green = blue = zero
+    for k in range(4):
+        i = below if k // 2 else row
+        j = beside if k % 2 else column
+        if i < 0 or j < 0 or i >= height or j >= width:
+            continue
+        # Comparisons with NaN, where there is no ray, are false.
+        if not abs(surface[i, j] - own) <= max(SPLAT_SAME * max(surface[i, j], own), FAR):
+            continue
+        part = (u if k % 2 else one - u) * (v if k // 2 else one - v)
+        covered += part
+        red += part * shade[i, j, 0]
+        green += part * shade[i, j, 1]
+        blue += part * shade[i, j, 2]
+    opacity = min((covered + covered) * covered, one)
+    return opacity, red / covered, green / covered, blue / covered
+
+
+@kernel
+def _parallelogram(corners: Any, wraps: bool, width: int) -> Any:
+    """Return the middle x, y of a pixel of a view, and its sides to the right and down.
+
+    ``corners`` are as in `_draw_splat`, and ``width`` is the picture's.
+    """
+    quarter, half = np.float32(0.25), np.float32(0.5)
+    x0, x1, x2, x3, y0, y1, y2, y3 = corners
+    if wraps:
+        # Take the shorter of the two ways around.
+        turn = np.float32(width)
+        x1 -= turn * np.rint((x1 - x0) / turn)
+        x2 -= turn * np.rint((x2 - x0) / turn)
+        x3 -= turn * np.rint((x3 - x0) / turn)
+    x = quarter * (x0 + x1 + x2 + x3)
+    y = quarter * (y0 + y1 + y2 + y3)
+    across_x = half * (x1 + x2 - x0 - x3)
+    across_y = half * (y1 + y2 - y0 - y3)
+    down_x = half * (x2 + x3 - x0 - x1)
+    down_y = half * (y2 + y3 - y0 - y1)
+    return x, y, across_x, across_y, down_x, down_y
+
+
+@kernel
+def _draw_splat(
+    corners: Any,
+    values: Any,
+    wraps: bool,
+    pixel: Any,
+    surface: Array,
+    shade: Array,
+    inverse: Array,
+    drawn: Array,
+) -> None:
+    """Draw a view's ``pixel`` (row, column) as a soft splat where nothing nearer is drawn yet.
+
+    ``corners`` are the x of its four corners and their y. The pixel becomes a parallelogram.
+    ``values`` are its inverse distance and its weight. As many of 2 × 2 samples show it as its
+    opacity says. They hide all behind them, so that the order of drawing does not matter.
+    """
+    height, width = inverse.shape
+    quarter, half = np.float32(0.25), np.float32(0.5)
+    nearness, weight = values
+    x, y, across_x, across_y, down_x, down_y = _parallelogram(corners, wraps, width)
+    area = across_x * down_y - across_y * down_x
+    # Skip splats seen from behind, and those that the lens does not see.
+    if not area > 0:
+        return
+    wide = SPLAT * (abs(across_x) + abs(down_x))
+    high = SPLAT * (abs(across_y) + abs(down_y))
+    if wide > half * LARGEST * width or high > half * LARGEST * height:
+        return
+    first = math.ceil(x - wide - half)
+    last = math.floor(x + wide - half)
+    if not wraps:
+        first = max(first, 0)
+        last = min(last, width - 1)
+    top = max(math.ceil(y - high - half), 0)
+    bottom = min(math.floor(y + high - half), height - 1)
+    for i in range(top, bottom + 1):
+        to_y = np.float32(i) + half - y
+        for place in range(first, last + 1):
+            j = place % width if wraps else place
+            if nearness <= inverse[i, j]:
+                continue
+            to_x = np.float32(place) + half - x
+            u = (to_x * down_y - to_y * down_x) / area
+            v = (to_y * across_x - to_x * across_y) / area
+            if abs(u) >= SPLAT or abs(v) >= SPLAT:
+                continue
+            opacity, red, green, blue = _splat_sample(pixel, u, v, surface, shade)
+            # The samples of a pixel show what has an opacity of 1/8, 7/8, 5/8 and 3/8 or more.
+            if opacity < quarter * (half + np.float32((2 * (i % 2) + 3 * (j % 2)) % 4)):
+                continue
+            inverse[i, j] = nearness
+            drawn[i, j, 0] = red
+            drawn[i, j, 1] = green
+            drawn[i, j, 2] = blue
+            drawn[i, j, 3] = weight
+
+
+@kernel
+def _mean_of_four(values: Array, first: int, column: int) -> Any:
+    """Return the mean of four rows of ``values`` (n, m) in a column."""
+    total = np.float32(0)
+    for row in range(first, first + 4):
+        total += values[row, column]
+    return np.float32(0.25) * total
+
+
+@kernel
+def draw_splats(
+    points: Array,
+    values: Array,
+    wraps: bool,
+    pixels: Array,
+    surface: Array,
+    shade: Array,
+    inverse: Array,
+    drawn: Array,
+) -> None:
+    """Draw single pixels of a view as soft splats.
+
+    ``points`` (4n, 2) and ``values`` (4n, 6) are those of the corners of n pixels, clockwise from
+    the upper left. ``pixels`` (n, 2) are their rows and columns. ``surface`` (h, w) and ``shade``
+    (h, w, 4) are as in `_splat_sample`, and the other arguments as in `draw`.
+
+    Source: Zwicker et al. 2001, "Surface Splatting", with a linear kernel.
+    """
+    for n in range(len(pixels)):
+        first = 4 * n
+        p0, p1, p2, p3 = points[first], points[first + 1], points[first + 2], points[first + 3]
+        corners = (p0[0], p1[0], p2[0], p3[0], p0[1], p1[1], p2[1], p3[1])
+        nearness = _mean_of_four(values, first, 0)
+        certainty = _mean_of_four(values, first, 4)
+        weight = _signed_weight(certainty, _mean_of_four(values, first, 5))
+        pixel = (pixels[n, 0], pixels[n, 1])
+        _draw_splat(corners, (nearness, weight), wraps, pixel, surface, shade, inverse, drawn)
 
 
 @kernel
@@ -352,10 +501,10 @@ def _hidden_part(nearness: Any, front: Any) -> Any:
 def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: Array) -> Any:
     """Add a sample's colour to ``light`` (3,). Return its inverse distance, −1 if none sees it.
 
-    A drawing's weight is divided by its squared distance. So near surfaces count most, but no
-    single view decides at an edge. A surface of which a view is certain hides what is behind it.
-    Colours are summed as the inverses of their roots, so that a highlight in one view counts
-    little.
+    A drawing's weight is divided by its squared distance, up to that of `BEHIND`. So near surfaces
+    count most, but no single view decides at an edge. A surface of which a view is certain hides
+    what is behind it. Colours are summed as the inverses of their roots, so that a highlight in one
+    view counts little.
     """
     count = len(inverses)
     nearest = front = np.float32(-1)
@@ -369,6 +518,7 @@ def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: A
     total = red = green = blue = np.float32(0)
     nearness_weight = nearness_sum = np.float32(0)
     slack = max(SAME * nearest, FAR)
+    least = max(BEHIND * nearest, FAR)
     for k in range(count):
         nearness = inverses[k, row, column]
         if nearness < 0:
@@ -377,7 +527,8 @@ def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: A
         if nearness >= nearest - slack:
             nearness_weight += weight
             nearness_sum += weight * nearness
-        weight *= max(nearness, FAR) * max(nearness, FAR) * (1 - _hidden_part(nearness, front))
+        counted = max(nearness, least)
+        weight *= counted * counted * (1 - _hidden_part(nearness, front))
         red += weight / (drawn[k, row, column, 0] + DARK)
         green += weight / (drawn[k, row, column, 1] + DARK)
         blue += weight / (drawn[k, row, column, 2] + DARK)

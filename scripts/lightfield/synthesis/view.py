@@ -30,7 +30,7 @@ DIRECTIONS = 12
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent.
 STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
-TORN_WEIGHT = 0.17
+TORN_WEIGHT = 0.25
 # What a mirror shows is elsewhere from another place. It counts this much if it is drawn unmoved.
 UNMOVED_WEIGHT = 0.1
 # A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
@@ -297,7 +297,8 @@ class Sources:
         # Each pixel beside a tear is as far away everywhere as in its middle.
         torn = np.repeat(np.flatnonzero(surface.torn), 4)
         corners = placed(surface.corners.reshape(-1, 3), true[torn], shade[torn], counts[torn])
-        kernels.draw_pixels(*corners, wraps, inverse, drawn)
+        pixels = np.argwhere(surface.torn)
+        kernels.draw_splats(*corners, wraps, pixels, surface.inverse, surface.shade, inverse, drawn)
         if surface.mirror.any():
             links = _mirror_links(surface)
             mirrors = np.full(inverse.shape, -1, np.float32)

@@ -114,6 +114,9 @@ function drawPart({ linked, uniforms }, { vertices, count, kind }, source, eye, 
   gl.uniform1f(uniforms.unmoved, WALK.unmoved);
   gl.uniform1i(uniforms.isSeeming, isSeeming);
   gl.uniform1f(uniforms.certain, WALK.certain);
+  gl.uniform1f(uniforms.far, WALK.far);
+  gl.uniform1f(uniforms.splat, WALK.splat);
+  gl.uniform1f(uniforms.splatSame, WALK.splatSame);
   gl.bindVertexArray(vertices);
   gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
   gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
@@ -184,6 +187,7 @@ function blendLayers({ layers, levels, samples }, count) {
   gl.uniform1i(uniforms.samples, samples);
   gl.uniform1f(uniforms.same, WALK.same);
   gl.uniform1f(uniforms.hidden, WALK.hidden);
+  gl.uniform1f(uniforms.behind, WALK.behind);
   gl.uniform1f(uniforms.dark, WALK.dark);
   drawTriangle();
 }

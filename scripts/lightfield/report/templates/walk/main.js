@@ -18,6 +18,7 @@ import pixelsShader from "./shaders/pixels.glsl";
 import placeShader from "./shaders/place.glsl";
 import shownShader from "./shaders/shown.glsl";
 import shrunkShader from "./shaders/shrunk.glsl";
+import splatShader from "./shaders/splat.glsl";
 import surfaceShader from "./shaders/surface.glsl";
 import wholePictureShader from "./shaders/whole_picture.glsl";
 import { unfolded, upload } from "./sources.js";
@@ -60,7 +61,7 @@ function prepareDrawing(gl) {
   walk.gl = gl;
   walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
   walk.coarse = program(gl, placeShader + surfaceShader, coarseShader);
-  walk.pixels = program(gl, placeShader + pixelsShader, drawnShader);
+  walk.pixels = program(gl, placeShader + pixelsShader, splatShader);
   walk.blended = program(gl, wholePictureShader, blendedShader);
   walk.shrunk = program(gl, wholePictureShader, shrunkShader);
   walk.enlarged = program(gl, wholePictureShader, enlargedShader);

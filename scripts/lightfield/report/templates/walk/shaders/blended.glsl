@@ -6,7 +6,7 @@ precision highp int;
 precision highp sampler2DArray;
 uniform sampler2DArray colours, inverses;
 uniform int count, samples;
-uniform float same, hidden, far, dark;
+uniform float same, hidden, behind, far, dark;
 // Linear light; alpha is the part of the sources that show the nearest surface, 0 in a hole.
 layout(location = 0) out vec4 colour;
 layout(location = 1) out float inverse;
@@ -35,8 +35,9 @@ float addSample(ivec2 texel) {
       used += 1.0;
     }
     // A surface of which a source is certain hides what is behind it, first partly, then completely.
-    float behind = (front - near) / max(front, far);
-    weight *= max(near, far) * max(near, far) * (1.0 - clamp((behind - same) / (hidden - same), 0.0, 1.0));
+    float lag = (front - near) / max(front, far);
+    float counted = max(near, max(behind * nearest, far));
+    weight *= counted * counted * (1.0 - clamp((lag - same) / (hidden - same), 0.0, 1.0));
     inverted += weight / (drawn.rgb + dark);
     total += weight;
   }
