@@ -34,7 +34,7 @@ from lightfield.synthesis.view import seeming_farther
 Array = NDArray[Any]
 
 # The longer side of an embedded view in pixels. Smaller if the page has more than MANY_VIEWS.
-SIDE = 340
+SIDE = 448
 SMALLER_SIDE = 192
 MANY_VIEWS = 60
 LIGHT_QUALITY = 88

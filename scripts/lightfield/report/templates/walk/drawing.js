@@ -14,7 +14,7 @@ const FEW = Math.min(2, MOST_SOURCES);
 // A still picture has this many samples across and down a pixel.
 const FINE = 2;
 // A picture in motion has this part of the pixels across and down. The browser enlarges it.
-const COARSE = 0.36;
+const COARSE = 0.33;
 // The picture counts as still this many milliseconds after the last motion.
 const REST = 200;
 
