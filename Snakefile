@@ -61,6 +61,7 @@ container: f"{FOLDER}/envs/plenoforge.sif" if USES_CONTAINERS else "plenoforge.s
 
 
 include: "rules/common.smk"
+include: "rules/shell.smk"
 include: "rules/storage.smk"
 include: "rules/ledger.smk"
 include: "rules/start.smk"

@@ -66,27 +66,9 @@ from lightfield.dataset.loading import (
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
-from lightfield.dataset.view_store import VARIABLE, ViewStore
+from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
-
-# The rules call `python`: the one that runs Snakemake, or a container's own.
-OWN_PYTHON = (
-    ""
-    if USES_CONTAINERS
-    else f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
-)
-# This replaces Snakemake's own prefix, including its strict mode. It also writes the signal that
-# ended a program into the job's log.
-shell.prefix(
-    f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};{OWN_PYTHON}"
-    # numpy would start a thread for each core, also in jobs that have one core.
-    " export OPENBLAS_NUM_THREADS=1;"
-    # A signal to the whole group must not end the shell first.
-    " trap : TERM;"
-    ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
-    ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
-)
 
 # The rigs in a config.yaml belong to the scenes in it. For other scenes, all rigs are chosen.
 NAMING = GIVEN if "scenes" in GIVEN else OWN
