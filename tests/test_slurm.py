@@ -30,7 +30,7 @@ pytestmark = [
 ]
 
 
-# Two batches, of two members each.
+# Two batches, of three members each.
 ROOMS = """
 scene: {builder: room}
 render: {samples: 4}
@@ -41,7 +41,7 @@ rigs:
     size: 0.5
     center: [0, 0, 1.2]
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
-family: {seeds: 0-3, batch: 2}
+family: {seeds: 0-5, batch: 3}
 """
 OF_ROOMS = ["--config", "scenes=rooms", "rigs=all", "preset=full"]
 
@@ -124,13 +124,13 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path):
         assert run.wait(1800) == 0, log.read_text()
         states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
     assert "CANCELLED" in states
-    assert "4 of 4 members of rooms built" in log.read_text()
+    assert "6 of 6 members of rooms built" in log.read_text()
     assert first.stat().st_mtime_ns == time
     # The same members on one machine, in one batch.
-    alone = checkout(tmp_path / "alone", rooms=ROOMS.replace("batch: 2", "batch: 4"))
+    alone = checkout(tmp_path / "alone", rooms=ROOMS.replace("batch: 3", "batch: 6"))
     result = snakemake(alone, *OF_ROOMS)
     assert result.returncode == 0, result.stdout + result.stderr
-    for number in range(4):
+    for number in range(6):
         sums = f"results/rooms/000{number}/LFPlane/sha256sums.txt"
         views = [line for line in (folder / sums).read_text().splitlines() if "exr/" in line]
         assert len(views) == 2
