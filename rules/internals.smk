@@ -134,6 +134,14 @@ def take_as_missing(is_damaged):
     _IOFile.exists_local = exists_and_is_sound
 
 
+def tell_of_new_file(path):
+    """Tell Snakemake that a file exists that an input function wrote.
+
+    Otherwise the file is missing if Snakemake listed its folder before, for another target.
+    """
+    workflow.iocache.exists_local[path] = True
+
+
 def before_lock(take_folder, begin_dry_run):
     """Call ``take_folder`` when a real run is planned, before Snakemake locks its files.
 

@@ -39,6 +39,7 @@ def settings_file(path, content):
             clear_folder(path)
             if write_json_if_changed(Path(path), content):
                 restore_time(path)
+            tell_of_new_file(path)
     except UserError as error:
         sys.exit(f"error: {error}")
     return path

@@ -206,6 +206,7 @@ def unfinished_shards(folder):
     ]
 
 
+@pytest.mark.usefixtures("in_forks")
 def test_after_a_kill_during_rendering_the_next_run_continues(smoke, other):
     """The bytes are the same with other shards, and on one core."""
     rigs = ("LFPlane_3x2_equisolid", "LFLattice_2panos")
@@ -236,6 +237,15 @@ def test_the_default_scene_plans_its_stages(preset, smoke):
     rules = planned(smoke, "--config", f"preset={preset}")
     assert "build_scene" in rules
     assert "check_blend" not in rules
+
+
+def test_targets_whose_settings_are_in_one_folder_are_planned_together(other):
+    """The first target's settings are listed before those of the second are written."""
+    folders = ("results=pair/results", "work=pair/work")
+    panorama = "pair/work/smoke/LFCuboid_1x1x1/panorama"
+    targets = (f"pair/{CUBOID}/lightfield.json", f"{panorama}/lightfield.json")
+    rules = planned(other, *targets, "--config", *folders, "scenes=smoke")
+    assert set(rules) == {"lightfield", "panorama_lightfield"}
 
 
 def test_a_dry_run_ends_with_the_phases_and_their_sum(smoke):
