@@ -50,6 +50,8 @@ TOLERANCE_FOOTPRINTS = 0.05
 
 # Fewer points than this say nothing about a pair of views, nor about six unknowns of motion.
 FEWEST_POINTS = 30
+# Rounding may move all points alike by this many pixel footprints.
+ROUNDING = 1e-4
 NEIGHBOURS = 6
 # The farther neighbours are chosen from this many of the nearest views.
 NEIGHBOURHOOD = 48
@@ -512,4 +514,6 @@ def scales(answers: Answer) -> tuple[Array, Array]:
     inverse = np.linalg.inv(squares)
     errors = inverse @ products
     unexplained = max(float(answers.moments[2, 2] - errors @ products), 0.0)
-    return errors, np.sqrt(np.diagonal(inverse) * unexplained / answers.measured)
+    # The residuals of rounding depend on each other. So many of them determine no more than one.
+    variance = max(unexplained / answers.measured, ROUNDING**2 * answers.measured)
+    return errors, np.sqrt(np.diagonal(inverse) * variance)
