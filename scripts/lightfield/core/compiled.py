@@ -3,10 +3,9 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from lightfield.core.files import locked
+from lightfield.core.files import locked_folder
 
 
 @contextmanager
@@ -63,7 +62,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save the machine code for the signature ``sig``."""
         self._impl.locator.ensure_cache_path()
-        with locked(Path(self.cache_path, "kernels")):
+        with locked_folder(self.cache_path):
             super().save_overload(sig, data)
 
 

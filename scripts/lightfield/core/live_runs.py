@@ -13,14 +13,13 @@ import re
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 
-from lightfield.core.files import is_locked
+from lightfield.core.files import is_locked, locked_folder
 
 # Jobs inherit this variable. They live on if only their run is killed.
 VARIABLE = "PLENOFORGE_RUN"
@@ -65,7 +64,7 @@ def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> l
     folder.mkdir(parents=True, exist_ok=True)
     _wait_for_jobs(folder)
     try:
-        with _guarded(folder.parent):
+        with locked_folder(folder.parent):
             other_runs = _runs(folder)
             live_runs = [run for run in other_runs if not run.is_killed]
             if other_runs and not live_runs:
@@ -160,16 +159,3 @@ def _wait_for_jobs(folder: Path) -> None:
             )
         has_reported = True
         time.sleep(0.5)
-
-
-@contextmanager
-def _guarded(folder: Path) -> Iterator[None]:
-    """Lock the folder of the notes, so that one process at a time reads and writes them."""
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        # Some network file systems cannot lock folders.
-        with suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(lock)
