@@ -30,7 +30,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import blend_file, cycles, limits, shard
-from lightfield.rendering.clearance import TOUCHING, clearances
+from lightfield.rendering.clearance import TOUCHING, surroundings
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 
@@ -571,7 +571,7 @@ def render(case: Case, folder: Path) -> tuple[Render, list[str], list[str]]:
     view = lightfield.views[0]
     cycles.set_up(path, None, lightfield, "cpu", 1)
     positions = view.position[None]
-    distances = clearances(positions)
+    distances = surroundings(positions).distances
     warned = list(limits.warnings(positions, distances))
     refused = ["inside geometry"] if distances[0] < TOUCHING else []
     geometry = render_geometry(view.matrix)

@@ -31,7 +31,6 @@ from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import (
-    MODEL_KEYS,
     accept_blend,
     load_config,
     load_scene,
@@ -41,7 +40,6 @@ from lightfield.dataset.config import (
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
-from lightfield.dataset.keys import MODEL_VERSION
 from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from lightfield.dataset.job_settings import ImportSettings
-from lightfield.rendering import blend_file, model
+from lightfield.rendering import blend_file, cycles, model
 from lightfield.rendering.quiet import quiet
 from scenes.library.scene import Scene
 from scenes.library.shapes import box, transform
@@ -70,7 +70,13 @@ def export(folder):
 
 
 def export_others(folder):
-    """Export the model with a moving cone, and a slab of negative scale."""
+    """Export the model with a red that glows. Then with a moving cone, and a mirrored slab."""
+    shader = bpy.data.materials["red"].node_tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Color"].default_value = RED
+    shader.inputs["Emission Strength"].default_value = 1
+    bpy.ops.export_scene.gltf(filepath=str(folder / "glowing.glb"))
+    bpy.ops.wm.obj_export(filepath=str(folder / "glowing.obj"))
+    shader.inputs["Emission Strength"].default_value = 0
     cone = bpy.data.objects["cone"]
     cone.keyframe_insert("location", index=0, frame=1)
     cone.location.x -= 4
@@ -126,6 +132,8 @@ def main():
         ("first frame", moving),
         ("last frame", moving | {"frame": 11}),
         ("moving.usdc", {"model": str(folder / "moving.usdc"), "frame": 11}),
+        ("glowing.glb", {"model": str(folder / "glowing.glb")}),
+        ("glowing.obj", {"model": str(folder / "glowing.obj")}),
     ]
     for name, content in imports:
         record = model.make_scene(ImportSettings(**content), folder)
@@ -134,6 +142,7 @@ def main():
         blend_file.open_scene(folder / "scene.blend")
         bpy.context.scene.frame_set(content.get("frame", 1))
         record["kinds"] = sorted({obj.type for obj in bpy.data.objects})
+        record["sampling"] = cycles.sampling()
         record["packed"] = all(
             image.packed_file and str(folder) not in image.filepath
             for image in bpy.data.images

@@ -353,3 +353,43 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     plan = snakemake(folder, "--dry-run", *choice)
     for path in (*records, "results/rooms/corpus.json"):
         assert f"{path}: " in plan.stderr
+
+
+MODELS = """
+scene: {{light: {light}}}
+render: {{samples: 1}}
+rigs:
+  ring:
+    type: ring
+    count: 2
+    size: 3
+    camera: {{lens: rectilinear, fov: 50, resolution: [8, 8]}}
+family: {{models: models/*.obj, values: {values}}}
+"""
+
+
+@pytest.mark.slow
+def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(tmp_path):
+    drawn_light = "{scene.light: {choice: [city, softboxes]}}"
+    scenes = {
+        "boxes": MODELS.format(light="softboxes", values="{}"),
+        "drawn": MODELS.format(light="city", values=drawn_light),
+        "city": MODELS.format(light="city", values="{}"),
+    }
+    folder = checkout(tmp_path / "plenoforge", **scenes)
+    (folder / "models").mkdir()
+    (folder / "models/face.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
+
+    def batch_settings():
+        choice = ("--config", f"scenes=[{','.join(scenes)}]", "rigs=all", "preset=full")
+        plan = snakemake(folder, "--dry-run", *choice)
+        assert plan.returncode == 0, plan.stderr
+        files = {name: folder.glob(f"work/{name}/settings/batches/*.json") for name in scenes}
+        return {name: [path.read_text() for path in files[name]] for name in scenes}
+
+    before = batch_settings()
+    assert all(before.values())
+    text = folder / "scripts/lightfield/dataset/keys.py"
+    text.write_text(text.read_text().replace("SOFTBOXES_VERSION = ", "SOFTBOXES_VERSION = 1000"))
+    after = batch_settings()
+    assert [name for name in scenes if before[name] != after[name]] == ["boxes", "drawn"]

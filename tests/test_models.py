@@ -15,6 +15,7 @@ from checkouts import checkout, jobs_on, snakemake
 from conftest import SCRIPTS
 
 from lightfield.core.errors import UserError
+from lightfield.dataset import keys
 from lightfield.rendering import model_files
 
 # The files of `exported_models`.
@@ -81,6 +82,28 @@ def test_a_model_without_a_material_is_grey(renders, name):
 def test_softboxes_over_expose_nothing(renders, name):
     picture = renders.pictures[f"shape.{name}"]
     assert picture[..., :3].max() < 1
+
+
+@pytest.mark.parametrize("name", [f"shape.{suffix}" for suffix in FORMATS])
+def test_softboxes_do_without_the_light_tree(renders, name):
+    """Three lamps cost less without it. An OBJ gives each material an emission, which is black."""
+    assert not renders.records[name]["sampling"]["light_tree"]
+
+
+@pytest.mark.parametrize("name", ["glowing.glb", "glowing.obj", "city"])
+def test_models_that_glow_and_environments_keep_the_light_tree(renders, name):
+    assert renders.records[name]["sampling"]["light_tree"]
+
+
+def test_another_light_of_the_softboxes_leaves_models_in_environments_alone(monkeypatch):
+    def identities():
+        return [keys.model_fingerprint({"light": light}, []) for light in ("softboxes", "city")]
+
+    before = identities()
+    monkeypatch.setattr(keys, "SOFTBOXES_VERSION", keys.SOFTBOXES_VERSION + 1)
+    softboxes, city = identities()
+    assert softboxes != before[0]
+    assert city == before[1]
 
 
 @pytest.mark.parametrize(

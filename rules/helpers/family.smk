@@ -3,6 +3,7 @@ from lightfield.dataset import keys
 from lightfield.dataset.corpus import CORPUS_FILES, CorpusSettings
 from lightfield.dataset.family import RECORD, outdated_members
 from lightfield.dataset.job_settings import BatchSettings, CountSettings
+from lightfield.dataset.names import SOFTBOXES
 
 # The CPU seconds of a member beside its views, and those of the checks.
 MEMBER_SECONDS = 0.5
@@ -25,6 +26,18 @@ def batches_of(folder):
         sys.exit(f"error: {scene_path(name)}: {error}")
 
 
+def source_fingerprint(source, values):
+    """Return what changes with a builder's text, or with the import of models."""
+    if source.builder:
+        return keys.scene_fingerprint(source)
+    # A drawn light may be the softboxes.
+    import_version = keys.model_version(
+        SOFTBOXES if "scene.light" in values else source.light
+    )
+    # Batches of the first version keep their settings.
+    return str(import_version) if import_version > 1 else None
+
+
 @cache
 def common_settings(folder):
     """Return the settings that all batches of a family have."""
@@ -41,7 +54,7 @@ def common_settings(folder):
         "limits": SETTINGS.presets[SETTINGS.preset],
         "results": RESULTS,
         "work": WORK,
-        "fingerprint": keys.scene_fingerprint(source) if source.builder else None,
+        "fingerprint": source_fingerprint(source, FAMILIES[name].values),
         "bpy": version("bpy"),
     }
 

@@ -22,12 +22,7 @@ def import_settings(dataset):
         sys.exit(
             f"error: {dataset.scene_work}/model.blend: the scene YAML has no model that makes it"
         )
-    keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
-    return ImportSettings(
-        **source.model_dump(include=keys, exclude_none=True),
-        version=MODEL_VERSION,
-        bpy=version("bpy"),
-    ).as_json()
+    return ImportSettings.of_source(source).as_json()
 
 
 def inventory_settings(dataset):

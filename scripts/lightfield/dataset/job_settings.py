@@ -5,6 +5,7 @@ file with --settings. The settings of light fields are in `lightfield.dataset.ca
 reprojections and exports have modules of their own.
 """
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -13,16 +14,19 @@ from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 from lightfield.core.settings import Settings, read_settings
 from lightfield.dataset.config import (
     FILE,
+    MODEL_KEYS,
     AtLeastOne,
     Credits,
     ModelOptions,
     ModelPath,
     Parameters,
     Preset,
+    SceneSource,
     check_model,
     load_scene,
 )
 from lightfield.dataset.family import Draw, Member
+from lightfield.dataset.keys import model_version
 from lightfield.dataset.names import builders
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
@@ -67,6 +71,16 @@ class ImportSettings(ModelOptions):
         None, description="Changes with the importer, so that the model is imported again."
     )
     bpy: str | None = Field(None, description="The same for Blender's version.")
+
+    @classmethod
+    def of_source(cls, source: SceneSource) -> Self:
+        """Return the settings that import the model of a scene's ``source``."""
+        keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
+        return cls(
+            **source.model_dump(include=keys, exclude_none=True),
+            version=model_version(source.light),
+            bpy=version("bpy"),
+        )
 
     @model_validator(mode="after")
     def _up_is_unknown(self) -> Self:
@@ -214,7 +228,9 @@ class BatchSettings(Settings):
     results: str = Field("results", description="Folder of the datasets.")
     work: str = Field("work", description="Folder of intermediate files.")
     fingerprint: str | None = Field(
-        None, description="Changes with the builder's text, so that the members are built again."
+        None,
+        description="Changes with the builder's text, or with the import of models, so that the "
+        "members are built again.",
     )
     bpy: str | None = Field(None, description="The same for Blender's version.")
 

@@ -20,7 +20,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset import published
 from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import MACHINE, LightField, View
-from lightfield.dataset.names import BUILDERS
+from lightfield.dataset.names import BUILDERS, SOFTBOXES
 
 # Raise these when rendering, or the computation of flow, writes other files for equal settings.
 RENDER_VERSION = 4
@@ -31,6 +31,8 @@ SURFACES_VERSION = 2
 PART_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
 MODEL_VERSION = 1
+# The same for models in softboxes.
+SOFTBOXES_VERSION = 1
 
 
 # Cached, because a look-up in a package's files takes a millisecond.
@@ -71,13 +73,18 @@ def _builder_folders(builder: str) -> list[str]:
     return folders
 
 
+def model_version(light: str) -> int:
+    """Return the version of the import of models in a ``light``."""
+    return MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
+
+
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
     """Return the identity of an imported model: 64 hexadecimal digits.
 
-    ``options`` say how it was imported. ``files`` are path and SHA-256 of each file that it was
-    read from. None stands for a missing file.
+    ``options`` say how it was imported, and its ``light``. ``files`` are path and SHA-256 of each
+    file that it was read from. None stands for a missing file.
     """
-    return _digest([MODEL_VERSION, version("bpy"), dict(options), files])
+    return _digest([model_version(options["light"]), version("bpy"), dict(options), files])
 
 
 def render_key(lightfield: LightField, view: View) -> str:

@@ -8,7 +8,6 @@ import argparse
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import lightfield_file
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import MODEL_KEYS, Scene
+from lightfield.dataset.config import Scene
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.exports import Export, InstantNgp, export_settings_of
 from lightfield.dataset.job_settings import (
@@ -26,7 +25,6 @@ from lightfield.dataset.job_settings import (
     FreePlacesSettings,
     ImportSettings,
 )
-from lightfield.dataset.keys import MODEL_VERSION
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.names import VIEWS
 from lightfield.dataset.splits_file import splits_content
@@ -112,13 +110,7 @@ class Stages:
         else:
             assert self.model_record
             with self._stage("import_model"):
-                keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
-                import_settings = ImportSettings(
-                    **source.model_dump(include=keys, exclude_none=True),
-                    version=MODEL_VERSION,
-                    bpy=version("bpy"),
-                )
-                model.write(import_settings, self.blend, self.model_record)
+                model.write(ImportSettings.of_source(source), self.blend, self.model_record)
         with self._stage("inventory"):
             inventory_file.write_of_datasets(
                 self.blend, self.written, self.datasets, self.inventory, measures_memory=False

@@ -44,8 +44,8 @@ def write_clearance(blend: Path, path: Path, inventory: Path | None, output: Pat
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), contents)
     bpy.context.scene.frame_set(lightfield.frame)
     clearance.show_what_is_rendered()
-    distances = clearance.clearances(positions)
-    enclosures = clearance.enclosures(positions)
+    distances, box = clearance.surroundings(positions)
+    enclosures = clearance.enclosures(positions, box)
     inside = clearance.enclosing_objects(enclosures)
     views = {
         name: {

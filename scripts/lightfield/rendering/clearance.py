@@ -60,10 +60,25 @@ def _shown(depsgraph: Any) -> set[str]:
     return {str(obj.original.name_full) for obj in objects if not obj.hide_render}
 
 
-def clearances(positions: Floats, reach: float = REACH) -> Floats:
-    """Return each camera's distance in metres to the nearest surface, inf beyond ``reach``."""
+class Surroundings(NamedTuple):
+    """What is around cameras.
+
+    - ``distances`` (n,): of each camera to the nearest surface in metres, inf beyond the reach.
+    - ``box`` (2, 3): around all rendered meshes.
+    """
+
+    distances: Floats
+    box: Floats
+
+
+def surroundings(positions: Floats, reach: float = REACH) -> Surroundings:
+    """Measure what is around each camera, as far as ``reach``."""
     nearest = np.full(len(positions), np.inf)
+    lowest = np.full(3, np.inf)
+    highest = np.full(3, -np.inf)
     for mesh, matrix, low, high in instances():
+        lowest = np.minimum(lowest, low)
+        highest = np.maximum(highest, high)
         # Only cameras within reach of the instance's bounding box can be near its surface.
         outside = np.maximum(np.maximum(low - positions, positions - high), 0)
         near = np.flatnonzero(np.linalg.norm(outside, axis=1) < np.minimum(nearest, reach))
@@ -77,7 +92,7 @@ def clearances(positions: Floats, reach: float = REACH) -> Floats:
             distance = tree.find_nearest(Vector(positions[index]), reach)[3]
             if distance is not None:
                 nearest[index] = min(nearest[index], distance)
-    return nearest
+    return Surroundings(nearest, np.array([lowest, highest]))
 
 
 def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
@@ -155,7 +170,7 @@ def free_places(rig: Random) -> Floats:
         unplaced = np.flatnonzero(np.isnan(places[:, 0]))
         candidates = np.array([rig.candidate(int(view), number) for view in unplaced])
         world = rig.to_world(candidates)
-        free = clearances(world, rig.clearance) >= rig.clearance
+        free = surroundings(world, rig.clearance).distances >= rig.clearance
         inside = [name not in {None, *rooms} for name in _objects_around(enclosures(world))]
         free &= ~np.array(inside)
         places[unplaced[free]] = candidates[free]
@@ -168,8 +183,10 @@ def free_places(rig: Random) -> Floats:
     )
 
 
-def enclosures(positions: Floats) -> list[Enclosure | None]:
+def enclosures(positions: Floats, box: Floats | None = None) -> list[Enclosure | None]:
     """Return the object, or room, around each camera, or None.
+
+    ``box`` is that of `surroundings`. It saves the rays of cameras outside.
 
     An object encloses a camera if most rays from the camera meet the object's back first. For an
     open mesh a third of the rays suffices, if few others meet its fronts: leaves show both. The
@@ -179,6 +196,10 @@ def enclosures(positions: Floats) -> list[Enclosure | None]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     around_each: list[Enclosure | None] = []
     for position in positions:
+        # From outside, at most half the rays can meet the box. So nothing is around the camera.
+        if box is not None and not np.all((position >= box[0]) & (position <= box[1])):
+            around_each.append(None)
+            continue
         hits = _first_hits(position, depsgraph)
         backs = Counter(hit.obj.name for hit in hits if hit.is_back)
         name, count = backs.most_common(1)[0] if backs else ("", 0)

@@ -100,7 +100,10 @@ def _part(visible: NDArray[np.float64], world_matrix: Array, lens: Lens) -> Part
     in_camera = (visible - world_matrix[:3, 3]) @ world_matrix[:3, :3]
     if not len(visible) or not (in_camera[:, 2] < 0).all():
         return None
-    pixels = lens.pixels(in_camera)
+    # The rows and columns of a perspective view follow from these slopes.
+    slopes = in_camera[:, :2] / in_camera[:, 2:]
+    outermost = np.concatenate([slopes.argmin(0), slopes.argmax(0)])
+    pixels = lens.pixels(in_camera[outermost])
     if not np.isfinite(pixels).all():
         return None
     # The pixel filter reaches beyond a pixel. One pixel more is for rounding.
