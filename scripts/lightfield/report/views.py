@@ -1,5 +1,6 @@
 """Packs the views of a dataset's page, so that a browser can show their light and depth."""
 
+import json
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -33,11 +34,14 @@ from lightfield.synthesis.view import seeming_farther
 
 Array = NDArray[Any]
 
-# The longer side of an embedded view in pixels. Smaller if the page has more than MANY_VIEWS.
-SIDE = 448
+# The longer side of an embedded view in pixels: the first of SIDES with which the views have at
+# most MOST_BYTES. With more than MANY_VIEWS it is at most SMALLER_SIDE.
+SIDES = (448, 384, 320, 256, 192, 128, 96, 64)
 SMALLER_SIDE = 192
 MANY_VIEWS = 60
-LIGHT_QUALITY = 88
+# The rest of a page has up to 2 MB, so that it has at most 10 MB.
+MOST_BYTES = 8_000_000
+LIGHT_QUALITY = 92
 # The longer side in pixels of the views that epipolar-plane images sample: their columns' number.
 EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
@@ -104,13 +108,15 @@ def collect(
         return read(folder / f"{names[number]}.exr", small, meaning)
 
     embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
-    small = lens.fitted(SIDE if len(embedded) <= MANY_VIEWS else SMALLER_SIDE)
-    views = [load(number, small) for number in embedded]
-    depths = _depths(views, small)
-    shown = _pictures(views, depths, embedded, lightfield, small)
-    if sensor:
-        for entry in shown["embedded"]:
-            entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
+    for small in _lenses(lens, len(embedded)):
+        views = [load(number, small) for number in embedded]
+        depths = _depths(views, small)
+        shown = _pictures(views, depths, embedded, lightfield, small)
+        if sensor:
+            for entry in shown["embedded"]:
+                entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
+        if len(json.dumps(shown)) <= MOST_BYTES:
+            break
     row = epipolar.find_row(rig, lightfield.matrices)
     row_views = epipolar.thinned(row.views, MOST_ROWS) if row else []
     middle = lightfield.matrices[middle_view(rig)]
@@ -138,6 +144,16 @@ def collect(
         row_shown=len(row_views),
         sensor=sensor.name if sensor else None,
     )
+
+
+def _lenses(lens: Lens, view_count: int) -> list[Lens]:
+    """Return the lenses that ``view_count`` embedded views can have, from large to small."""
+    most = SIDES[0] if view_count <= MANY_VIEWS else SMALLER_SIDE
+    sides = [side for side in SIDES if side <= most]
+    # A view has no more pixels than the dataset's own.
+    largest = max(lens.width, lens.height)
+    smaller = [side for side in sides[1:] if side < largest]
+    return [lens.fitted(side) for side in [sides[0], *smaller]]
 
 
 def _sensed(path: Path, small: Lens) -> str:

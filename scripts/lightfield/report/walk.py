@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from lightfield.export.source import pixel_indices
 from lightfield.geometry.lenses import Lens
-from lightfield.report.packing import packed_bytes
+from lightfield.report.packing import packed_bytes, webp
 from lightfield.synthesis import apparent, kernels
 from lightfield.synthesis import view as synthesis
 from lightfield.synthesis.defaults import BEST
@@ -30,10 +30,11 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     ``distances`` (m, height, width) are what the embedded views see, in metres.
     ``fills_holes`` is that of `lightfield.synthesis.view.Sources`. Some of the keys:
 
-    - ``rays``: the pixels' rays row by row, octahedral in two times 16 bits.
+    - ``rays``: the pixels' octahedral rays as a picture: above across, below down. The first two
+      channels are the high and the low byte.
     - ``sight``: a byte for each direction of an octahedral map, 1 where the lens sees it.
     - ``planes`` (m, 4): the bounds n · p + c ≤ 0 of the volume between the cameras.
-    - ``toRim``: a byte for each pixel, 0 at the edge of the image circle, 255 far from it.
+    - ``toRim``: a grey picture, 0 at the edge of the image circle, 255 far from it.
     - ``pixel``: the angle between two pixels, in radians.
     - ``nearest``: the first percentile of the distances.
     """
@@ -43,13 +44,15 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     sample = distances[:: max(1, len(distances) // 4)]
     positive = sample[sample > 0]
     hit = positive[np.isfinite(positive)]
-    coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype("<u2")
+    coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype(np.uint16)
+    stacked = np.concatenate([coded[..., 0], coded[..., 1]])
+    to_rim = np.round(255 * synthesis.to_rim(lens)).astype(np.uint8)
     return {
-        "rays": packed_bytes(coded.tobytes()),
+        "rays": webp(np.stack([stacked >> 8, stacked & 255, 0 * stacked], -1).astype(np.uint8)),
         "sight": packed_bytes(is_seen.astype(np.uint8).tobytes()),
         "side": SIGHT,
         "planes": np.round(_bounds(places), 6).tolist(),
-        "toRim": packed_bytes(np.round(255 * synthesis.to_rim(lens)).astype(np.uint8).tobytes()),
+        "toRim": webp(np.stack([to_rim] * 3, axis=-1)),
         "pixel": synthesis.pixel_angle(lens),
         "steepest": float(synthesis.steepest(lens)),
         "distances": synthesis.typical(1 / positive).tolist() if positive.size else [1.0, 1.0],

@@ -4,7 +4,8 @@ import { DATA } from "../page/data.js";
 import { viewer } from "../page/state.js";
 import { clamp, minus } from "../page/vectors.js";
 import { NEAR, metresToEdge } from "./eye.js";
-import { ROW_GAP } from "./sources.js";
+import { DEEPEST, gridStep } from "./coarse.js";
+import { rowStride } from "./joins.js";
 import { MOST_SOURCES, WALK, walk } from "./state.js";
 import { bindTextures, texture } from "./webgl.js";
 
@@ -25,10 +26,6 @@ function createPicture(width, height) {
     texture(gl, gl.TEXTURE_2D, format, width, height, 0, layout, type, null);
   const colours = image(gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT);
   const inverses = image(gl.R32F, gl.RED, gl.FLOAT);
-  // Enlarge a picture smoothly if it is smaller than the canvas.
-  gl.bindTexture(gl.TEXTURE_2D, colours);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   const framebuffer = framebufferOf(() => {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colours, 0);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, inverses, 0);
@@ -58,12 +55,10 @@ function createStage(width, height, samples) {
   const levels = [];
   for (let [w, h] = [width, height]; ; [w, h] = [Math.ceil(w / 2), Math.ceil(h / 2)]) {
     const level = createPicture(w, h);
-    // No coarser level fills the coarsest one.
-    if (w * h === 1) {
-      levels.push({ level, filled: level });
-      break;
-    }
-    levels.push({ level, filled: createPicture(w, h) });
+    // No coarser level fills the coarsest one, and the finest one is filled when it is shown.
+    const isFilledApart = w * h > 1 && levels.length > 0;
+    levels.push({ level, filled: isFilledApart ? createPicture(w, h) : level });
+    if (w * h === 1) break;
   }
   return { width, height, samples, layers: createLayers(samples * width, samples * height), levels };
 }
@@ -101,7 +96,8 @@ function drawPart({ linked, uniforms }, { vertices, count, kind }, source, eye, 
     inverses: [gl.TEXTURE_2D, source.inverses],
     light: [gl.TEXTURE_2D, source.light],
   });
-  gl.uniform1i(uniforms.stride, DATA.size[0] + ROW_GAP);
+  gl.uniform1i(uniforms.stride, rowStride());
+  gl.uniform1i(uniforms.gridStep, gridStep());
   // The columns are the source's axes in the world, and the world's axes in the eye.
   gl.uniformMatrix3fv(uniforms.turn, false, [...view.right, ...view.up, ...view.ahead.map((value) => -value)]);
   gl.uniformMatrix3fv(uniforms.back, false, [0, 1, 2].flatMap((axis) => [right[axis], up[axis], back[axis]]));
@@ -117,8 +113,9 @@ function drawPart({ linked, uniforms }, { vertices, count, kind }, source, eye, 
   gl.uniform1f(uniforms.far, WALK.far);
   gl.uniform1f(uniforms.splat, WALK.splat);
   gl.uniform1f(uniforms.splatSame, WALK.splatSame);
+  gl.uniform1f(uniforms.deepest, DEEPEST);
   gl.bindVertexArray(vertices);
-  gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
+  gl.uniform1f(uniforms.pointSize, (gridStep() * eye.lens[0] * width * WALK.pixel) / 2);
   gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
 }
 
@@ -152,7 +149,7 @@ function drawSources(layers, eye, isCoarse) {
     gl.clearBufferfi(gl.DEPTH_STENCIL, 0, 1, 0);
     if (isCoarse) {
       drawPart(walk.coarse, source.coarse, source, eye, layers.width, true);
-      drawPart(walk.surface, source.points, source, eye, layers.width, true);
+      drawPart(walk.blocks, source.points, source, eye, layers.width, true);
     } else {
       drawPart(walk.surface, source.surface, source, eye, layers.width);
       drawPart(walk.pixels, source.pixels, source, eye, layers.width);
@@ -192,7 +189,21 @@ function blendLayers({ layers, levels, samples }, count) {
   drawTriangle();
 }
 
-// Fill holes from coarser levels (push-pull: Gortler et al. 1996).
+// Return the textures from which filled.glsl fills a level.
+function fillTextures(levels, number) {
+  const { gl } = walk;
+  const { level } = levels[number];
+  // No coarser level fills the coarsest one.
+  const coarse = number + 1 < levels.length ? levels[number + 1].filled : level;
+  return {
+    colours: [gl.TEXTURE_2D, level.colours],
+    inverses: [gl.TEXTURE_2D, level.inverses],
+    coarseColours: [gl.TEXTURE_2D, coarse.colours],
+    coarseInverses: [gl.TEXTURE_2D, coarse.inverses],
+  };
+}
+
+// Fill the holes of all levels but the finest, each from the next coarser one (push-pull: Gortler et al. 1996).
 function fillHoles({ levels }) {
   const { gl } = walk;
   for (let number = 1; number < levels.length; number++) {
@@ -202,37 +213,26 @@ function fillHoles({ levels }) {
     gl.uniform1i(uniforms.isFirst, number === 1);
     drawTriangle();
   }
-  for (let number = levels.length - 2; number >= 0; number--) {
-    const { level, filled } = levels[number];
-    const coarse = levels[number + 1].filled;
-    const uniforms = startPass(walk.enlarged, filled, {
-      colours: [gl.TEXTURE_2D, level.colours],
-      inverses: [gl.TEXTURE_2D, level.inverses],
-      coarseColours: [gl.TEXTURE_2D, coarse.colours],
-      coarseInverses: [gl.TEXTURE_2D, coarse.inverses],
-    });
-    gl.uniform1i(uniforms.isFirst, number === 0);
+  for (let number = levels.length - 2; number > 0; number--) {
+    const uniforms = startPass(walk.enlarged, levels[number].filled, fillTextures(levels, number));
+    gl.uniform1i(uniforms.isFirst, false);
     drawTriangle();
   }
 }
 
+// Fill the holes of the finest level, and show it.
 function showPicture({ levels }, eye, target, corner, size) {
   const { gl } = walk;
   const { linked, uniforms } = walk.shown;
-  const { level } = levels[0];
-  const { filled } = WALK.fillsHoles ? levels[0] : { filled: level };
   gl.bindFramebuffer(gl.FRAMEBUFFER, target);
   gl.viewport(...corner, ...size);
   gl.useProgram(linked);
-  bindTextures(gl, uniforms, {
-    filled: [gl.TEXTURE_2D, filled.colours],
-    colours: [gl.TEXTURE_2D, level.colours],
-    inverses: [gl.TEXTURE_2D, level.inverses],
-    palette: [gl.TEXTURE_2D, walk.palette],
-  });
+  bindTextures(gl, uniforms, { ...fillTextures(levels, 0), palette: [gl.TEXTURE_2D, walk.palette] });
+  gl.uniform1i(uniforms.fillsHoles, WALK.fillsHoles);
+  gl.uniform1i(uniforms.isFirst, true);
+  gl.uniform1f(uniforms.far, WALK.far);
   gl.uniform1i(uniforms.mode, walk.mode);
   gl.uniform2iv(uniforms.corner, corner);
-  gl.uniform2iv(uniforms.size, size);
   gl.uniform1f(uniforms.gain, 2 ** viewer.exposure);
   gl.uniform1f(uniforms.white, DATA.white);
   gl.uniform1f(uniforms.edge, clamp(1 - metresToEdge(eye.at) / Math.max(walk.fadeFrom, NEAR), 0, 0.8));

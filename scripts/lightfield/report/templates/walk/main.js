@@ -11,9 +11,12 @@ import { drawWalkSoon } from "./drawing.js";
 import { axes, scales } from "./eye.js";
 import { goHome, restorePlace } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
+import blockShader from "./shaders/block.glsl";
+import blocksShader from "./shaders/blocks.glsl";
 import coarseShader from "./shaders/coarse.glsl";
 import drawnShader from "./shaders/drawn.glsl";
 import enlargedShader from "./shaders/enlarged.glsl";
+import filledShader from "./shaders/filled.glsl";
 import pixelsShader from "./shaders/pixels.glsl";
 import placeShader from "./shaders/place.glsl";
 import shownShader from "./shaders/shown.glsl";
@@ -40,11 +43,13 @@ async function loadSources(begin) {
 }
 
 // Return the unit ray of each pixel in the camera's axes: x, y, z, 0.
-function unpackedRays() {
-  const codes = new Uint16Array(bytesOf(WALK.rays).buffer);
-  const rays = new Float32Array(2 * codes.length);
-  for (let pixel = 0; pixel < codes.length / 2; pixel++) {
-    rays.set(unfolded(codes[2 * pixel] / 65535, codes[2 * pixel + 1] / 65535), 4 * pixel);
+async function unpackedRays() {
+  const pixels = await decoded(WALK.rays);
+  const count = pixels.length / 8;
+  const coordinate = (pixel) => ((pixels[4 * pixel] << 8) | pixels[4 * pixel + 1]) / 65535;
+  const rays = new Float32Array(4 * count);
+  for (let pixel = 0; pixel < count; pixel++) {
+    rays.set(unfolded(coordinate(pixel), coordinate(count + pixel)), 4 * pixel);
   }
   return rays;
 }
@@ -61,19 +66,20 @@ function prepareDrawing(gl) {
   walk.gl = gl;
   walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
   walk.coarse = program(gl, placeShader + surfaceShader, coarseShader);
+  walk.blocks = program(gl, placeShader + blocksShader, blockShader);
   walk.pixels = program(gl, placeShader + pixelsShader, splatShader);
   walk.blended = program(gl, wholePictureShader, blendedShader);
   walk.shrunk = program(gl, wholePictureShader, shrunkShader);
-  walk.enlarged = program(gl, wholePictureShader, enlargedShader);
-  walk.shown = program(gl, wholePictureShader, shownShader);
+  walk.enlarged = program(gl, wholePictureShader, filledShader + enlargedShader);
+  walk.shown = program(gl, wholePictureShader, filledShader + shownShader);
   walk.palette = paletteTexture(gl);
 }
 
-function prepareSources() {
-  walk.rays = unpackedRays();
+async function prepareSources() {
+  walk.rays = await unpackedRays();
   const { gl } = walk;
   walk.raysTexture = texture(gl, gl.TEXTURE_2D, gl.RGBA32F, ...DATA.size, 0, gl.RGBA, gl.FLOAT, walk.rays);
-  walk.toRim = bytesOf(WALK.toRim);
+  walk.toRim = (await decoded(WALK.toRim)).filter((_, place) => place % 4 === 0);
   walk.sight = bytesOf(WALK.sight);
   walk.inverses = Float32Array.from({ length: DATA.depth.steps }, (_, code) => 1 / depthOf(code, DATA.depth.range));
   walk.order = DATA.embedded.map((entry) => ({ entry, view: DATA.views[entry.view] }));
@@ -89,7 +95,7 @@ async function startWalk() {
     return;
   }
   prepareDrawing(gl);
-  prepareSources();
+  await prepareSources();
   goHome();
   restorePlace();
   const fieldOfView = scales(walk.canvas.clientWidth, walk.canvas.clientHeight);

@@ -2,17 +2,10 @@
 
 import { DATA } from "../page/data.js";
 import { LIGHT, depthCode } from "../page/packing.js";
+import { coarseShapes } from "./coarse.js";
+import { joins, vertexOf } from "./joins.js";
 import { WALK, walk } from "./state.js";
 import { drawable, texture } from "./webgl.js";
-
-// This many vertex numbers stay unused after each row. A software renderer caches vertices by their number modulo 64.
-// Without the gap, a vertex would often replace the one above it there.
-export const ROW_GAP = 32;
-
-// In motion, a flat block of at most this many pixels along a side is drawn as two triangles.
-const LARGEST_BLOCK = 8;
-// A block is flat if its inverse distances differ from the two triangles' by less than this part.
-const FLAT = 0.03;
 
 const ROOTS = LIGHT.map(Math.sqrt);
 
@@ -28,16 +21,6 @@ export function unfolded(u, v) {
 // Return by how many steps each pixel's inverse distance is too large for a reflection.
 const stepsFarther = (depth) => Uint8Array.from({ length: depth.length / 4 }, (_, pixel) => depth[4 * pixel + 1] & 15);
 
-// Return whether two neighbours a and b in a row of inverse distances are on one surface.
-function isOneSurface(before, a, b, after) {
-  const step = b - a;
-  if (Number.isNaN(step)) return false;
-  if (Math.abs(step) <= Math.max(WALK.steepest * Math.max(a, b), WALK.far)) return true;
-  if (Math.min(a, b) === 0) return false;
-  const even = WALK.even * Math.abs(step);
-  return Math.abs(a - before - step) < even && Math.abs(after - b - step) < even;
-}
-
 // Return each pixel's inverse distance from the camera, NaN outside the lens.
 function inverseDistances(depth) {
   const [width, height] = DATA.size;
@@ -48,35 +31,6 @@ function inverseDistances(depth) {
   }
   return inverses;
 }
-
-// Return for each pixel whether it shares a surface with the pixel on its right, and with the one below.
-function joins(inverses) {
-  const [width, height] = DATA.size;
-  const at = (i, j) => (i < 0 || j < 0 || i >= height || j >= width ? NaN : inverses[i * width + j]);
-  const right = new Uint8Array(width * height);
-  const down = new Uint8Array(width * height);
-  for (let i = 0; i < height; i++) {
-    for (let j = 0; j < width; j++) {
-      const pixel = i * width + j;
-      right[pixel] = isOneSurface(at(i, j - 1), at(i, j), at(i, j + 1), at(i, j + 2));
-      down[pixel] = isOneSurface(at(i - 1, j), at(i, j), at(i + 1, j), at(i + 2, j));
-    }
-  }
-  return { right, down };
-}
-
-// Return the same `joins`, torn at the edges of mirrors.
-function tornAtMirrors({ right, down }, steps) {
-  const width = DATA.size[0];
-  const isMirror = (pixel) => steps[pixel] > 0;
-  return {
-    right: right.map((joined, pixel) => joined && isMirror(pixel) === isMirror(pixel + 1)),
-    down: down.map((joined, pixel) => joined && isMirror(pixel) === isMirror(pixel + width)),
-  };
-}
-
-// Return the number of a pixel's vertex.
-const vertexOf = (i, j) => i * (DATA.size[0] + ROW_GAP) + j;
 
 // Return the corners of the triangles between pixels on one surface: those of mirrors, and all others.
 function surfaceTriangles({ right, down }, steps) {
@@ -107,68 +61,6 @@ function surfaceTriangles({ right, down }, steps) {
   return { matte: matte.subarray(0, count), mirrors: Uint32Array.from(mirrors) };
 }
 
-// Return whether all quads of a block are complete, and the block is flat enough for two triangles.
-function isFlat(inverses, isComplete, first, side) {
-  const width = DATA.size[0];
-  for (let line = 0; line < side; line++) {
-    for (let column = 0; column < side; column++) if (!isComplete(first + line * width + column)) return false;
-  }
-  // Two triangles replace eight here, which nobody sees in motion.
-  if (side === 2) return true;
-  const corner = (i, j) => inverses[first + i * side * width + j * side];
-  for (let i = 0; i <= 2; i++) {
-    for (let j = 0; j <= 2; j++) {
-      const expected =
-        ((2 - i) * ((2 - j) * corner(0, 0) + j * corner(0, 1)) + i * ((2 - j) * corner(1, 0) + j * corner(1, 1))) / 4;
-      const here = inverses[first + ((i * side) / 2) * width + (j * side) / 2];
-      if (Math.abs(here - expected) > Math.max(FLAT * here, WALK.far)) return false;
-    }
-  }
-  return true;
-}
-
-// Return the corners of fewer triangles, for pictures in motion. Flat blocks of 8, 4 or 2 pixels have two.
-function coarseTriangles(inverses, { right, down }) {
-  const [width, height] = DATA.size;
-  const corners = [];
-  const upper = (pixel) => right[pixel] && down[pixel];
-  const lower = (pixel) => right[pixel + width] && down[pixel + 1];
-  const isComplete = (pixel) => upper(pixel) && lower(pixel);
-  const addBlock = (i, j, side) => {
-    if (i + 1 >= height || j + 1 >= width) return;
-    const pixel = i * width + j;
-    const fits = i + side < height && j + side < width;
-    if (side > 1 && !(fits && isFlat(inverses, isComplete, pixel, side))) {
-      const half = side / 2;
-      for (const [line, column] of [[0, 0], [0, half], [half, 0], [half, half]]) addBlock(i + line, j + column, half);
-      return;
-    }
-    const [next, below, diagonal] = [vertexOf(i, j + side), vertexOf(i + side, j), vertexOf(i + side, j + side)];
-    if (side > 1 || upper(pixel)) corners.push(vertexOf(i, j), next, below);
-    if (side > 1 || lower(pixel)) corners.push(next, diagonal, below);
-  };
-  for (let i = 0; i < height; i += LARGEST_BLOCK) {
-    for (let j = 0; j < width; j += LARGEST_BLOCK) addBlock(i, j, LARGEST_BLOCK);
-  }
-  return Uint32Array.from(corners);
-}
-
-// Return the pixels without any triangle around them. In motion, only they are drawn one by one.
-function lonePixels(inverses, { right, down }) {
-  const [width, height] = DATA.size;
-  const upper = (i, j) => i >= 0 && j >= 0 && right[i * width + j] && down[i * width + j];
-  const lower = (i, j) => i >= 0 && j >= 0 && right[(i + 1) * width + j] && down[i * width + j + 1];
-  const lone = [];
-  for (let i = 0; i < height; i++) {
-    for (let j = 0; j < width; j++) {
-      const hasTriangle =
-        upper(i, j) || lower(i - 1, j - 1) || upper(i, j - 1) || lower(i, j - 1) || upper(i - 1, j) || lower(i - 1, j);
-      if (!hasTriangle && !Number.isNaN(inverses[i * width + j])) lone.push(i * width + j);
-    }
-  }
-  return lone;
-}
-
 // Return the pixels without all of the triangles that fit into the picture around them. They are drawn one by one.
 function tornPixels(inverses, { right, down }) {
   const [width, height] = DATA.size;
@@ -197,12 +89,6 @@ function pixelTriangles(pixels) {
     const first = 4 * vertexOf(Math.floor(pixel / width), pixel % width);
     return [first, first + 1, first + 2, first + 2, first + 1, first + 3];
   }));
-}
-
-// Return the vertices of these pixels.
-function pixelVertices(pixels) {
-  const width = DATA.size[0];
-  return Uint32Array.from(pixels, (pixel) => vertexOf(Math.floor(pixel / width), pixel % width));
 }
 
 // Return the roots of a picture's colours, sharpened as by `sharpen` in synthesis/kernels.py. The fourth number is the
@@ -238,10 +124,10 @@ export function upload(source, light, depth) {
   const { gl } = walk;
   const inverses = inverseDistances(depth);
   const steps = stepsFarther(depth);
-  const joined = joins(inverses);
+  const joined = joins(inverses, DATA.size, 1);
   const torn = tornPixels(inverses, joined);
   const seeming = inverses.map((value, pixel) => value * (1 - steps[pixel] / WALK.steps));
-  const parted = tornAtMirrors(joined, steps);
+  const { triangles, points } = coarseShapes(seeming, steps);
   const pairs = new Float32Array(2 * inverses.length);
   inverses.forEach((value, pixel) => {
     const isHit = !Number.isNaN(value);
@@ -261,8 +147,8 @@ export function upload(source, light, depth) {
     surface: shapes(matte),
     mirrors: shapes(mirrors),
     pixels: shapes(pixelTriangles(torn)),
-    coarse: shapes(coarseTriangles(seeming, parted)),
-    points: drawable(gl, gl.POINTS, pixelVertices(lonePixels(seeming, parted))),
+    coarse: shapes(triangles),
+    points: drawable(gl, gl.POINTS, points),
     isLoaded: true,
   });
 }

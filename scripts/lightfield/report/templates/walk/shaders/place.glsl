@@ -11,7 +11,8 @@ uniform sampler2D inverses;
 uniform bool isSeeming;
 // The roots of colours; alpha is the certainty of a pixel.
 uniform sampler2D light;
-uniform int stride;
+// The number of vertex numbers from row to row, and the distance of the pixels with vertices in motion.
+uniform int stride, gridStep;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;

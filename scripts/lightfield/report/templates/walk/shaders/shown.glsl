@@ -1,11 +1,8 @@
-#version 300 es
-// Shows the picture on the whole viewport: its light, depth, holes or sources, by `mode`.
-precision highp float;
-precision highp int;
-precision highp sampler2D;
-uniform sampler2D filled, colours, inverses, palette;
+// Shows the picture on the whole viewport: its light, depth, holes or sources, by `mode`. filled.glsl precedes it.
+uniform sampler2D palette;
+uniform bool fillsHoles;
 uniform int mode;
-uniform ivec2 corner, size;
+uniform ivec2 corner;
 uniform float gain, white, edge;
 uniform vec2 shown;
 out vec4 result;
@@ -14,14 +11,15 @@ vec3 encoded(vec3 v) {
   return mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), v));
 }
 void main() {
-  vec2 place = (gl_FragCoord.xy - vec2(corner)) / vec2(size);
-  ivec2 texel = ivec2(place * vec2(textureSize(colours, 0)));
-  float used = mode == 0 ? 1.0 : texelFetch(colours, texel, 0).a;
+  ivec2 texel = ivec2(gl_FragCoord.xy) - corner;
+  vec4 light = texelFetch(colours, texel, 0);
+  float inverse = texelFetch(inverses, texel, 0).r;
+  float used = mode == 0 ? 1.0 : light.a;
   bool hole = used <= 0.0;
-  vec3 v = gain * texture(filled, place).rgb;
+  if (fillsHoles) fill(texel, light, inverse);
+  vec3 v = gain * light.rgb;
   vec3 colour = encoded(v * (1.0 + v / (white * white)) / (1.0 + v));
   if (mode == 1) {
-    float inverse = texelFetch(inverses, texel, 0).r;
     float depth = (-log2(max(inverse, 1e-9)) - shown.x) / (shown.y - shown.x);
     colour = hole ? vec3(0.0) : inverse <= 0.0 ? vec3(0.69) : texture(palette, vec2(clamp(depth, 0.002, 0.998), 0.5)).rgb;
   } else if (mode == 2) {
