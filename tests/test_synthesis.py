@@ -110,6 +110,39 @@ def test_the_view_nearest_to_the_surface_counts_most():
     assert (middle[..., 0] > 10 * middle[..., 1]).all()
 
 
+def test_a_view_from_farther_away_than_the_eye_counts_little():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([-2.0, -6.0])
+
+    def wall(view):
+        """A wall at y = 2, which is brighter in the first view, from the eye's place."""
+        distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
+        return np.full((48, 48, 3), 0.8 if view is views[0] else 0.2), distance
+
+    made = Sources(lens, views, wall).blended(views[0].matrix, lens, [0, 1])
+    assert (made.colour[20:28, 20:28] > 0.7).all()
+
+
+def test_the_colour_of_an_edge_counts_a_quarter_of_a_surfaces():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([0.0, 0.0])
+    edge_column = 23
+
+    def edge(view):
+        """One view sees a grey wall. For the other it ends with a brighter column."""
+        depth = np.full((48, 48), 2.0)
+        colour = np.full((48, 48, 3), 0.4)
+        if view is views[0]:
+            depth[:, edge_column + 1 :] = 4
+            colour[:, edge_column] = 0.8
+        return colour, depth / -lens.pixel_rays()[..., 2]
+
+    made = Sources(lens, views, edge).blended(views[0].matrix, lens, [0, 1])
+    # The harmonic mean of square roots. Equal weights would give 0.55.
+    expected = (1 / (0.2 / 0.8**0.5 + 0.8 / 0.4**0.5)) ** 2
+    assert made.colour[8:40, edge_column] == pytest.approx(expected, abs=0.03)
+
+
 def test_the_colour_of_an_edge_counts_only_without_other_views():
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
     views = views_along_y([0.0, 0.0])
