@@ -13,7 +13,7 @@ from pathlib import Path
 
 import forks
 
-from lightfield.core.files import locked
+from lightfield.core.files import locked_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
@@ -87,7 +87,8 @@ def keep_kernels(folder):
     for index in folder.glob("scripts/lightfield/*/__pycache__/*.nbi"):
         cache = ROOT / index.parent.relative_to(folder)
         source = f"{index.name.partition('.')[0]}.py"
-        with locked(cache / "kernels"):
+        cache.mkdir(exist_ok=True)
+        with locked_folder(cache):
             is_missing = not (cache / index.name).exists()
             if is_missing and filecmp.cmp(index.parents[1] / source, cache.parent / source):
                 for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):

@@ -80,6 +80,14 @@ def run_program():
     return run
 
 
+@pytest.fixture
+def in_forks(monkeypatch):
+    """Run Snakemake and the programs that the project starts by itself in forks, too."""
+    python = forks.python()
+    monkeypatch.setattr(sys, "executable", str(python))
+    monkeypatch.setenv("PATH", f"{python.parent}:{os.environ['PATH']}")
+
+
 def mount_disk(folder, options):
     """Mount a small file system at a folder. Return False if that is not allowed."""
     command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
@@ -140,16 +148,10 @@ def built_once(build, name, config, tmp_path_factory):
 
 
 def build_smoke(folder):
-    """Build the smoke dataset in a checkout. Keep what numba compiles, for the next checkouts."""
+    """Build the smoke dataset in a checkout."""
     checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
-    for compiled in folder.glob("scripts/**/__pycache__/*.nb[ci]"):
-        target = ROOT / compiled.relative_to(folder)
-        if not target.exists():
-            temporary = target.with_name(f"{target.name}.tmp.{os.getpid()}")
-            shutil.copy2(compiled, temporary)
-            temporary.rename(target)
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import socket
 import sys
@@ -12,6 +13,7 @@ connection.connect(path)
 # The import of pathlib takes as long as all of this.
 folder = os.getcwd()  # noqa: PTH109
 request = {"arguments": arguments, "folder": folder, "env": dict(os.environ)}
+request["largest_file"] = resource.getrlimit(resource.RLIMIT_FSIZE)
 socket.send_fds(connection, [json.dumps(request).encode()], [0, 1, 2])
 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
     signal.signal(number, lambda number, _: connection.send(str(number).encode()))

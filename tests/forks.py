@@ -6,10 +6,13 @@ import starts threads, which a fork lacks.
 """
 
 import atexit
+import gc
 import importlib
 import json
+import multiprocessing.process
 import os
 import pkgutil
+import resource
 import runpy
 import select
 import shlex
@@ -30,12 +33,16 @@ LIBRARIES = (
 )
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
-# Stands for python. It starts forks for programs, and processes for all else.
+# Stands for python. It starts forks for programs and Snakemake, and processes for all else.
 PYTHON = """#!/bin/sh
 case "$1" in
 *.py) exec {python} -IS {client} {socket} "$@" ;;
-*) exec {python} "$@" ;;
+-m) [ "$2" != snakemake ] || {{ shift 2 && exec {snakemake} "$@"; }} ;;
 esac
+exec {python} "$@"
+"""
+SNAKEMAKE = """#!/bin/sh
+exec {python} -IS {client} {socket} snakemake.py "$@"
 """
 # The exit status of a fork, once its program has ended.
 STATUS = []
@@ -62,17 +69,21 @@ def run_snakemake(arguments, folder, env=None, merge_outputs=False, prefix=()):
 
 
 def python(prefix=()):
-    """Return the path of a ``python`` that runs programs in forks. Starts their server."""
+    """Return the path of a ``python`` that runs programs in forks. Starts their server.
+
+    A ``snakemake`` is beside it.
+    """
     prefix = tuple(map(str, prefix))
     if prefix not in _FOLDERS:
         home = tempfile.TemporaryDirectory(prefix="forks")
         atexit.register(home.cleanup)
         folder = Path(home.name)
         names = {"python": sys.executable, "client": Path(__file__).with_name("fork_client.py")}
-        names["socket"] = folder / "socket"
+        names |= {"socket": folder / "socket", "snakemake": folder / "snakemake"}
         quoted = {name: shlex.quote(str(path)) for name, path in names.items()}
-        (folder / "python").write_text(PYTHON.format(**quoted))
-        (folder / "python").chmod(0o755)
+        for name, script in (("python", PYTHON), ("snakemake", SNAKEMAKE)):
+            (folder / name).write_text(script.format(**quoted))
+            (folder / name).chmod(0o755)
         server = subprocess.Popen(
             [*prefix, sys.executable, Path(__file__), folder], stdout=subprocess.PIPE
         )
@@ -94,6 +105,8 @@ def serve(folder):
             importlib.import_module(module.name)
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
+    # Otherwise the collector would copy the memory of each fork.
+    gc.freeze()
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     listener.bind(f"{folder}/socket")
     listener.listen(64)
@@ -109,6 +122,7 @@ def serve(folder):
         message, descriptors, _, _ = socket.recv_fds(connection, MOST_BYTES, 3)
         child = os.fork()
         if child:
+            os.setpgid(child, child)
             attend(connection, child)
         connection.close()
         run(json.loads(message), descriptors, folder)
@@ -116,17 +130,20 @@ def serve(folder):
 
 
 def attend(connection, child):
-    """Send a fork the signals of its client, and the client its exit status. Then end."""
+    """Send a fork the signals of its client, and the client its exit status. Then end.
+
+    If the client is killed, the fork is killed with all processes that it started.
+    """
     ended = os.pidfd_open(child)
     while True:
         ready, _, _ = select.select([ended, connection], [], [])
         if ended in ready:
             break
         number = connection.recv(16)
-        # The client was killed if there is none.
-        os.kill(child, int(number) if number else signal.SIGKILL)
         if not number:
+            os.killpg(child, signal.SIGKILL)
             break
+        os.kill(child, int(number))
     _, status = os.waitpid(child, 0)
     try:
         connection.send(str(os.waitstatus_to_exitcode(status)).encode())
@@ -159,8 +176,11 @@ def leave():
 def become(request, descriptors):
     """Turn a fork into the process of a request."""
     os.chdir(request["folder"])
+    # New processes look there for a program at a relative path.
+    multiprocessing.process.ORIGINAL_DIR = request["folder"]
     os.environ.clear()
     os.environ.update(request["env"])
+    resource.setrlimit(resource.RLIMIT_FSIZE, request["largest_file"])
     for target, descriptor in enumerate(descriptors):
         os.dup2(descriptor, target)
         os.close(descriptor)

@@ -181,6 +181,7 @@ def test_the_ledger_names_the_damaged_file_and_what_to_make_again(nobody, fault)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_a_scene_damaged_before_its_ledger_line_is_built_again(tmp_path):
     """Its SHA-256 was not noted before the kill, so no job may use it."""
     folder = checkout(tmp_path / "plenoforge")

@@ -421,32 +421,41 @@ ROUNDS = {
     "a reprojection to faces no longer": {
         "built": ("cube_map: true", "cube_map: false", {"cubes reprojected_lightfield"}),
     },
-    # A missing file is downloaded again if a job needs it.
-    "a .blend to be fetched": {
-        "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
-        "scene.blend": (None, None, {"fetch_brought"}),
+    "no panorama, and larger batches": {
+        "built": ("panorama: true", "panorama: false", {"figures"}),
+        "many": ("batch: 2", "batch: 3", {"count_members"}),
     },
-    "no panorama": {"built": ("panorama: true", "panorama: false", {"figures"})},
-    "motion blur": {
-        "built": ("samples: 4", "samples: 4, motion_blur: true", {"inventory"} | CAMERAS)
+    "motion blur, and another model": {
+        "built": ("samples: 4", "samples: 4, motion_blur: true", {"inventory"} | CAMERAS),
+        "modelled": (
+            "model: model.obj",
+            "model: other.obj, unit: metres, up: z, ground: true, light: city, frame: 2, "
+            "allow_missing: true",
+            {"import_model", "inventory"} | CAMERAS,
+        ),
     },
-    "another format": {
+    "another format, and another text of the model": {
         "built": (
             "format: png",
             "format: exr\n    primaries: acescg",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
+        "model.obj": ("#", "# ", {"import_model"}),
     },
-    "another format of meshes": {"built": ("[glb]", "[ply]", {"mesh"})},
+    "another format of meshes, and a seed more": {
+        "built": ("[glb]", "[ply]", {"mesh"}),
+        "many": ("0-2", "0-3", {"seeds_0002_0003 build_members", "corpus"}),
+    },
     "the numbers of objects": {
         "built": ("samples: 4", "samples: 4, passes: [object]", {"mesh"} | CAMERAS),
     },
-    "how pixels are resampled": {
+    "how pixels are resampled, and other drawn values": {
         "built": (
             "exposure: -1",
             "exposure: -1\n    filter: bilinear\n    samples: 2\n    rotation: [0, 9, 0]",
             {"perspective lens_map", "perspective reprojected_lightfield"},
         ),
+        "many": ("[0.5, 1]", "[0.6, 1]", {"build_members"}),
     },
     "how light becomes pixels": {
         "built": (
@@ -455,14 +464,19 @@ ROUNDS = {
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
-    "another sensor": {
+    "another sensor, and how members are split": {
         "built": (
             "a: 0.01",
             "a: 0.02",
             {"sensor reproject", "sensor reprojected_lightfield"},
         ),
+        "many": (
+            "batch: 2",
+            "batch: 2\n  corpus: {splits: {test: 0.2}, shards: true, shard_gigabytes: 2}",
+            {"corpus"},
+        ),
     },
-    "another pass": {
+    "another pass, and a .blend to be fetched": {
         "built": (
             TO_CUBES,
             TO_CUBES.replace("samples: 4", "samples: 4, passes: [normal]").replace(
@@ -470,6 +484,9 @@ ROUNDS = {
             ),
             CAMERAS | {"perspective reproject", "perspective reprojected_lightfield"},
         ),
+        # A missing file is downloaded again if a job needs it.
+        "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
+        "scene.blend": (None, None, {"fetch_brought"}),
     },
     # The inventory lists the emitters, of which a light field's groups are made.
     "light groups, and another light": {
@@ -481,10 +498,19 @@ ROUNDS = {
             {"inventory", "perspective reproject", "perspective reprojected_lightfield"} | CAMERAS,
         ),
     },
-    "cameras that move": {
+    "cameras that move, and a longer sequence": {
         "built": ("samples: 4", "samples: 4, camera_motion: {travel: [1, 0, 0]}", CAMERAS),
+        # The cameras' settings hold the rig, and so its frames.
+        "moved": (
+            "last: 2",
+            "last: 3",
+            {"inventory", "lightfield", "probe_cameras", "export_sequence", "pack"},
+        ),
     },
-    "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
+    "distances, and other points of a sequence": {
+        "built": ("samples: 4", "samples: 4, depth: distance", CAMERAS),
+        "moved": ("points: 9", "points: 8", {"export_sequence"}),
+    },
     "another builder": {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)
     },
@@ -505,25 +531,6 @@ ROUNDS = {
             },
         ),
     },
-    "another model, and how it becomes a scene": {
-        "modelled": (
-            "model: model.obj",
-            "model: other.obj, unit: metres, up: z, ground: true, light: city, frame: 2, "
-            "allow_missing: true",
-            {"import_model", "inventory"} | CAMERAS,
-        ),
-    },
-    "another text of the model": {"model.obj": ("#", "# ", {"import_model"})},
-    "a seed more": {"many": ("0-2", "0-3", {"seeds_0002_0003 build_members", "corpus"})},
-    "other drawn values": {"many": ("[0.5, 1]", "[0.6, 1]", {"build_members"})},
-    "how members are split, and shards": {
-        "many": (
-            "batch: 2",
-            "batch: 2\n  corpus: {splits: {test: 0.2}, shards: true, shard_gigabytes: 2}",
-            {"corpus"},
-        ),
-    },
-    "larger batches": {"many": ("batch: 2", "batch: 3", {"count_members"})},
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
     "a sequence": {
         "built": (
@@ -532,15 +539,6 @@ ROUNDS = {
             {"inventory", "probe_cameras", "check_gpu", "LFPlane pack"},
         ),
     },
-    # The cameras' settings hold the rig, and so its frames.
-    "a longer sequence": {
-        "moved": (
-            "last: 2",
-            "last: 3",
-            {"inventory", "lightfield", "probe_cameras", "export_sequence", "pack"},
-        ),
-    },
-    "other points of a sequence": {"moved": ("points: 9", "points: 8", {"export_sequence"})},
     "a description, and somebody's light field": {
         "built": ("Cameras in a room", "Some cameras", {"pack"}),
         "published/LFPlane/lightfield.json": ("{", "{ ", {"imported lightfield"}),
@@ -622,12 +620,11 @@ WITH_FEWER_JOBS = {
     "an export less, and other options",
     "a reprojection less, and another .blend",
     "a reprojection to faces no longer",
-    "no panorama",
+    "no panorama, and larger batches",
     "a sequence",
     "development, and no flow",
     "a rig that is tested",
     "a rig less",
-    "larger batches",
 }
 # The settings that each round changes.
 CHANGED = {}

@@ -266,7 +266,10 @@ def test_the_batch_systems_log_is_named_for_a_job_that_never_began(failing, grou
         *groups,
     ]
     terminal = failing.fail("render", options=options)
-    assert terminal.endswith(f"render failed: {said}\n  log: .snakemake/{name}-17.log\n"), terminal
+    log = Path(f".snakemake/{name}-17.log")
+    assert terminal.endswith(f"render failed: {said}\n  log: {log}\n"), terminal
+    # The next run must not take it for its own.
+    (failing.folder / log).unlink()
 
 
 REFUSAL = "sbatch: error: Batch job submission failed: Invalid partition name specified"

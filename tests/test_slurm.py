@@ -4,6 +4,7 @@ import json
 import os
 import re
 import resource
+import shutil
 import signal
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,9 @@ from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
 JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
+SHARDS = ("0-3", "3-6")
+# What the jobs on the cluster need.
+INPUTS = ("cameras.json", "perspective/lens_map.npy", "panorama/lightfield.json")
 CONFIG = ["--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"]
 WORDS = [
     *("--profile", "profiles/slurm", "--cores", "2", "--retries", "4"),
@@ -22,6 +26,10 @@ WORDS = [
     # The panorama gets too little memory at first.
     *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
     *CONFIG,
+    "--",
+    # A job that renders a shard also reprojects it.
+    *(f"work/{CUBOID}/perspective/{shard}.json" for shard in SHARDS),
+    f"work/{CUBOID}/panorama/exr/view_0000f.exr",
 ]
 IMPATIENT = Path(__file__).with_name("impatient")
 pytestmark = [
@@ -53,6 +61,12 @@ def slower_checkout(folder: Path) -> Path:
     return folder
 
 
+def build(folder: Path, *targets: str) -> None:
+    """Make targets on this machine."""
+    result = snakemake(folder, *CONFIG, "--", *targets)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
 def views_of(folder: Path) -> dict[str, bytes]:
     """Return the rendered views of the dataset by name."""
     views = folder.glob(f"results/{CUBOID}/exr/*.exr")
@@ -61,11 +75,11 @@ def views_of(folder: Path) -> dict[str, bytes]:
 
 def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     install()
-    undisturbed = slower_checkout(tmp_path / "undisturbed")
-    records = [f"work/{CUBOID}/render/{shard}.json" for shard in ("0-3", "3-6")]
-    result = snakemake(undisturbed, *CONFIG, "--", *records)
-    assert result.returncode == 0, result.stdout + result.stderr
     folder = slower_checkout(tmp_path / "cluster")
+    build(folder, *(f"work/{CUBOID}/{name}" for name in INPUTS))
+    undisturbed = tmp_path / "undisturbed"
+    shutil.copytree(folder, undisturbed)
+    build(undisturbed, *(f"work/{CUBOID}/render/{shard}.json" for shard in SHARDS))
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
         environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}

@@ -8,6 +8,7 @@ import soak
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_a_build_that_is_limited_killed_and_damaged_loses_nothing(capsys, monkeypatch):
     sizes = ("--views", 2, "--limits", 1, "--kills", 1, "--faults", 3)
     monkeypatch.setattr(sys, "argv", ["soak.py", *map(str, sizes)])

@@ -41,6 +41,7 @@ def test_a_server_that_cannot_start_is_reported_with_its_own_message(tmp_path, m
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_settings_of_a_killed_run_are_sent_by_the_next(tmp_path):
     build = Cloud(tmp_path / "cloud", 2, str(tmp_path / "store"))
     build.start("--dry-run").communicate()
@@ -55,6 +56,7 @@ def test_settings_of_a_killed_run_are_sent_by_the_next(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smoke, tmp_path):
     folder = tmp_path / "store"
     build, store = Cloud(tmp_path / "cloud", 2, str(folder)), ViewStore(str(folder))
@@ -161,6 +163,7 @@ BROUGHT_WORDS = (
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     folder, root, given = (tmp_path / name for name in ("store", "cloud", "dataset"))
     build = Cloud(root, 2, str(folder), ("published/LFPlane/lightfield.json",))
@@ -233,6 +236,7 @@ family: {seeds: 0-1}
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
 def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path):
     folder = tmp_path / "store"
     build = Cloud(tmp_path / "cloud", 2, str(folder))

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import forks
 import pytest
 from checkouts import ROOT, checkout
 
@@ -47,11 +48,17 @@ def folder(tmp_path_factory):
     """A checkout with a tiny garden, and an environment that `make` takes for complete."""
     folder = checkout(tmp_path_factory.mktemp("tutorials") / "plenoforge", garden=GARDEN)
     (folder / "Makefile").write_text((ROOT / "Makefile").read_text())
-    environment = folder / ".venv"
-    environment.mkdir()
-    for name in ("bin", "lib", "pyvenv.cfg"):
-        (environment / name).symlink_to(Path(sys.prefix) / name)
-    (environment / "complete").touch()
+    programs = folder / ".venv/bin"
+    programs.mkdir(parents=True)
+    for program in Path(sys.executable).parent.iterdir():
+        (programs / program.name).symlink_to(program)
+    # These run in forks.
+    for name in ("python", "snakemake"):
+        (programs / name).unlink()
+        (programs / name).symlink_to(forks.python().with_name(name))
+    (programs / "activate").unlink()
+    (programs / "activate").write_text(f"export PATH={programs}:$PATH\n")
+    (folder / ".venv/complete").touch()
     return folder
 
 
