@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -1269,7 +1270,14 @@ def check_member(content: Any, name: str) -> Scene:
 def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
-    content = read_yaml(path, file)
+    return _checked_scene(_read_settings_text(path, file), file, Path.cwd())
+
+
+# The rules ask for the same scenes many times.
+@lru_cache(maxsize=100)
+def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
+    """Return a scene YAML's text as settings. Its relative paths start from ``_folder``."""
+    content = _parse_yaml(text, file)
     if isinstance(content, dict) and "family" in content:
         # The check below reports a block `family` that is wrong itself.
         with suppress(ValidationError, TypeError):
@@ -1393,14 +1401,27 @@ def read_yaml(path: Path, file: str) -> Any:
 
     Raises `UserError` if it is not YAML, or too large. Repeated aliases count, too.
     """
+    return _parse_yaml(_read_settings_text(path, file), file)
+
+
+def _read_settings_text(path: Path, file: str) -> str:
+    """Return a YAML file's text. Raises `UserError` if it is not text, or too large."""
     try:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_YAML + 1)
-        if len(content) > LARGEST_YAML:
-            raise UserError(
-                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
-            )
-        loader = _UniqueKeyLoader(content.decode())
+        if len(content) <= LARGEST_YAML:
+            return content.decode()
+    except (OSError, ValueError) as error:
+        raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+    raise UserError(
+        f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
+    )
+
+
+def _parse_yaml(text: str, file: str) -> Any:
+    """Return what a YAML file's text says. Raises `UserError` as `read_yaml` does."""
+    try:
+        loader = _UniqueKeyLoader(text)
         node = loader.get_single_node()
         if _size(node, {}) > MOST_NODES:
             raise UserError(
@@ -1411,17 +1432,17 @@ def read_yaml(path: Path, file: str) -> Any:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         problem = error.problem
-        if mark and _is_indented_by_tabs(content, mark.line):
+        if mark and _is_indented_by_tabs(text, mark.line):
             problem = "is indented with a tab; use spaces"
         raise UserError(f"{file}: {where}{problem}") from None
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
 
 
-def _is_indented_by_tabs(content: bytes, line: int) -> bool:
+def _is_indented_by_tabs(text: str, line: int) -> bool:
     """Return whether a line's indentation has a tab. Lines count from 0."""
-    text = dict(enumerate(content.splitlines())).get(line, b"")
-    return b"\t" in text[: len(text) - len(text.lstrip())]
+    line_text = dict(enumerate(text.splitlines())).get(line, "")
+    return "\t" in line_text[: len(line_text) - len(line_text.lstrip())]
 
 
 def _size(node: yaml.Node | None, sizes: dict[int, float]) -> float:
