@@ -1,26 +1,33 @@
-"""Asks the server of forks.py for a fork that runs a program, and ends as the fork does."""
+"""Asks the server of forks.py for a fork that runs a program, and ends as the fork does.
 
-import json
+The modules socket, signal and json import enum and re, which takes longer than all of this. So it
+uses what lies behind them.
+"""
+
+import _signal
+import _socket
+import array
+import marshal
 import os
 import resource
-import signal
-import socket
 import sys
 
 path, *arguments = sys.argv[1:]
-connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+connection = _socket.socket(_socket.AF_UNIX, _socket.SOCK_SEQPACKET)
 connection.connect(path)
-# The import of pathlib takes as long as all of this.
+# The import of pathlib takes long, too.
 folder = os.getcwd()  # noqa: PTH109
 request = {"arguments": arguments, "folder": folder, "env": dict(os.environ)}
 request["largest_file"] = resource.getrlimit(resource.RLIMIT_FSIZE)
-socket.send_fds(connection, [json.dumps(request).encode()], [0, 1, 2])
-for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-    signal.signal(number, lambda number, _: connection.send(str(number).encode()))
+descriptors = array.array("i", [0, 1, 2])
+rights = (_socket.SOL_SOCKET, _socket.SCM_RIGHTS, descriptors)
+connection.sendmsg([marshal.dumps(request)], [rights])
+for number in (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP):
+    _signal.signal(number, lambda number, _: connection.send(str(number).encode()))
 answer = connection.recv(16)
 status = int(answer) if answer else 1
 if status < 0:
-    if -status != signal.SIGKILL:
-        signal.signal(-status, signal.SIG_DFL)
+    if -status != _signal.SIGKILL:
+        _signal.signal(-status, _signal.SIG_DFL)
     os.kill(os.getpid(), -status)
 sys.exit(status)

@@ -1,14 +1,17 @@
 """Runs Snakemake and the programs in forks of one process, which has imported their libraries.
 
 Most of the time of a short run are imports of libraries. Each fork reads the Snakefile and the
-project's own code anew, as a process of its own does. Blender is imported in the fork, because its
-import starts threads, which a fork lacks.
+project's own code anew, as a process of its own does. Blender's library is loaded here, and counts
+the processors. Blender is imported in the fork, because its import starts threads, which a fork
+lacks.
 """
 
 import atexit
+import ctypes
 import gc
 import importlib
-import json
+import importlib.util
+import marshal
 import multiprocessing.process
 import os
 import pkgutil
@@ -22,6 +25,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from contextlib import suppress
 from pathlib import Path
 
 PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
@@ -29,7 +33,11 @@ LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
     *("snakemake.report", "snakemake.report.html_reporter", "smart_open"),
     # What the programs import.
-    *("numba", "OpenEXR", "OpenImageIO", "pydantic", "scipy.ndimage", "scipy.spatial", "yaml"),
+    *("numba", "OpenEXR", "OpenImageIO", "PIL.Image", "pydantic", "psutil", "yaml"),
+    *("scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "skimage.metrics"),
+    *("matplotlib.pyplot", "matplotlib.style", "matplotlib.backends.backend_svg"),
+    # What Blender imports.
+    *("cattrs.preconf.json", "requests"),
 )
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
@@ -105,50 +113,74 @@ def serve(folder):
             importlib.import_module(module.name)
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
+    ctypes.CDLL(importlib.util.find_spec("bpy").origin)
     # Otherwise the collector would copy the memory of each fork.
     gc.freeze()
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     listener.bind(f"{folder}/socket")
     listener.listen(64)
     print("listening", flush=True)
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    forks = []
     while True:
-        connection, _ = listener.accept()
-        if os.fork():
-            connection.close()
+        watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
+        ready, _, _ = select.select([listener, *watched], [], [])
+        for fork in [*forks]:
+            if fork.ended in ready:
+                fork.pass_status()
+                forks.remove(fork)
+            elif fork.client in ready:
+                fork.pass_signal()
+        if listener not in ready:
             continue
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        listener.close()
-        message, descriptors, _, _ = socket.recv_fds(connection, MOST_BYTES, 3)
-        child = os.fork()
-        if child:
-            os.setpgid(child, child)
-            attend(connection, child)
-        connection.close()
-        run(json.loads(message), descriptors, folder)
-        return
+        client, _ = listener.accept()
+        message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
+        if not message:
+            # The client was killed.
+            client.close()
+            continue
+        process = os.fork()
+        if not process:
+            listener.close()
+            client.close()
+            for fork in forks:
+                fork.close()
+            run(marshal.loads(message), descriptors, folder)
+            return
+        for descriptor in descriptors:
+            os.close(descriptor)
+        os.setpgid(process, process)
+        forks.append(Fork(process, client))
 
 
-def attend(connection, child):
-    """Send a fork the signals of its client, and the client its exit status. Then end.
+class Fork:
+    """A fork, and the connection of the client that it runs for."""
 
-    If the client is killed, the fork is killed with all processes that it started.
-    """
-    ended = os.pidfd_open(child)
-    while True:
-        ready, _, _ = select.select([ended, connection], [], [])
-        if ended in ready:
-            break
-        number = connection.recv(16)
-        if not number:
-            os.killpg(child, signal.SIGKILL)
-            break
-        os.kill(child, int(number))
-    _, status = os.waitpid(child, 0)
-    try:
-        connection.send(str(os.waitstatus_to_exitcode(status)).encode())
-    finally:
-        os._exit(0)
+    def __init__(self, process, client):
+        self.process = process
+        self.client = client
+        self.ended = os.pidfd_open(process)
+
+    def close(self):
+        os.close(self.ended)
+        self.client.close()
+
+    def pass_signal(self):
+        """Send the fork a signal that its client got.
+
+        If the client was killed, kill the fork with all processes that it started.
+        """
+        number = self.client.recv(16)
+        if number:
+            os.kill(self.process, int(number))
+        else:
+            os.killpg(self.process, signal.SIGKILL)
+
+    def pass_status(self):
+        """Send the client the exit status of the fork, which has ended."""
+        _, status = os.waitpid(self.process, 0)
+        with suppress(OSError):
+            self.client.send(str(os.waitstatus_to_exitcode(status)).encode())
+        self.close()
 
 
 def run(request, descriptors, folder):
