@@ -1,5 +1,6 @@
 """Builds whose jobs share no folder, with a storage in a folder."""
 
+import json
 import tarfile
 from collections import Counter
 
@@ -230,8 +231,20 @@ rigs:
     cameras: [2, 1]
     size: 0.5
     center: [0, 0, 1.2]
+    split: {every: 2}
     camera: {lens: equidistant, fov: 180, resolution: [32, 32]}
-family: {seeds: 0-1}
+family: {seeds: 0-2}
+"""
+# A builder that raises an error for seed 2.
+BROKEN = """
+
+built = build
+
+
+def build(parameters):
+    if parameters["seed"] == 2:
+        raise ValueError("no walls")
+    built(parameters)
 """
 
 
@@ -241,9 +254,12 @@ def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path)
     folder = tmp_path / "store"
     build = Cloud(tmp_path / "cloud", 2, str(folder))
     (tmp_path / "cloud/configs/scenes/rooms.yaml").write_text(ROOMS)
+    with (tmp_path / "cloud/program/scripts/scenes/room/__init__.py").open("a") as builder:
+        builder.write(BROKEN)
     run = build.start("--config", "scenes=rooms", "rigs=all", "preset=full")
+    journal = folder / "work/rooms/batches/seeds_0000_0031.journal.jsonl"
+    wait_until(lambda: journal.is_file() and '"0001"' in journal.read_text(), run)
     first = folder / "results/rooms/0000/member.json"
-    wait_until(first.exists, run)
     time = first.stat().st_mtime_ns
     for group in build.running():
         kill_group(group)
@@ -251,11 +267,20 @@ def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path)
     build.jobs.rename(tmp_path / "gone")
     build.jobs.mkdir()
     said, _ = run.communicate()
-    assert run.returncode == 0, said
-    assert "2 of 2 members of rooms built" in said
+    assert run.returncode == 1, said
+    assert "2 of 3 members of rooms built, 1 failed" in said
     assert first.stat().st_mtime_ns == time
+    # The second node knew at which member the first one was, and built it last.
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    assert sum("started" in line for line in lines) == 2
+    began = [line["member"] for line in lines if "began" in line]
+    assert began == ["0000", "0001", "0002", "0001"]
+    failure = json.loads((folder / "results/rooms/0002/member.json").read_text())["failure"]
+    assert failure["cause"] == "ValueError: no walls"
+    assert "Traceback" in (folder / failure["log"]).read_text()
     for member in ("0000", "0001"):
         dataset = folder / "results/rooms" / member / "LFPlane"
+        assert (dataset.parent / "splits.json").is_file()
         lines = (dataset / "sha256sums.txt").read_text().splitlines()
         sums = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
         assert {"exr/view_0000f.exr", "exr/view_0001f.exr", "validation.json"} <= sums.keys()

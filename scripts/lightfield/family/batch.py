@@ -4,7 +4,8 @@ A worker process builds the members. If a signal ends it, as when memory runs ou
 crashes, the member at hand has failed, and another worker goes on with the next. A journal beside
 the batch's record says what each process did. So if this process dies as well, the next run knows
 which member was at hand, and builds it last: a user may have killed the run, or the member may have
-taken all memory. A member at which three runs in a row have died has failed.
+taken all memory. A member at which three runs in a row have died has failed. Without a common
+folder, the journal lies in the storage, because the next run may be on another node.
 """
 
 import os
@@ -33,6 +34,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.family import Member
 from lightfield.dataset.job_settings import BatchSettings
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
+from lightfield.dataset.view_store import ViewStore
 from lightfield.family.member import MemberBuild
 
 # These signals stop a run. They are no fault of the member at hand.
@@ -46,7 +48,7 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
 
     Raises `UserError` if nothing can be written, or if the run is stopped.
     """
-    journal = record.with_suffix(JOURNAL_SUFFIX)
+    journal = _brought_journal(record, Path(settings.work))
     builds = {member.name: MemberBuild(settings, member) for member in settings.members}
     leftovers.remove()
     failed: list[str] = []
@@ -59,18 +61,37 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
                 f"{MOST_DEATHS} runs died at it: most likely memory ran out, or Blender crashed",
             )
             failed.append(name)
-        append_json_line(journal, {"failed": name})
+        _note(journal, {"failed": name})
     started = {"started": round(time.time(), 3), "host": socket.gethostname(), "pid": os.getpid()}
-    append_json_line(journal, started)
+    _note(journal, started)
     while signal_number := _work(settings, journal, failed, last, device, threads):
         name = member_at_hand(read_json_lines(journal))
         if name is None or signal_number in STOPS:
             raise UserError(f"killed by {signal.Signals(signal_number).name}")
         builds[name].fail(builds[name].last_stage(), signal_cause(signal_number))
-        append_json_line(journal, {"failed": name})
+        _note(journal, {"failed": name})
         failed.append(name)
     write_json(record, _content(builds))
-    append_json_line(journal, {"ended": round(time.time(), 3)})
+    _note(journal, {"ended": round(time.time(), 3)})
+
+
+def _brought_journal(record: Path, work: Path) -> Path:
+    """Return the path of a batch's journal. Brings it from the storage, if there is one."""
+    journal = record.with_suffix(JOURNAL_SUFFIX)
+    store = ViewStore.configured()
+    if not store:
+        return journal
+    # The record is named in the folder of Snakemake's copies, to which ``work`` is a link.
+    journal = work / journal.resolve().relative_to(work.resolve())
+    store.bring(str(journal))
+    return journal
+
+
+def _note(journal: Path, entry: Mapping[str, Any]) -> None:
+    """Append a line to the journal, and keep it where the next run finds it."""
+    append_json_line(journal, entry)
+    if store := ViewStore.configured():
+        store.send(str(journal))
 
 
 def _work(
@@ -117,10 +138,10 @@ def _build_members(
     for build in missing:
         if os.getppid() != parent:
             raise UserError("the run has ended")
-        append_json_line(journal, {"member": build.member.name, "began": round(time.time(), 3)})
+        _note(journal, {"member": build.member.name, "began": round(time.time(), 3)})
         began = time.process_time()
         record = build.build(device, threads)
-        append_json_line(
+        _note(
             journal,
             {
                 "member": build.member.name,

@@ -22,6 +22,7 @@ from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.family import FORMAT, RECORD, Member, drawn, member_content
 from lightfield.dataset.job_settings import BatchSettings
 from lightfield.dataset.loading import datasets_of
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
 from lightfield.validation.files import SUMS, read_sums
@@ -189,22 +190,35 @@ class MemberBuild:
         return record
 
     def _send(self, record: Mapping[str, Any]) -> None:
-        """Put the member's files into the storage, each under its path, and the record last."""
+        """Put the member's files into the storage, each under its path, and the record last.
+
+        Of a failed member, this is its log, which the record names.
+        """
         assert self.store
+        if record["state"] == "failed" and self.log.is_file():
+            # This process may still write to it.
+            sys.stdout.flush()
+            self.store.send(str(self.log))
         for rig in record["datasets"]:
             sums = self.folder / rig / SUMS
             for name in read_sums(sums):
                 self.store.send(str(self.folder / rig / name))
             self.store.send(str(sums))
+        if record["datasets"] and (self.folder / SPLITS).is_file():
+            self.store.send(str(self.folder / SPLITS))
         self.store.send(str(self.record))
 
     def last_stage(self) -> str:
-        """Return the stage at which a process was that died, by the member's log."""
-        with suppress(OSError):
+        """Return the stage at which a process was that died, by the member's log.
+
+        Without a common folder, the log of a process on another node is lost: "unknown".
+        """
+        try:
             lines = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
-            stages = [line.partition(": ")[2] for line in lines if line.startswith("stage: ")]
-            return stages[-1] if stages else "settings"
-        return "settings"
+        except OSError:
+            return "unknown"
+        stages = [line.partition(": ")[2] for line in lines if line.startswith("stage: ")]
+        return stages[-1] if stages else "settings"
 
 
 def _listing(dataset: Dataset) -> dict[str, Any]:
