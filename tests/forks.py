@@ -114,8 +114,9 @@ def serve(folder):
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
-    # Otherwise the collector would copy the memory of each fork.
+    # Otherwise the collector would copy the memory of each fork. Most end before it is needed.
     gc.freeze()
+    gc.set_threshold(20_000)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     listener.bind(f"{folder}/socket")
     listener.listen(64)
