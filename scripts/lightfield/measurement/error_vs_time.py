@@ -506,7 +506,7 @@ def _row(*cells: str | float | None) -> str:
 
 def draw(stem: Path, content: Mapping[str, Any]) -> None:
     """Draw error over time as ``stem``.svg and .png: by method, and beside it by stratum."""
-    with plots.plot(stem, 1, 2, size=(18, 5.5)) as (by_method_axes, by_stratum_axes):
+    with plots.plot(stem, 1, 2, size=(18, 6.5)) as (by_method_axes, by_stratum_axes):
         _draw_methods(by_method_axes, content)
         unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
         by_method_axes.set(
@@ -514,9 +514,10 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
             yscale="log",
             title=f"{stem.name}: error against render time",
             xlabel=f"render time, {unit} seconds per megapixel",
-            ylabel="relative mean squared error of all but the worst thousandth of pixels",
+            ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
         )
-        by_method_axes.legend(fontsize=8)
+        # Put both legends outside of the axes: they would hide curves.
+        by_method_axes.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
         _draw_strata(by_stratum_axes, content)
         by_stratum_axes.set(
             xscale="log",
@@ -525,7 +526,6 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
             xlabel=by_method_axes.get_xlabel(),
         )
         by_stratum_axes.xaxis.set_minor_formatter("")
-        # Put the legend beside the axes: its seven strata would hide the curves.
         by_stratum_axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
 
 
