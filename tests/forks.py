@@ -36,9 +36,9 @@ LIBRARIES = (
     *("numba", "OpenEXR", "OpenImageIO", "PIL.Image", "pydantic", "psutil", "yaml"),
     *("scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "skimage.metrics"),
     *("matplotlib.pyplot", "matplotlib.style", "matplotlib.backends.backend_svg"),
-    # What Blender imports.
-    *("cattrs.preconf.json", "requests"),
 )
+# What Blender imports. Not every version needs, and brings, all of it.
+BLENDER_LIBRARIES = ("cattrs.preconf.json", "requests")
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
 # Stands for python. It starts forks for programs and Snakemake, and processes for all else.
@@ -113,6 +113,9 @@ def serve(folder):
             importlib.import_module(module.name)
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
+    for name in BLENDER_LIBRARIES:
+        with suppress(ModuleNotFoundError):
+            importlib.import_module(name)
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
     # Otherwise the collector would copy the memory of each fork. Most end before it is needed.
     gc.freeze()

@@ -147,12 +147,9 @@ class Node:
         wait_until(lambda: self.state() in up, self.daemons["slurmd"], 60)
 
     def fill_disk(self) -> Path:
-        """Fill the node's own disk to the last byte. Return the file that fills it.
-
-        Called again, it also fills what was freed meanwhile.
-        """
+        """Fill the node's own disk to the last byte. Return the file that fills it."""
         filler = Path(f"/proc/{self.daemons['slurmd'].pid}/root{self.folder}/disk/filler")
-        with filler.open("ab", buffering=0) as file, suppress(OSError):
+        with filler.open("wb", buffering=0) as file, suppress(OSError):
             while True:
                 file.write(bytes(4096))
         return filler

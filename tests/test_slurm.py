@@ -93,12 +93,13 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
         began |= stop_next(folder, shard, began, run)
         for job in node.run("squeue", "--states=RUNNING", "--noheader", "--format=%i").split():
             node.run("scontrol", "update", f"JobId={job}", "EndTime=now")
-        # The next job finds the disk full, and fails.
+        # The disk of the next job is full, and it fails. It begins after it has chosen a folder of
+        # temporary files, and so it does not choose one on another disk.
         full = stop_next(folder, shard, began, run)
         with no_room(node, full):
             for process in full:
                 os.kill(process, signal.SIGCONT)
-            wait_until(lambda: has_ended_without_room(node, full), run, log=log)
+            wait_until(lambda: not any(map(psutil.pid_exists, full)), run, log=log)
             logs = [path.read_text() for path in folder.glob(f"work/logs/{CUBOID}/render/*.log")]
         wait_until(lambda: processes(folder, shard) - began - full, run, log=log)
         wait_for_views(folder, 4, run)
@@ -183,13 +184,6 @@ def no_room(node: Node, found: set[int]):
     for process in found:
         resource.prlimit(process, resource.RLIMIT_FSIZE, (1, 1))
     yield
-
-
-def has_ended_without_room(node: Node, processes: set[int]) -> bool:
-    """Return whether these processes have ended. Takes what room others left on the node's disk."""
-    if node.own_disk:
-        node.fill_disk()
-    return not any(map(psutil.pid_exists, processes))
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:

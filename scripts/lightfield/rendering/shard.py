@@ -68,10 +68,10 @@ def render(
     cannot be written.
     """
     images.check_codec(lightfield.render.get("compression", "zip"))
-    shard_journal = Journal(journal)
-    shard_record = ShardRecord(record, folder)
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
+    shard_journal = Journal(journal)
+    shard_record = ShardRecord(record, folder)
     chosen_views = lightfield.views[view_slice(views, len(lightfield.views))]
     missing_views = [
         view for view in chosen_views if not _is_finished(view, lightfield, folder, shard_record)
