@@ -236,6 +236,27 @@ def test_the_viewer_shows_a_view_clean_and_as_the_sensor_sees_it(tmp_path, show)
     assert "show-sensor" not in page_without.replace('element("show-sensor")', "")
 
 
+def test_the_viewer_shows_dark_colours_as_they_are_beside_a_fire(tmp_path, show):
+    rig = {**LINE, "cameras": [2, 1]}
+    lightfield = write_dataset(tmp_path, rig)
+    colour = np.empty((48, 64, 3), np.float16)
+    # Leaves in the shade, in the sun, and a fire.
+    colour[:24] = (0.03, 0.004, 0.0005)
+    colour[24:] = (0.02, 0.3, 0.05)
+    colour[40:, :8] = (6000, 2500, 400)
+    for view in lightfield.views:
+        distance = np.ones(colour.shape[:2], np.float32)
+        images.write_exr(tmp_path / "exr" / f"{view.name}.exr", channels_of(colour, Z=distance))
+    tab = show(make_page(tmp_path, rig))
+    shown = pixels(tab, "viewer")[..., :3]
+    exposure = pictures.exposure_for(colour.astype(np.float32))
+    expected = pictures.develop(colour.astype(np.float32), exposure).astype(int)
+    # The packing is lossy at edges.
+    middle = (slice(4, 20), slice(20, 60)), (slice(28, 44), slice(20, 60))
+    for part in middle:
+        assert np.abs(shown[part] - expected[part]).max() <= 6
+
+
 def test_the_readout_shows_the_files_values(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
@@ -733,14 +754,14 @@ def test_light_and_depth_survive_packing():
     random = np.random.default_rng(1)
     light = np.exp2(random.uniform(-6, 6, (40, 3)))
     light[3] = 0
-    low, high = packing.light_range(light)
-    codes = packing.pack_light(light, (low, high)).astype(float)
+    scale = packing.light_scale(light)
+    codes = packing.pack_light(light, scale).astype(float)
     assert (codes[3] == 0).all()
-    back = np.where(codes > 0, 2 ** (low + (codes - 1) / 254 * (high - low)), 0)
-    inside = light >= 2**low
-    np.testing.assert_allclose(
-        back[inside], light[inside], rtol=2 ** ((high - low) / 508) - 1 + 1e-9
-    )
+    toe, highest = scale
+    back = toe * ((1 + highest / toe) ** (codes / 255) - 1)
+    step = packing.light_step(scale)
+    assert step < 0.06
+    np.testing.assert_allclose(back, light, rtol=step / 2 + 1e-9, atol=step / 2 * toe)
 
     depth = np.exp2(random.uniform(-3, 9, 500))
     depth[:2] = np.inf, np.nan

@@ -9,7 +9,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import of_group
 from lightfield.imaging import images, pictures
-from lightfield.report.packing import light_range, pack_light, webp
+from lightfield.report.packing import light_scale, pack_light, webp
 
 # The longer side of the pictures in pixels, at most. Smaller for more than MANY_GROUPS.
 SIDE = 256
@@ -35,10 +35,10 @@ def collect(
         colour = np.nan_to_num(colour, posinf=0, neginf=0)
         if colour.shape[:2] != (small.height, small.width):
             colour = pictures.shrunk(colour, small.width, small.height)
-        limits = light_range(colour)
+        scale = light_scale(colour)
         # Without loss: the sum of many groups would show what each has lost.
-        picture = webp(pack_light(colour, limits))
-        groups.append({"name": name, "range": limits, "light": picture})
+        picture = webp(pack_light(colour, scale))
+        groups.append({"name": name, "scale": scale, "light": picture})
     if not groups:
         return None
     return {

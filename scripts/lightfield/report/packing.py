@@ -1,7 +1,8 @@
 """Packs light and depth into the 8-bit pixels of pictures, with more range than a display has.
 
-A page decodes them in the browser (templates/page/packing.js), to show exposure and depth. Both are
-logarithmic: every stop of light, and every doubling of depth, has the same number of steps.
+A page decodes them in the browser (templates/page/packing.js), to show exposure and depth. Every
+doubling of depth has the same number of steps. So has every stop of light, except for dark light,
+which has equal steps down to black.
 """
 
 import base64
@@ -12,39 +13,45 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from lightfield.imaging import pictures
+
 Array = NDArray[Any]
 
-# More than a scene's light usually spans. A step is then 4 to 5 percent, as in the darker half of
-# 8-bit sRGB.
-MOST_STOPS = 18.0
+# Steps of light become linear this many stops below white, nearly as fine as those of 8-bit sRGB.
+# Logarithmic steps would end above black, and change the dark channels of saturated colours.
+TOE_STOPS = 7.0
 # 12 bits of depth: a step is 0.3 percent in a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096
 NO_DEPTH = 0
 MISS = DEPTH_STEPS - 1
 
 
-def light_range(colour: Array) -> tuple[float, float]:
-    """Return the range (low, high) of light (..., 3) to keep, in stops (log2).
+def light_scale(colour: Array) -> tuple[float, float]:
+    """Return the scale (toe, highest) that light (..., 3) is packed on.
 
-    It goes from the 0.1 percentile to the highest value, but over at most `MOST_STOPS`.
+    Steps are linear below the toe. The toe is `TOE_STOPS` below white at the colour's own exposure.
     """
+    toe = 2.0 ** -(TOE_STOPS + pictures.exposure_for(colour))
     lit = colour[np.isfinite(colour) & (colour > 0)]
-    if not lit.size:
-        return -1.0, 1.0
-    low = np.log2(np.percentile(lit, 0.1))
-    high = np.log2(lit.max())
-    high = max(high, low + 1.0)
-    return float(max(low, high - MOST_STOPS)), float(high)
+    return toe, float(lit.max()) if lit.size else toe
 
 
-def pack_light(colour: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return light (...) as codes. 0 is black, 1 to 255 are ``limits`` in equal steps of log2."""
-    low, high = limits
-    with np.errstate(divide="ignore", invalid="ignore"):
-        steps = (np.log2(colour) - low) / (high - low) * 254
-    codes = np.clip(np.round(np.nan_to_num(steps, nan=0.0)) + 1, 1, 255)
-    packed: NDArray[np.uint8] = np.where(colour > 0, codes, 0).astype(np.uint8)
+def pack_light(colour: Array, scale: tuple[float, float]) -> NDArray[np.uint8]:
+    """Return light (...) as codes from 0, which is black, to 255, which is the ``scale``'s highest.
+
+    Codes have equal steps of log(1 + light / toe).
+    """
+    toe, highest = scale
+    light = np.clip(np.nan_to_num(colour, nan=0.0), 0, highest)
+    codes = np.log1p(light / toe) / np.log1p(highest / toe) * 255
+    packed: NDArray[np.uint8] = np.round(codes).astype(np.uint8)
     return packed
+
+
+def light_step(scale: tuple[float, float]) -> float:
+    """Return the part by which bright light grows from one code to the next."""
+    toe, highest = scale
+    return float(np.expm1(np.log1p(highest / toe) / 255))
 
 
 def depth_range(depth: Array) -> tuple[float, float]:

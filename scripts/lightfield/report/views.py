@@ -24,7 +24,8 @@ from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,
     depth_range,
-    light_range,
+    light_scale,
+    light_step,
     pack_depth,
     pack_light,
     packed_bytes,
@@ -41,7 +42,7 @@ SMALLER_SIDE = 192
 MANY_VIEWS = 60
 # The rest of a page has up to 2 MB, so that it has at most 10 MB.
 MOST_BYTES = 8_000_000
-LIGHT_QUALITY = 92
+LIGHT_QUALITY = 95
 # The longer side in pixels of the views that epipolar-plane images sample: their columns' number.
 EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
@@ -83,6 +84,11 @@ class PackedViews:
     row: epipolar.Row | None
     row_shown: int
     sensor: str | None = None
+
+    @property
+    def light_step(self) -> float:
+        """The part by which bright light grows from one packed code to the next."""
+        return light_step(self.data["light"])
 
 
 def collect(
@@ -208,13 +214,13 @@ def _pictures(
 ) -> dict[str, Any]:
     """Return the packed pictures of the ``embedded`` views, through the lens ``small``."""
     light = np.stack([view.colour for view in views])
-    limits = light_range(light)
+    scale = light_scale(light)
     exposure = round(pictures.exposure_for(light), 2)
     packed: list[dict[str, Any]] = [
-        {"view": number, "light": webp(pack_light(colour, limits), LIGHT_QUALITY)}
+        {"view": number, "light": webp(pack_light(colour, scale), LIGHT_QUALITY)}
         for number, colour in zip(embedded, light, strict=True)
     ]
-    shown = {"light": limits, "exposure": exposure, "embedded": packed}
+    shown = {"light": scale, "exposure": exposure, "embedded": packed}
     if depths is None:
         return shown | {"points": None, "depth": None, "walk": None}
     rays = small.pixel_rays()
@@ -324,7 +330,7 @@ def _epipolar_images(
     lightfield: LightField,
     row: epipolar.Row,
     kept: list[int],
-    limits: tuple[float, float],
+    scale: tuple[float, float],
 ) -> dict[str, Any]:
     """Return a row's epipolar-plane images: one picture, with all tilts beneath each other.
 
@@ -362,7 +368,7 @@ def _epipolar_images(
         "columns": columns,
         "widest": math.tan(epipolar.WIDEST),
         "shape": [count, last - first],
-        "light": webp(_stacked(pack_light(light, limits))),
+        "light": webp(_stacked(pack_light(light, scale))),
         "depth": webp(_stacked(pack_depth(depth, reach))),
         "range": reach,
     }

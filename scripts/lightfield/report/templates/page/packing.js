@@ -3,8 +3,11 @@
 import { DATA, MISS } from "./data.js";
 import { clamp } from "./vectors.js";
 
-export const LIGHT = Float64Array.from({ length: 256 }, (_, code) =>
-  code ? 2 ** (DATA.light[0] + ((code - 1) / 254) * (DATA.light[1] - DATA.light[0])) : 0);
+// Return the linear light of each code.
+export const lightByCode = ([toe, highest]) =>
+  Float64Array.from({ length: 256 }, (_, code) => toe * Math.expm1((code / 255) * Math.log1p(highest / toe)));
+
+export const LIGHT = lightByCode(DATA.light);
 
 export function encodeSrgb(linear) {
   const value = clamp(linear, 0, 1);

@@ -3,13 +3,12 @@
 
 import { DATA } from "../page/data.js";
 import { element, onceAFrame } from "../page/document.js";
-import { decoded, encodeSrgb } from "../page/packing.js";
+import { decoded, encodeSrgb, lightByCode } from "../page/packing.js";
 
 const LIGHTS = DATA.lights;
 // One entry for each group: its linear light by code, its codes, and its factors of R, G and B.
 const lamps = LIGHTS.groups.map((group) => ({
-  light: Float32Array.from({ length: 256 }, (_, code) =>
-    code ? 2 ** (group.range[0] + ((code - 1) / 254) * (group.range[1] - group.range[0])) : 0),
+  light: lightByCode(group.scale),
   codes: null,
   factors: [1, 1, 1],
 }));
