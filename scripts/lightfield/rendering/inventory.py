@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import animation, cycles, pruning
+from lightfield.rendering import animation, cycles, motion_blur, pruning
 from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
@@ -86,7 +86,7 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         "textures": sorted(image.name_full for image in images),
         "hidden": hidden,
         **changing,
-        "motion_blur": bool(scene.render.use_motion_blur),
+        "motion_blur": motion_blur.is_on(),
         "external_files": external_files(),
         "missing": problems(images),
     }
