@@ -65,10 +65,19 @@ def leave_out_blur(scene, layer):
     layer.use_motion_blur = False
 
 
+def cull_what_is_far(scene, layer):
+    scene.render.use_simplify = True
+    scene.cycles.use_distance_cull = True
+    scene.cycles.distance_cull_margin = 1
+    for obj in scene.objects:
+        obj.cycles.use_distance_cull = True
+
+
 @pytest.mark.parametrize(
     ("switch", "settings"),
     [
         (burn_a_stamp, {}),
+        (cull_what_is_far, {}),
         (leave_out_denoising, {"denoise": True}),
         (leave_out_blur, {"motion_blur": True}),
     ],

@@ -50,6 +50,9 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "stereoscopy": bool(render.use_multiview),
         "freestyle": bool(render.use_freestyle),
         "simplify": bool(render.use_simplify),
+        "culling": bool(
+            render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull)
+        ),
         "working_space": bpy.data.colorspace.working_space,
         "unit_scale": round(scene.unit_settings.scale_length, 6),
         "scripts": bool(bpy.app.autoexec_fail),

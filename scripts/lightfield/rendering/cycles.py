@@ -112,6 +112,9 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles.time_limit = 0
     cycles.use_layer_samples = "IGNORE"
     cycles.use_sample_subset = False
+    # Culling would leave other objects out of each view, and out of its reflections and shadows.
+    cycles.use_camera_cull = False
+    cycles.use_distance_cull = False
     if "filter_width" in settings:
         cycles.filter_width = settings["filter_width"]
     if "motion_blur" in settings:
