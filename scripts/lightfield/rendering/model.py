@@ -12,13 +12,12 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, write_json
+from lightfield.core.files import atomic_path, listed, write_json
 from lightfield.core.settings import FARTHEST
 from lightfield.dataset.job_settings import ImportSettings
 from lightfield.dataset.keys import model_fingerprint
 from lightfield.dataset.names import UP
 from lightfield.rendering import blend_file, model_files, model_light
-from lightfield.rendering.external_files import listed
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
@@ -49,23 +48,30 @@ _TOLERANCE = 0.01
 Box = NDArray[np.float64]
 
 
-def write(settings: ImportSettings, output: Path, record: Path) -> dict[str, Any]:
+def write(
+    settings: ImportSettings, output: Path, record: Path, sources: Path | None = None
+) -> dict[str, Any]:
     """Make a scene of a model, save it as a .blend, and write and return the import's record.
 
-    Raises `UserError` as `make_scene` does.
+    ``sources`` is a JSON to write as soon as the files that the model names are known. It lists
+    them also if the model is refused, as when one is missing. Raises `UserError` as `make_scene`
+    does.
     """
-    content = make_scene(settings, output.parent)
+    content = make_scene(settings, output.parent, sources)
     with atomic_path(output) as temporary:
         blend_file.save_scene(temporary)
     write_json(record, content)
     return content
 
 
-def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
+def make_scene(
+    settings: ImportSettings, folder: Path, sources: Path | None = None
+) -> dict[str, Any]:
     """Make a scene of a model in the open file. Return the record of the import.
 
-    ``folder`` is where the .blend will be. The record has the ``fingerprint``, the files that the
-    model was read from as ``external_files``, and its ``box`` in metres.
+    ``folder`` is where the .blend will be. ``sources`` is that of `write`. The record has the
+    ``fingerprint``, the files that the model was read from as ``external_files``, and its ``box``
+    in metres.
 
     Raises `UserError` for a model that is broken, empty, or lacks files.
     """
@@ -78,6 +84,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     _import(path, settings.up)
     _remove_cameras_and_lamps()
     files = _read_files(path, referred_files)
+    entries = [listed(file, path.parent) for file in files]
+    if sources:
+        write_json(sources, {"files": entries})
     if not settings.allow_missing:
         _refuse_missing(path, files)
         _refuse_unread_textures(path)
@@ -102,7 +111,6 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if settings.ground:
         model_light.add_ground(box)
     _name_caches_from(folder)
-    entries = [listed(file, path.parent) for file in files]
     options = settings.model_dump(include={"unit", "up", "ground", "light", "frame"})
     names = [(entry["path"], entry["sha256"]) for entry in entries]
     return {
