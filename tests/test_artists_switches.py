@@ -127,3 +127,88 @@ def test_a_window_of_a_view_of_any_size_has_the_pixels_of_the_whole(render, size
         cycles.set_window(x, y, 7, 6)
         window = render_colour(POSE, 0).pixels
         np.testing.assert_array_equal(window, whole[y : y + 6, x : x + 7])
+
+
+def add_fog(shader):
+    """Give a material or a world a thick volume. Return the link to its output."""
+    tree = shader.node_tree
+    volume = tree.nodes.new("ShaderNodeVolumePrincipled")
+    output = tree.get_output_node("CYCLES")
+    return tree.links.new(volume.outputs[0], output.inputs["Volume"])
+
+
+def cover_with_muted_fog(scene, layer):
+    """Put a clear cube before the camera. The artist has muted its volume."""
+    import bpy
+
+    bpy.ops.mesh.primitive_cube_add(location=(0, -2, 0), size=1.5)
+    material = bpy.data.materials.new("muted")
+    bpy.context.object.data.materials.append(material)
+    tree = material.node_tree
+    clear = tree.nodes.new("ShaderNodeBsdfTransparent")
+    tree.links.new(clear.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    add_fog(material).is_muted = True
+
+
+def test_a_muted_volume_stays_muted_in_all_views(render):
+    from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.geometry_pass import render_geometry
+
+    first = render(cover_with_muted_fog)
+    render_geometry(POSE)
+    np.testing.assert_array_equal(render_colour(POSE, 0).pixels, first)
+
+
+def test_depth_sees_through_fog_with_a_muted_surface(render):
+    from lightfield.rendering.geometry_pass import render_geometry
+
+    def mute_the_surface(scene, layer):
+        import bpy
+
+        cover_with_muted_fog(scene, layer)
+        output = bpy.data.materials["muted"].node_tree.get_output_node("CYCLES")
+        output.inputs["Volume"].links[0].is_muted = False
+        output.inputs["Surface"].links[0].is_muted = True
+
+    render()
+    expected = render_geometry(POSE).depth
+    render(mute_the_surface)
+    np.testing.assert_array_equal(render_geometry(POSE).depth, expected)
+
+
+def test_depth_sees_through_the_fog_of_a_layers_world(render):
+    import bpy
+
+    from lightfield.rendering.geometry_pass import render_geometry
+
+    def override(scene, layer):
+        layer.world_override = bpy.data.worlds.new("fog")
+        add_fog(layer.world_override)
+
+    render()
+    expected = render_geometry(POSE).depth
+    render(override)
+    np.testing.assert_array_equal(render_geometry(POSE).depth, expected)
+
+
+@pytest.mark.parametrize("kind", ["world", "material"])
+def test_a_missing_texture_of_a_layers_override_is_found(render, tmp_path, kind):
+    import bpy
+
+    from lightfield.rendering import blend_file, inventory
+
+    def override(scene, layer):
+        image = bpy.data.images.new("sky", 4, 4)
+        image.source = "FILE"
+        image.filepath = "//gone.png"
+        shader = getattr(bpy.data, f"{kind}s").new("override")
+        tree = shader.node_tree
+        texture = "Environment" if kind == "world" else "Image"
+        node = tree.nodes.new(f"ShaderNodeTex{texture}")
+        node.image = image
+        tree.links.new(node.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+        setattr(layer, f"{kind}_override", shader)
+
+    render(override)
+    blend_file.open_scene(tmp_path / "scene.blend")
+    assert [entry["path"] for entry in inventory.inventory([1])["missing"]] == ["gone.png"]
