@@ -2,18 +2,23 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 from faults import FAULTS
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import size_and_time
 from lightfield.dataset.config import check_member
-from lightfield.dataset.family import Family, drawn, member_content, outdated_members
+from lightfield.dataset.family import Family, Member, drawn, member_content, outdated_members
+from lightfield.dataset.job_settings import BatchSettings
 from lightfield.family.batch import deadly_member, member_at_hand
+from lightfield.imaging.images import write_png
 
 ROOT = Path(__file__).parents[1]
 CAMERA = "{lens: equidistant, fov: 180, resolution: [64, 64]}"
@@ -175,7 +180,7 @@ def record_of(folder, sources):
     failed.mkdir()
     (failed / "member.json").touch()
     members = {
-        "0000": {"state": "valid", "datasets": {"LF": "0" * 64}},
+        "0000": {"state": "valid", "datasets": {"LF": {"split": None}}},
         "0001": {"state": "failed"},
     }
     path = folder / "record.json"
@@ -393,3 +398,95 @@ def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(
     text.write_text(text.read_text().replace("SOFTBOXES_VERSION = ", "SOFTBOXES_VERSION = 1000"))
     after = batch_settings()
     assert [name for name in scenes if before[name] != after[name]] == ["boxes", "drawn"]
+
+
+# ---- files that change while members are built ------------------------------------------------
+
+FACE = "v 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nf 1/1 2/1 3/1\n"
+RING = {"type": "ring", "count": 2, "size": 3}
+RING["camera"] = {"lens": "rectilinear", "fov": 50, "resolution": [8, 8]}
+
+
+@pytest.fixture
+def face(tmp_path):
+    """Return a function that gives the settings of a family with one model, a face."""
+    (tmp_path / "face.obj").write_text(FACE)
+
+    def settings(**rig):
+        return BatchSettings(
+            family="faces",
+            scene={"scene": {}, "render": {"samples": 1}, "rigs": {"ring": RING | rig}},
+            members=[Member(name="face", model=str(tmp_path / "face.obj"))],
+            results=str(tmp_path / "results"),
+            work=str(tmp_path / "work"),
+        )
+
+    return settings
+
+
+def build_of(settings):
+    from lightfield.family.member import MemberBuild
+
+    return MemberBuild(settings, settings.members[0])
+
+
+@pytest.mark.slow
+def test_a_texture_that_was_missing_makes_its_batch_outdated(face, tmp_path, run_program):
+    (tmp_path / "face.obj").write_text(f"mtllib face.mtl\nusemtl red\n{FACE}")
+    (tmp_path / "face.mtl").write_text("newmtl red\nmap_Kd red.png\n")
+    (tmp_path / "settings.json").write_text(json.dumps(face().as_json()))
+    record = tmp_path / "work/faces/batches/models.json"
+    arguments = ("--settings", tmp_path / "settings.json", "--record", record, "--device", "cpu")
+    run_program("build_members.py", *arguments)
+    member = json.loads(record.read_text())["members"]["face"]
+    assert member["state"] == "failed" and "red.png" in member["failure"]["cause"]
+    assert not outdated_members(record, tmp_path / "results/faces")
+    write_png(tmp_path / "red.png", np.zeros((4, 4, 3), np.uint8))
+    assert outdated_members(record, tmp_path / "results/faces")
+    run_program("build_members.py", *arguments)
+    assert json.loads(record.read_text())["members"]["face"]["state"] == "valid"
+    assert not outdated_members(record, tmp_path / "results/faces")
+
+
+@pytest.mark.slow
+def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, monkeypatch):
+    from lightfield.family.stages import Stages
+
+    path = tmp_path / "face.obj"
+    render = Stages._render
+
+    def change_and_render(*arguments):
+        path.write_text(FACE.replace("1 0 0", "2 0 0"))
+        render(*arguments)
+
+    monkeypatch.setattr(Stages, "_render", change_and_render)
+    build = build_of(face())
+    assert build.build("cpu", 1)["state"] == "valid"
+    assert not build.is_finished()
+    # The batch's record must have the time of the content that was read.
+    assert build.source_stamps()[str(path)] != size_and_time(path)
+    path.write_text(FACE)
+    assert build.is_finished()
+    assert build.source_stamps()[str(path)] == size_and_time(path)
+
+
+@pytest.mark.slow
+def test_members_are_kept_without_their_folder_of_work(face, tmp_path):
+    build = build_of(face())
+    assert build.build("cpu", 1)["state"] == "valid"
+    shutil.rmtree(tmp_path / "work")
+    assert build.is_finished()
+    assert list(build.source_stamps()) == [str(tmp_path / "face.obj")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", ["{}", None])
+def test_a_member_with_a_damaged_splits_json_is_built_again(face, tmp_path, damage):
+    build = build_of(face(split={"test": ["view_0001f"]}))
+    assert build.build("cpu", 1)["state"] == "valid"
+    assert build.is_finished()
+    splits = tmp_path / "results/faces/face/splits.json"
+    splits.unlink()
+    if damage:
+        splits.write_text(damage)
+    assert not build.is_finished()

@@ -1,5 +1,6 @@
 """Scenes of model files: upright, of unit size and textured in five formats, or refused."""
 
+import base64
 import json
 import os
 import shutil
@@ -161,6 +162,96 @@ def test_an_animated_model_is_measured_at_its_frame(renders, name):
     assert shape[:, :8].any() and shape[:, 24:].any()
 
 
+def imported(path, **settings):
+    """Import a model into the open scene, and return its record."""
+    # Blender has one global state, so it is not imported with the module.
+    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.rendering import model
+
+    return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
+
+
+# A tetrahedron of 1 m, and two ways to place it at x = 0 and x = 10.
+TETRAHEDRON = """def Mesh "shape" {
+    int[] faceVertexCounts = [3, 3, 3, 3]
+    int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+}
+"""
+POINT_INSTANCER = f"""#usda 1.0
+(upAxis = "Z")
+def PointInstancer "points" {{
+    point3f[] positions = [(0, 0, 0), (10, 0, 0)]
+    int[] protoIndices = [0, 0]
+    rel prototypes = </points/shape>
+    {TETRAHEDRON}
+}}
+"""
+INSTANCES = f"""#usda 1.0
+(upAxis = "Z")
+def Xform "prototype" {{
+    {TETRAHEDRON}
+}}
+def "here" (
+    instanceable = true
+    references = </prototype>
+) {{
+}}
+def "there" (
+    instanceable = true
+    references = </prototype>
+) {{
+    double3 xformOp:translate = (10, 0, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("content", [POINT_INSTANCER, INSTANCES], ids=["points", "instanceable"])
+def test_instances_are_scaled_once(tmp_path, content):
+    record = imported(written(tmp_path / "a.usda", content))
+    half = np.array([11, 1, 1]) / 11 / 2
+    np.testing.assert_allclose(record["box"], [-half, half], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_curves_and_points_are_left_out(tmp_path):
+    import bpy
+
+    curve = """def BasisCurves "curve" {
+    uniform token type = "linear"
+    int[] curveVertexCounts = [2]
+    point3f[] points = [(0, 0, 0), (5, 0, 0)]
+    float[] widths = [0.1, 0.1]
+}
+"""
+    points = (
+        'def Points "points" {\n    point3f[] points = [(0, 5, 0)]\n    float[] widths = [1]\n}\n'
+    )
+    path = written(tmp_path / "a.usda", f"#usda 1.0\n{TETRAHEDRON}{curve}{points}")
+    np.testing.assert_allclose(imported(path)["box"], [[-0.5] * 3, [0.5] * 3], atol=1e-5)
+    assert {obj.type for obj in bpy.data.objects} <= {"EMPTY", "LIGHT", "MESH"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+def test_a_ply_may_have_the_line_ends_of_windows(tmp_path, kind):
+    head = (HEAD + FACE).replace("ascii", kind).replace("\n", "\r\n").encode()
+    text = b"0 0 0\r\n1 0 0\r\n0 1 0\r\n3 0 1 2\r\n"
+    numbers = struct.pack("<9fB3i", 0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2)
+    path = written(tmp_path / "a.ply", head + (text if kind == "ascii" else numbers))
+    box = imported(path)["box"]
+    np.testing.assert_allclose(box, [[-0.5, -0.5, 0], [0.5, 0.5, 0]], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_several_solids_of_an_stl_are_one_model(tmp_path):
+    second = STL.replace("solid a", "solid b").replace("0 1 0", "0 4 0")
+    box = imported(written(tmp_path / "a.stl", STL + second))["box"]
+    np.testing.assert_allclose(box, [[-0.125, -0.5, 0], [0.125, 0.5, 0]], atol=1e-5)
+
+
 # ---- files that a model names ---------------------------------------------------------------
 
 
@@ -220,6 +311,41 @@ def Mesh "a" {
 }
 """
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+STL = """solid a
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid a
+"""
+# A texture in a format that is an extension of glTF.
+UNREAD_TEXTURE = json.dumps(
+    {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_texture_basisu"],
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}],
+        "images": [{"uri": "data:image/ktx2;base64,q0tUWCAyMLs="}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
+            | {"min": [0, 0, 0], "max": [1, 1, 0]}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [
+            {
+                "byteLength": 36,
+                "uri": "data:application/octet-stream;base64,"
+                + base64.b64encode(struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)).decode(),
+            }
+        ],
+    }
+)
 # Broken models: the file, its content, and what the message says.
 BROKEN = [
     *((f"a.{name}", b"", "is empty") for name in FORMATS),
@@ -233,6 +359,8 @@ BROKEN = [
     ("a.ply", HEAD + "end_header\n0 0 0\n1 0 0\n0 1 0\n", "has no faces"),
     ("a.ply", HEAD + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", "1 faces, of which"),
     ("a.usda", NOT_A_NUMBER, "not numbers"),
+    ("a.stl", STL + STL.replace("solid a", "solid b")[:-20], "cut short"),
+    ("a.gltf", UNREAD_TEXTURE, "does not read"),
     ("a.gltf", json.dumps({"asset": {"version": "2.0"}}), "has no faces"),
     ("a.gltf", GLTF_TEXT, "missing"),
     ("a.gltf", json.dumps({"asset": {"version": "9.0"}}), "cannot import it"),

@@ -53,6 +53,7 @@ CASES = {
     "partly outside the view": {"rig": {"size": 1.5}},
     "around the cameras": {"scene": {"ground": True}},
     "lit by an environment": {"scene": {"light": "city"}},
+    "of a size at which borders round": {"rig": {"camera": CAMERA | {"resolution": [97, 61]}}},
     "off the axis": {"rig": {"camera": CAMERA | {"principal_point": [10.5, 20]}}},
 }
 

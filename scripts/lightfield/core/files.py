@@ -97,6 +97,18 @@ def size_and_time(path: Path | str) -> tuple[int, int] | None:
     return (status.st_size, status.st_mtime_ns) if stat.S_ISREG(status.st_mode) else None
 
 
+def listed(path: Path, home: Path) -> dict[str, Any]:
+    """Return the entry of a file in a list: its path from ``home``, size, time and SHA-256.
+
+    The last three are None if there is no file.
+    """
+    entry: dict[str, Any] = {"path": Path(os.path.relpath(path, home)).as_posix()}
+    stamp = size_and_time(path)
+    if stamp is None:
+        return entry | dict.fromkeys(("bytes", "mtime_ns", "sha256"))
+    return entry | {"bytes": stamp[0], "mtime_ns": stamp[1], "sha256": sha256(path)}
+
+
 def write_bytes(path: Path | str, content: bytes) -> None:
     """Write ``content``, atomically."""
     with atomic_path(path) as temporary:

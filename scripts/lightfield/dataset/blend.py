@@ -165,6 +165,9 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
             yield f"{title} ignored"
     if blend["simplify"]:
         yield "simplify ON"
+    # Inventories of earlier versions lack this key.
+    if blend.get("culling"):
+        yield "culling ignored"
     if blend.get("working_space", REC_709) != REC_709:
         yield f"working space {blend['working_space']} converted to Rec. 709"
     if blend["unit_scale"] != 1:

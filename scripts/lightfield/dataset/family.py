@@ -23,12 +23,15 @@ from lightfield.core.files import is_outdated, size_and_time
 from lightfield.core.settings import Settings, as_list, pattern
 from lightfield.dataset.corpus import CorpusOptions, evenly_spread
 from lightfield.dataset.names import MODELS
+from lightfield.dataset.splits_file import SPLITS
 
 # Planning more members would take minutes.
 MOST_MEMBERS = 100_000
 # The record of a member, in its folder.
 RECORD = "member.json"
 FORMAT = "plenoforge member"
+# The files that a member's model was read from, in the member's folder of work.
+SOURCES = "sources.json"
 
 _Bounds = Annotated[tuple[float, float], as_list(2)]
 
@@ -267,7 +270,8 @@ def outdated_members(record: Path, folder: Path) -> bool:
     """Return whether a file of a batch's members is missing or has changed since its ``record``.
 
     ``folder`` holds the members. Compares sizes and times of the models' files. Of the members'
-    own files it only looks for each record and sha256sums.txt: there may be a million views.
+    own files it only looks for each record, splits.json and sha256sums.txt: there may be a million
+    views.
     """
 
     def differs(content: Mapping[str, Any]) -> bool:
@@ -275,7 +279,10 @@ def outdated_members(record: Path, folder: Path) -> bool:
             if size_and_time(path) != (stamp and tuple(stamp)):
                 return True
         for name, member in content["members"].items():
-            paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in member.get("datasets", ()))]
+            datasets = member.get("datasets", {})
+            paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in datasets)]
+            if any(entry["split"] is not None for entry in datasets.values()):
+                paths.append(SPLITS)
             if not all(os.path.isfile(f"{folder}/{name}/{path}") for path in paths):  # noqa: PTH113
                 return True
         return False

@@ -29,8 +29,10 @@ FLOW_VERSION = 1
 SURFACES_VERSION = 2
 # The same for denoised views of which only a part is rendered.
 PART_VERSION = 1
+# The same for the views of a user's .blend.
+BLEND_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
-MODEL_VERSION = 1
+MODEL_VERSION = 2
 # The same for models in softboxes.
 SOFTBOXES_VERSION = 1
 
@@ -96,7 +98,15 @@ def render_key(lightfield: LightField, view: View) -> str:
         key.append(SURFACES_VERSION)
     if renders_part(lightfield) and lightfield.render["denoise"]:
         key.append(["part", PART_VERSION])
+    if _is_of_blend(lightfield):
+        key.append(["blend", BLEND_VERSION])
     return _digest(key)
+
+
+def _is_of_blend(lightfield: LightField) -> bool:
+    """Return whether the scene is a user's .blend: neither built nor a model."""
+    scene = lightfield.content.get("scene", {})
+    return "fingerprint" in scene and not scene.keys() & {"builder", "unit"}
 
 
 def renders_part(lightfield: LightField) -> bool:

@@ -170,10 +170,10 @@ def _content(builds: Mapping[str, MemberBuild]) -> dict[str, Any]:
     sources: dict[str, tuple[int, int] | None] = {}
     for name, build in builds.items():
         members[name] = read_json(build.record)
-        home = Path(build.member.model or "").parent
-        for source in build.sources():
-            path = Path(os.path.normpath(home / source))
-            sources[path.as_posix()] = size_and_time(path)
+        for path, stamp in build.source_stamps().items():
+            # Of several members with a file, one may have read another content of it.
+            if path not in sources or stamp != size_and_time(path):
+                sources[path] = stamp
     return {"members": members, "sources": sources}
 
 

@@ -6,7 +6,7 @@ import os
 import shutil
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -15,14 +15,15 @@ from typing import Any
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
-from lightfield.core.files import DAMAGE, read_json, sha256, write_json
+from lightfield.core.files import DAMAGE, listed, read_json, sha256, size_and_time, write_json
 from lightfield.dataset import config
 from lightfield.dataset.config import Scene
 from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.family import FORMAT, RECORD, Member, drawn, member_content
+from lightfield.dataset.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
 from lightfield.dataset.job_settings import BatchSettings
+from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import datasets_of
-from lightfield.dataset.splits_file import SPLITS
+from lightfield.dataset.splits_file import SPLITS, splits_content
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
 from lightfield.validation.files import SUMS, read_sums
@@ -65,39 +66,66 @@ class MemberBuild:
         settings = self.settings
         return datasets_of(settings.family, written, settings.preset, settings.limits, places)
 
-    def key(self) -> str:
-        """Return the SHA-256 of everything that the member is made from."""
+    def key(self, model_sums: Sequence[tuple[str, str | None]]) -> str:
+        """Return the SHA-256 of everything that the member is made from.
+
+        ``model_sums`` are the path and SHA-256 of each file that its model was read from.
+        """
         content = [
             VERSION,
             {k: v for k, v in self.content.items() if k not in DESCRIPTIVE_KEYS},
             self.settings.limits.as_json(),
             self.settings.fingerprint,
             version("bpy"),
-            self._model_sums(),
+            list(model_sums),
         ]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
-    def _model_sums(self) -> list[tuple[str, str | None]]:
-        """Return the path and SHA-256 of each file that the member's model was read from."""
-        home = Path(self.member.model).parent if self.member.model else Path()
-        files = {path: home / path for path in self.sources()}
-        return [(path, sha256(file) if file.is_file() else None) for path, file in files.items()]
+    def _present_model_sums(self) -> list[tuple[str, str | None]]:
+        """Return the sums of `key` as the model's files are now."""
+        return [(str(entry["path"]), _sum(self._file(entry))) for entry in self._sources()]
 
-    def sources(self) -> list[str]:
-        """Return the files that the member's model was read from, as paths from its folder.
+    def _file(self, entry: Mapping[str, Any]) -> Path:
+        """Return the path of an entry of `_sources`."""
+        return Path(os.path.normpath(Path(str(self.member.model)).parent / entry["path"]))
+
+    def _sources(self) -> list[dict[str, Any]]:
+        """Return the files that the member's model was last read from, as `listed` lists them.
 
         Before the first import, these are the files that it is known to refer to.
+        """
+        with suppress(UserError, *DAMAGE):
+            return list(read_json(self.work / SOURCES)["files"])
+        return self._known_sources()
+
+    def _known_sources(self) -> list[dict[str, Any]]:
+        """List the files that the model is known to refer to, as they are now.
+
+        The import may find more.
         """
         if self.member.model is None:
             return []
         path = Path(self.member.model)
-        with suppress(UserError, *DAMAGE):
-            record = read_json(self.work / "model.json")
-            return [str(entry["path"]) for entry in record["external_files"]]
-        files = [path]
+        files = {path}
         with suppress(UserError, OSError, *DAMAGE):
-            files += model_files.referred(path)
-        return sorted({Path(os.path.relpath(file, path.parent)).as_posix() for file in files})
+            files.update(model_files.referred(path))
+        names = sorted(Path(os.path.relpath(file)) for file in files)
+        return [listed(file, path.parent) for file in names]
+
+    def source_stamps(self) -> dict[str, tuple[int, int] | None]:
+        """Return the size and time of each file that the model was read from, by its path.
+
+        If the file has another content now, these are those of the content that was read.
+        """
+        stamps = {}
+        for entry in self._sources():
+            path = self._file(entry)
+            stamp = size_and_time(path)
+            as_read = (entry["bytes"], entry["mtime_ns"]) if entry["sha256"] else None
+            if stamp != as_read and _sum(path) != entry["sha256"]:
+                stamp = as_read
+            stamps[path.as_posix()] = stamp
+        return stamps
 
     def is_finished(self) -> bool:
         """Return whether the member is valid, of the present settings, and has its bytes.
@@ -108,7 +136,9 @@ class MemberBuild:
             self.store.bring(str(self.record))
         try:
             record = read_json(self.record)
-            if record["state"] != "valid" or record["key"] != self.key():
+            if record["state"] != "valid" or record["key"] != self.key(self._present_model_sums()):
+                return False
+            if not self._has_splits(record["datasets"]):
                 return False
             has_bytes = self._has_stored_files if self.store else _has_its_bytes
             return all(
@@ -117,6 +147,16 @@ class MemberBuild:
             )
         except (UserError, OSError, *DAMAGE):
             return False
+
+    def _has_splits(self, datasets: Mapping[str, Any]) -> bool:
+        """Return whether the member's splits.json is that of its rigs. Some have no split."""
+        rigs = [rig for rig, entry in datasets.items() if entry["split"] is not None]
+        if not rigs:
+            return True
+        if self.store:
+            return SPLITS in self.store.names(str(self.folder))
+        lightfields = {rig: LightField.read(self.folder / rig / "lightfield.json") for rig in rigs}
+        return bool(read_json(self.folder / SPLITS) == splits_content(lightfields))
 
     def _has_stored_files(self, folder: Path, digest: str) -> bool:
         """Return whether the storage has a dataset's checksums, and all files that they name."""
@@ -150,6 +190,9 @@ class MemberBuild:
                 written = self._written()
                 datasets = self._datasets(written)
                 self._remove_sums(datasets)
+                if self.member.model:
+                    # List the files before they are read, because they may change meanwhile.
+                    write_json(self.work / SOURCES, {"files": self._known_sources()})
                 name = f"{self.settings.family}/{self.member.name}"
                 stages = Stages(self.settings, name, written, datasets, device, threads)
                 stages.run()
@@ -178,7 +221,9 @@ class MemberBuild:
 
     def _write(self, outcome: Mapping[str, Any]) -> dict[str, Any]:
         member = self.member
-        record: dict[str, Any] = {"format": FORMAT, "name": member.name, "key": self.key()}
+        model_sums = [(str(entry["path"]), entry["sha256"]) for entry in self._sources()]
+        key = self.key(model_sums)
+        record: dict[str, Any] = {"format": FORMAT, "name": member.name, "key": key}
         if member.model is None:
             record["seed"] = member.seed
         else:
@@ -219,6 +264,11 @@ class MemberBuild:
             return "unknown"
         stages = [line.partition(": ")[2] for line in lines if line.startswith("stage: ")]
         return stages[-1] if stages else "settings"
+
+
+def _sum(path: Path) -> str | None:
+    """Return the SHA-256 of a file. None if there is no file."""
+    return sha256(path) if path.is_file() else None
 
 
 def _listing(dataset: Dataset) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import Scene
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.exports import Export, InstantNgp, export_settings_of
+from lightfield.dataset.family import SOURCES
 from lightfield.dataset.job_settings import (
     BatchSettings,
     BuildSettings,
@@ -110,7 +111,9 @@ class Stages:
         else:
             assert self.model_record
             with self._stage("import_model"):
-                model.write(ImportSettings.of_source(source), self.blend, self.model_record)
+                sources = self.model_record.with_name(SOURCES)
+                options = ImportSettings.of_source(source)
+                model.write(options, self.blend, self.model_record, sources)
         with self._stage("inventory"):
             inventory_file.write_of_datasets(
                 self.blend, self.written, self.datasets, self.inventory, measures_memory=False

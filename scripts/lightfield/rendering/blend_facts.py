@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
+from lightfield.rendering import motion_blur
 from lightfield.rendering.cycles import view_layer
 
 
@@ -33,7 +34,7 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "samples": _samples(cycles, layer),
         "adaptive_sampling": bool(cycles.use_adaptive_sampling),
         "denoising": bool(cycles.use_denoising and layer.cycles.use_denoising),
-        "motion_blur": bool(render.use_motion_blur),
+        "motion_blur": motion_blur.is_on(),
         "compositor": bool(render.use_compositing and nodes and nodes.nodes),
         "sequencer": bool(
             render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips
@@ -49,6 +50,9 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "stereoscopy": bool(render.use_multiview),
         "freestyle": bool(render.use_freestyle),
         "simplify": bool(render.use_simplify),
+        "culling": bool(
+            render.use_simplify and (cycles.use_camera_cull or cycles.use_distance_cull)
+        ),
         "working_space": bpy.data.colorspace.working_space,
         "unit_scale": round(scene.unit_settings.scale_length, 6),
         "scripts": bool(bpy.app.autoexec_fail),
@@ -81,7 +85,8 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
     clips = []
     for frame in sorted(set(frames)):
         scene.frame_set(frame)
-        if scene.camera is None:
+        # Blender lets any object be the camera. Only a camera has a lens.
+        if scene.camera is None or scene.camera.type != "CAMERA":
             return None
         camera = scene.camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
         names.append(scene.camera.name)

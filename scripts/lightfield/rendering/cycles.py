@@ -19,6 +19,7 @@ from lightfield.rendering import (
     ids,
     instances,
     light_groups,
+    motion_blur,
     moving_camera,
     pruning,
     surfaces,
@@ -111,10 +112,13 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles.time_limit = 0
     cycles.use_layer_samples = "IGNORE"
     cycles.use_sample_subset = False
+    # Culling would leave other objects out of each view, and out of its reflections and shadows.
+    cycles.use_camera_cull = False
+    cycles.use_distance_cull = False
     if "filter_width" in settings:
         cycles.filter_width = settings["filter_width"]
     if "motion_blur" in settings:
-        bpy.context.scene.render.use_motion_blur = settings["motion_blur"]
+        motion_blur.turn(settings["motion_blur"])
 
 
 def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
@@ -132,6 +136,8 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     render.use_compositing = False
     render.use_sequencer = False
     render.use_freestyle = False
+    # Blender would burn the file's name, the frame and the like into the pixels.
+    render.use_stamp = False
     render.film_transparent = lightfield.transparent
     render.use_overwrite = True
     output = render.image_settings
@@ -182,6 +188,8 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
     cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
     cycles.adaptive_threshold = settings["adaptive_threshold"]
     cycles.use_denoising = settings["denoise"]
+    # The scene decides. A view layer may leave denoising out on its own.
+    view_layer(bpy.context.scene).cycles.use_denoising = True
     cycles.denoiser = "OPENIMAGEDENOISE"
     # Denoise with albedo and normals, which are denoised themselves first.
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
@@ -201,13 +209,17 @@ def sampling() -> dict[str, Any]:
 def set_window(x: int, y: int, width: int, height: int) -> None:
     """Render only these pixels of all following views. (0, 0) is the top left pixel."""
     render = bpy.context.scene.render
-    render.use_border = render.use_crop_to_border = True
+    render.use_border = True
+    render.use_crop_to_border = True
     across = render.resolution_x
     down = render.resolution_y
-    render.border_min_x = x / across
-    render.border_max_x = (x + width) / across
-    render.border_min_y = 1 - (y + height) / down
-    render.border_max_y = 1 - y / down
+    bottom = down - y - height
+    # Blender computes the border in float32, and rounds it down to whole pixels. Half a pixel more
+    # keeps the rounding away from the next lower pixel.
+    render.border_min_x = (x + 0.5) / across
+    render.border_max_x = (x + width + 0.5) / across
+    render.border_min_y = (bottom + 0.5) / down
+    render.border_max_y = (bottom + height + 0.5) / down
 
 
 def gpu(device: str) -> str | None:

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import listed
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
@@ -227,19 +227,6 @@ def _problem(block: Any, path: Path) -> str | None:
         except RuntimeError:
             readable = False
     return None if readable else "cannot be read"
-
-
-def listed(path: Path, home: Path) -> dict[str, Any]:
-    """Return the entry of a file in a list: its path from ``home``, size, time and SHA-256."""
-    entry: dict[str, Any] = {"path": _from(home, path)}
-    if not path.is_file():
-        return entry | dict.fromkeys(("bytes", "mtime_ns", "sha256"))
-    status = path.stat()
-    return entry | {
-        "bytes": status.st_size,
-        "mtime_ns": status.st_mtime_ns,
-        "sha256": sha256(path),
-    }
 
 
 def _from(home: Path, path: Path) -> str:

@@ -114,7 +114,8 @@ def _geometry_settings(passes: Iterable[str]) -> Iterator[None]:
         for obj in bpy.data.objects:
             if obj.visible_camera and obj.name_full in volumes.alone():
                 stack.enter_context(changed(obj, "visible_camera", False))
-        for shader in (*bpy.data.materials, scene.world):
+        worlds = {scene.world, layer.world_override}
+        for shader in (*bpy.data.materials, *worlds):
             if shader and volumes.has_volume(shader) and volumes.has_surface(shader):
                 stack.enter_context(_without_volume(shader.node_tree))
         yield

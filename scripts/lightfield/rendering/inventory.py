@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import animation, cycles, pruning
+from lightfield.rendering import animation, cycles, motion_blur, pruning
 from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
@@ -61,11 +61,13 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         pruning.remove_unused()
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
+    layer = bpy.context.view_layer
+    worlds = {world for world in (scene.world, layer.world_override) if world}
     materials = rendered_materials()
     lights = {obj.data for obj in objects if obj.type == "LIGHT"}
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
-    for shader in (*materials, *([scene.world] if scene.world else []), *lights):
+    for shader in (*materials, *worlds, *lights):
         for feature, image in surface_features(shader):
             # A light always emits, so its nodes' features do not count.
             if feature and shader not in lights:
@@ -86,7 +88,7 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         "textures": sorted(image.name_full for image in images),
         "hidden": hidden,
         **changing,
-        "motion_blur": bool(scene.render.use_motion_blur),
+        "motion_blur": motion_blur.is_on(),
         "external_files": external_files(),
         "missing": problems(images),
     }
@@ -124,9 +126,12 @@ def _triangles(depsgraph: Any) -> dict[str, int]:
 
 
 def rendered_materials() -> list[Any]:
-    """Return the materials of all objects, by name."""
+    """Return the materials of all objects, by name. A view layer may override them."""
     slots = [slot for obj in bpy.data.objects for slot in obj.material_slots]
     materials = {slot.material for slot in slots if slot.material} | set_by_nodes()
+    override = bpy.context.view_layer.material_override
+    if override:
+        materials.add(override)
     return sorted(materials, key=lambda material: str(material.name_full))
 
 

@@ -21,6 +21,7 @@ from lightfield.rendering import (
     blend_file,
     external_files,
     light,
+    motion_blur,
     pruning,
     scene_memory,
     simulations,
@@ -60,7 +61,7 @@ def write_of_datasets(
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
         contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
     if written and written.render and written.render.motion_blur is not None:
-        bpy.context.scene.render.use_motion_blur = written.render.motion_blur
+        motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
     contents |= inventory(frames)
     if contents["missing"] and not chosen.get("allow_missing"):

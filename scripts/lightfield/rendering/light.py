@@ -34,8 +34,7 @@ def may_be_lit() -> bool:
     if any(obj.type == "GREASEPENCIL" or _is_shining_lamp(obj) for obj in objects):
         return True
     shaders = [scene.world, *rendered_materials()]
-    for layer in scene.view_layers:
-        shaders += [layer.world_override, layer.material_override]
+    shaders += [layer.world_override for layer in scene.view_layers]
     return any(_emits(shader) for shader in shaders if shader)
 
 

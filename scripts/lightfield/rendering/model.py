@@ -12,13 +12,13 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, write_json
+from lightfield.core.files import atomic_path, listed, write_json
 from lightfield.core.settings import FARTHEST
 from lightfield.dataset.job_settings import ImportSettings
 from lightfield.dataset.keys import model_fingerprint
 from lightfield.dataset.names import UP
 from lightfield.rendering import blend_file, model_files, model_light
-from lightfield.rendering.external_files import listed
+from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
 
@@ -26,7 +26,11 @@ from lightfield.rendering.render_graph import in_render
 _OPTIONS: dict[str, dict[str, Any]] = {
     # Without this, an armature brings a mesh for the shape of its bones.
     "gltf": {"disable_bone_shape": True},
-    "usd": {"import_cameras": False, "import_lights": False, "create_world_material": False},
+    "usd": {
+        **{"import_cameras": False, "import_lights": False, "create_world_material": False},
+        # A point instancer is imported all the same.
+        **{"import_curves": False, "import_points": False},
+    },
 }
 # How an importer turns each axis that may point up.
 _AXES = {
@@ -37,27 +41,37 @@ _AXES = {
 # A largest side beyond these is a mistake, and not to be had in Blender's 32 bits.
 _SIDES = (1e-9, 1e12)
 
+# The largest side of a scaled model may differ from 1 by this, because Blender computes in 32 bits.
+_TOLERANCE = 0.01
+
 # The least and the largest coordinates of all meshes, (2, 3).
 Box = NDArray[np.float64]
 
 
-def write(settings: ImportSettings, output: Path, record: Path) -> dict[str, Any]:
+def write(
+    settings: ImportSettings, output: Path, record: Path, sources: Path | None = None
+) -> dict[str, Any]:
     """Make a scene of a model, save it as a .blend, and write and return the import's record.
 
-    Raises `UserError` as `make_scene` does.
+    ``sources`` is a JSON to write as soon as the files that the model names are known. It lists
+    them also if the model is refused, as when one is missing. Raises `UserError` as `make_scene`
+    does.
     """
-    content = make_scene(settings, output.parent)
+    content = make_scene(settings, output.parent, sources)
     with atomic_path(output) as temporary:
         blend_file.save_scene(temporary)
     write_json(record, content)
     return content
 
 
-def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
+def make_scene(
+    settings: ImportSettings, folder: Path, sources: Path | None = None
+) -> dict[str, Any]:
     """Make a scene of a model in the open file. Return the record of the import.
 
-    ``folder`` is where the .blend will be. The record has the ``fingerprint``, the files that the
-    model was read from as ``external_files``, and its ``box`` in metres.
+    ``folder`` is where the .blend will be. ``sources`` is that of `write`. The record has the
+    ``fingerprint``, the files that the model was read from as ``external_files``, and its ``box``
+    in metres.
 
     Raises `UserError` for a model that is broken, empty, or lacks files.
     """
@@ -70,8 +84,12 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     _import(path, settings.up)
     _remove_cameras_and_lamps()
     files = _read_files(path, referred_files)
+    entries = [listed(file, path.parent) for file in files]
+    if sources:
+        write_json(sources, {"files": entries})
     if not settings.allow_missing:
         _refuse_missing(path, files)
+        _refuse_unread_textures(path)
     _pack(path)
     _give_material()
     bpy.context.scene.frame_set(settings.frame)
@@ -79,6 +97,11 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if settings.unit == "box":
         _scale_to_box(path, box)
         box = _box(path)
+        if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
+            raise UserError(
+                f"{path}: Blender does not scale all of it in one; export it without constraints, "
+                "near its origin, or use unit: metres"
+            )
     elif np.abs(box).max() > FARTHEST:
         raise UserError(
             f"{path}: reaches {np.abs(box).max():.3g} m from the origin, and Blender computes in "
@@ -88,7 +111,6 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if settings.ground:
         model_light.add_ground(box)
     _name_caches_from(folder)
-    entries = [listed(file, path.parent) for file in files]
     options = settings.model_dump(include={"unit", "up", "ground", "light", "frame"})
     names = [(entry["path"], entry["sha256"]) for entry in entries]
     return {
@@ -199,6 +221,21 @@ def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
         )
 
 
+def _refuse_unread_textures(path: Path) -> None:
+    """Raise `UserError` if a model has textures that its importer left out, such as KTX2."""
+    names = [
+        material.name
+        for material in bpy.data.materials
+        for node in material.node_tree.nodes
+        if node.bl_idname == "ShaderNodeTexImage" and node.image is None
+    ]
+    if names:
+        raise UserError(
+            f"{path}: the material {names[0]} has a texture in a format that Blender does not "
+            "read; export it with PNG or JPEG, or render it magenta: scene: {allow_missing: true}"
+        )
+
+
 def _shown(path: Path) -> str:
     """Return a path for a message, also if its bytes are not UTF-8."""
     return os.fsencode(path).decode("utf-8", "replace")
@@ -305,8 +342,10 @@ def _scale_to_box(path: Path, box: Box) -> None:
         )
     model = bpy.data.objects.new("model", None)
     bpy.context.scene.collection.objects.link(model)
+    # What an instancer places is scaled with the instancer.
+    instanced = objects_of_used_collections(bpy.data.user_map())
     for obj in bpy.data.objects:
-        if obj.parent is None and obj != model:
+        if obj.parent is None and obj != model and obj not in instanced:
             obj.parent = model
     model.matrix_world = Matrix.Scale(1 / side, 4) @ Matrix.Translation(-box.mean(0))
     bpy.context.view_layer.update()

@@ -38,7 +38,8 @@ def check(path: Path) -> None:
                 "suffix of its format, or export it again"
             )
         case ".stl" if head.lstrip().startswith(b"solid") and b"facet" in head + tail:
-            if b"endsolid" not in tail:
+            # A text may have several solids, each with its own end.
+            if not re.search(rb"endsolid[^\r\n]*\s*$", tail):
                 raise UserError(f"{path}: is cut short; an STL text ends with endsolid")
         case ".stl":
             # A head of 80 bytes, the number of triangles, and 50 bytes for each.
@@ -74,9 +75,11 @@ def _least_ply_bytes(path: Path) -> int:
     In a text, each value has a digit and a blank.
     """
     with path.open("rb") as file:
-        head, end, _ = file.read(65536).partition(b"end_header\n")
+        content = file.read(65536)
+    end = re.search(rb"end_header(\r\n|\n|\r)", content)
+    head = content[: end.end()] if end else content
     is_text = b"format ascii" in head
-    total = len(head + end)
+    total = len(head)
     count = 0
     for line in head.splitlines():
         match line.split():

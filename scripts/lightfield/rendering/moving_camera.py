@@ -8,6 +8,7 @@ import mathutils
 import numpy as np
 
 from lightfield.geometry.exposure import pose_at
+from lightfield.rendering import motion_blur
 
 Array = np.ndarray[Any, Any]
 
@@ -25,10 +26,10 @@ def set_up(motion: Mapping[str, Any] | None) -> None:
         return
     _motion.update(motion)
     scene = bpy.context.scene
-    if not scene.render.use_motion_blur:
+    if not motion_blur.is_on():
         for obj in bpy.data.objects:
             obj.cycles.use_motion_blur = obj == scene.camera
-    scene.render.use_motion_blur = True
+    motion_blur.turn(True)
     scene.render.motion_blur_position = "CENTER"
     if "rolling" in motion:
         scene.cycles.rolling_shutter_type = "TOP"

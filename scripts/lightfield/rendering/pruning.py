@@ -54,10 +54,7 @@ def removable_objects() -> list[str]:
     for background in background_scenes(scene):
         shown.update(background.objects)
     users = bpy.data.user_map()
-    needed = animation.reached()
-    for collection in bpy.data.collections:
-        if any(not isinstance(user, _HOLDS_ONLY) for user in users[collection]):
-            needed.update(collection.all_objects)
+    needed = animation.reached() | objects_of_used_collections(users)
     removable = {
         obj
         for obj in scene.objects
@@ -76,6 +73,18 @@ def removable_objects() -> list[str]:
             break
         removable -= used
     return sorted(obj.name_full for obj in removable)
+
+
+def objects_of_used_collections(users: Mapping[Any, Any]) -> set[Any]:
+    """Return the objects of all collections that an instancer, a modifier or the like uses.
+
+    ``users`` are those of each data-block, from ``bpy.data.user_map()``.
+    """
+    objects: set[Any] = set()
+    for collection in bpy.data.collections:
+        if any(not isinstance(user, _HOLDS_ONLY) for user in users[collection]):
+            objects.update(collection.all_objects)
+    return objects
 
 
 def _is_used(users: Collection[Any], removable: Collection[Any]) -> bool:

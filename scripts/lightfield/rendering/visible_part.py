@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.geometry.lenses import Lens
-from lightfield.rendering import volumes
+from lightfield.rendering import motion_blur, volumes
 from lightfield.rendering.cycles import set_window
 from lightfield.rendering.render_graph import in_render
 
@@ -49,7 +49,7 @@ def places() -> NDArray[np.float64] | None:
     Return None if something else may be visible, such as blurred or displaced surfaces.
     """
     scene = bpy.context.scene
-    is_blurred = scene.render.use_motion_blur or scene.camera.data.dof.use_dof
+    is_blurred = motion_blur.is_on() or scene.camera.data.dof.use_dof
     is_displaced = any(m.displacement_method != "BUMP" for m in bpy.data.materials)
     if is_blurred or is_displaced or (scene.world and volumes.has_volume(scene.world)):
         return None

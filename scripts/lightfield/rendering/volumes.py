@@ -63,4 +63,4 @@ def has_surface(shader: Any) -> bool:
 
 def _is_linked(shader: Any, name: str) -> bool:
     output = shader.node_tree.get_output_node("CYCLES") if shader.node_tree else None
-    return output is not None and output.inputs[name].is_linked
+    return output is not None and any(not link.is_muted for link in output.inputs[name].links)

@@ -1,0 +1,19 @@
+"""Turns the motion blur of the open scene on and off.
+
+Cycles blurs only if both the scene and its view layer have motion blur on. The view layer is that
+of Blender's context: `lightfield.rendering.blend_file` renders no other.
+"""
+
+import bpy
+
+
+def turn(is_on: bool) -> None:
+    """Turn motion blur on or off."""
+    bpy.context.scene.render.use_motion_blur = is_on
+    if is_on:
+        bpy.context.view_layer.use_motion_blur = True
+
+
+def is_on() -> bool:
+    """Return whether Cycles blurs what moves."""
+    return bool(bpy.context.scene.render.use_motion_blur and bpy.context.view_layer.use_motion_blur)
