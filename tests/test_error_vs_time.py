@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -243,6 +244,22 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     assert (same.total, same.added, same.share) == (0, 0, 0)
 
 
+def test_a_constant_error_has_a_slope_of_exactly_0(tmp_path):
+    """So it is if a denoiser's bias is all the error, as in a smooth sky."""
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+    points = []
+    for samples in (1, 2, 4, 8):
+        trial = trials.Trial(sky + np.float32(0.25), None, samples, float(samples), "CPU")
+        method = Method("denoised", {"samples": samples, "denoise": True})
+        points.append(measured_point(method, [[trial, trial]], [reference]))
+    plain = replace(points[0], method="plain")
+    evaluation = evaluated([plain, *points], 0.0)
+    write_json(tmp_path / "points.json", evaluation)
+    slope = evaluation["slopes"]["denoised"]["over_time"]
+    assert (slope["slope"], slope["slope_error"]) == (0, 0)
+
+
 def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
@@ -252,6 +269,26 @@ def test_other_programs_can_read_the_files(measured, content):
     assert sum(row["pareto"] == "True" for row in whole_views) == len(content["pareto_front"])
     assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
     assert images.read_image(measured.folder / "room.png").channels
+
+
+def test_both_panels_of_the_plot_have_one_size_with_their_legends_below(measured):
+    root = ElementTree.parse(measured.folder / "room.svg").getroot()
+    by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
+    panels = []
+    for name in ("axes_1", "axes_2"):
+        outline = next(by_id[name].iter("{http://www.w3.org/2000/svg}path")).get("d")
+        corners = np.array(re.findall(r"-?[\d.]+", outline), float).reshape(-1, 2)
+        panels.append((corners.min(axis=0), corners.max(axis=0)))
+    (first_start, first_end), (second_start, second_end) = panels
+    np.testing.assert_allclose(first_end - first_start, second_end - second_start, atol=0.1)
+    assert first_start[1] == pytest.approx(second_start[1])
+    size = np.array(root.get("viewBox").split()[2:], float)
+    assert (second_end < size).all()
+    for name, start, end in (("legend_1", *panels[0]), ("legend_2", *panels[1])):
+        legend = ElementTree.tostring(by_id[name], encoding="unicode")
+        texts = np.array(re.findall(r"translate\(([\d.]+) ([\d.]+)\) scale", legend), float)
+        assert (texts[:, 0] > start[0]).all() and (texts[:, 0] < end[0]).all()
+        assert (texts[:, 1] > end[1]).all() and (texts[:, 1] < size[1]).all()
 
 
 def test_a_second_run_renders_nothing(measured):

@@ -506,27 +506,22 @@ def _row(*cells: str | float | None) -> str:
 
 def draw(stem: Path, content: Mapping[str, Any]) -> None:
     """Draw error over time as ``stem``.svg and .png: by method, and beside it by stratum."""
-    with plots.plot(stem, 1, 2, size=(18, 6.5)) as (by_method_axes, by_stratum_axes):
+    unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
+    with plots.plot(stem, 1, 2, size=(14, 8.4)) as (by_method_axes, by_stratum_axes):
         _draw_methods(by_method_axes, content)
-        unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
-        by_method_axes.set(
-            xscale="log",
-            yscale="log",
-            title=f"{stem.name}: error against render time",
-            xlabel=f"render time, {unit} seconds per megapixel",
-            ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
-        )
-        # Put both legends outside of the axes: they would hide curves.
-        by_method_axes.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+        by_method_axes.set_title(f"{stem.name}: error against render time")
         _draw_strata(by_stratum_axes, content)
-        by_stratum_axes.set(
-            xscale="log",
-            yscale="log",
-            title="by what pixels show",
-            xlabel=by_method_axes.get_xlabel(),
-        )
-        by_stratum_axes.xaxis.set_minor_formatter("")
-        by_stratum_axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+        by_stratum_axes.set_title("by what pixels show")
+        for axes in (by_method_axes, by_stratum_axes):
+            axes.set(
+                xscale="log",
+                yscale="log",
+                xlabel=f"render time, {unit} seconds per megapixel",
+                ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
+            )
+            axes.xaxis.set_minor_formatter("")
+            # Put the legend below the axes: it would hide curves.
+            axes.legend(loc="upper left", bbox_to_anchor=(0, -0.12), fontsize=9)
 
 
 def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
@@ -602,6 +597,6 @@ def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:
         ("of_all_pixels_over_time", " (all pixels {})"),
     ):
         if name in lines:
-            slope = f"{lines[name]['slope']:.2f} ± {lines[name]['slope_error']:.2f}"
+            slope = f"{lines[name]['slope']:z.2f} ± {lines[name]['slope_error']:.2f}"
             text += form.format(slope.replace("-", "−"))
     return text

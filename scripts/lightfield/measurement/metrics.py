@@ -388,7 +388,9 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
     line = linregress(np.log(x), np.log(y))
-    return Line(float(line.slope), float(line.stderr), float(np.exp(line.intercept)))
+    # Of equal y, which a level line fits exactly, SciPy does not know the error.
+    slope_error = 0.0 if min(y) == max(y) else float(line.stderr)
+    return Line(float(line.slope), slope_error, float(np.exp(line.intercept)))
 
 
 def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
