@@ -16,7 +16,7 @@ from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import strata, trials
-from lightfield.measurement.error_vs_time import evaluated, measured_point, whole_views_point
+from lightfield.measurement.error_vs_time import evaluated, measured_point, whole_views_point, write
 from lightfield.measurement.experiment import Method
 from lightfield.measurement.metrics import Reference, disagreement, make_reference
 from lightfield.measurement.strata import STRATA
@@ -258,6 +258,20 @@ def test_a_constant_error_has_a_slope_of_exactly_0(tmp_path):
     write_json(tmp_path / "points.json", evaluation)
     slope = evaluation["slopes"]["denoised"]["over_time"]
     assert (slope["slope"], slope["slope_error"]) == (0, 0)
+
+
+def test_a_scene_without_noise_has_a_plot_that_says_so(tmp_path):
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+    trial = trials.Trial(sky, None, 1, 1.0, "CPU")
+    points = [measured_point(Method("plain", {"samples": 1}), [[trial, trial]], [reference])]
+    measured = evaluated(points, 0.0)
+    content = {"measured_on": {"device": "CPU"}, **measured, "neighbouring_views": []}
+    content["strata"] = {"environment": {"area": 1.0, **measured}}
+    write(tmp_path / "sky", content)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".json", ".md", ".png", ".svg"}
+    text = (tmp_path / "sky.svg").read_text()
+    assert text.count("No error is above the references' own.") == 2
 
 
 def test_other_programs_can_read_the_files(measured, content):

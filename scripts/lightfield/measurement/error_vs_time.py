@@ -34,6 +34,7 @@ from lightfield.measurement.experiment import (
     Renders,
     mean_own_error,
     over_views,
+    samples_of_reference,
 )
 from lightfield.measurement.sampling import DENOISED, standard_error
 from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
@@ -144,7 +145,7 @@ def measure(
         "measured_on": {
             **experiment.described(),
             "seeds": seeds,
-            "reference_samples": reference_samples,
+            "reference_samples": samples_of_reference(reference_samples),
             "device": experiment.device,
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },
@@ -513,6 +514,13 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
         _draw_strata(by_stratum_axes, content)
         by_stratum_axes.set_title("by what pixels show")
         for axes in (by_method_axes, by_stratum_axes):
+            if axes.has_data():
+                # Put the legend below the axes: it would hide curves.
+                axes.legend(loc="upper left", bbox_to_anchor=(0, -0.12), fontsize=9)
+            else:
+                # A logarithmic axis without data has no limits.
+                axes.set(xlim=(1, 100), ylim=(1e-3, 1))
+                axes.text(2, 0.03, "No error is above the references' own.")
             axes.set(
                 xscale="log",
                 yscale="log",
@@ -520,8 +528,6 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
                 ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
             )
             axes.xaxis.set_minor_formatter("")
-            # Put the legend below the axes: it would hide curves.
-            axes.legend(loc="upper left", bbox_to_anchor=(0, -0.12), fontsize=9)
 
 
 def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
@@ -529,6 +535,8 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
     methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
     for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
         points = [p for p in content["points"] if p["method"] == method and p["resolved"]]
+        if not points:
+            continue
         axes.errorbar(
             _column("seconds", points),
             _column("relative_mse", points),
@@ -538,14 +546,15 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
             linewidth=1,
             label=method + _slopes(content["slopes"].get(method, {})),
         )
-    axes.plot(
-        _column("seconds", content["pareto_front"]),
-        _column("relative_mse", content["pareto_front"]),
-        color=plots.GREY,
-        linewidth=6,
-        alpha=0.3,
-        label="Pareto front",
-    )
+    if content["pareto_front"]:
+        axes.plot(
+            _column("seconds", content["pareto_front"]),
+            _column("relative_mse", content["pareto_front"]),
+            color=plots.GREY,
+            linewidth=6,
+            alpha=0.3,
+            label="Pareto front",
+        )
     own_points = [point for point in content["settings"] if point["resolved"]]
     if own_points:
         axes.plot(
@@ -558,13 +567,15 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
             markerfacecolor="none",
             label=OWN,
         )
-    axes.axhline(
-        content["reference_error"],
-        color="black",
-        linestyle=":",
-        linewidth=1,
-        label="the references' own error (subtracted)",
-    )
+    # A logarithmic axis has no place for references without noise.
+    if content["pareto_front"] and content["reference_error"] > 0:
+        axes.axhline(
+            content["reference_error"],
+            color="black",
+            linestyle=":",
+            linewidth=1,
+            label="the references' own error (subtracted)",
+        )
 
 
 def _draw_strata(axes: Any, content: Mapping[str, Any]) -> None:
@@ -573,6 +584,8 @@ def _draw_strata(axes: Any, content: Mapping[str, Any]) -> None:
     for (stratum, measured), colour, marker in strata_and_styles:
         for method, line in ((PLAIN, "-"), (DENOISED, ":")):
             points = [p for p in measured["points"] if p["method"] == method and p["resolved"]]
+            if not points:
+                continue
             axes.plot(
                 _column("seconds", points),
                 _column("relative_mse", points),
