@@ -274,6 +274,27 @@ def test_a_scene_without_noise_has_a_plot_that_says_so(tmp_path):
     assert text.count("No error is above the references' own.") == 2
 
 
+def test_a_methods_time_is_when_it_first_has_the_error():
+    """The error of the denoised renders ends at their bias, and rises a little at the end."""
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+
+    def line(name, errors):
+        method = Method(name, {"samples": 1})
+        trial = trials.Trial(sky * 2, None, 1, 1.0, "CPU")
+        point = measured_point(method, [[trial, trial]], [reference])
+        seconds = (10.0 * 2**number for number in range(len(errors)))
+        pairs = zip(errors, seconds, strict=True)
+        return [replace(point, relative_mse=error, seconds=at) for error, at in pairs]
+
+    points = line("plain", [0.08, 0.04, 0.01505]) + line("denoised", [0.05, 0.02, 0.015, 0.0152])
+    by_method = {row["method"]: row for row in evaluated(points, 0.0)["methods_at_most_samples"]}
+    assert by_method["plain"]["seconds_at_equal_error"] == pytest.approx(40)
+    # The power law from 0.02 after 20 s to 0.015 after 40 s.
+    expected = 20 * 2 ** (np.log(0.01505 / 0.02) / np.log(0.015 / 0.02))
+    assert by_method["denoised"]["seconds_at_equal_error"] == pytest.approx(expected)
+
+
 def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()

@@ -17,6 +17,7 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -308,9 +309,8 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
     One of plain path tracing's points sets the equal time and the equal error. With ``part`` 0.5 it
-    is the middle one, with 1 that of most samples. Figures are interpolated between a method's own
-    points, and None beyond them. If even a method's cheapest point has less error, the time is that
-    of this point.
+    is the middle one, with 1 that of most samples. The error at equal time is interpolated between
+    a method's own points, and None beyond them. The time is that of `seconds_to`.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
@@ -319,11 +319,7 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     rows = []
     for method in dict.fromkeys(p.method for p in points if p.method != OWN):
         line = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
-        seconds = metrics.interpolated(
-            equal.relative_mse, [(p.relative_mse, p.seconds) for p in line]
-        )
-        if seconds is None and line[0].relative_mse <= equal.relative_mse:
-            seconds = line[0].seconds
+        seconds = seconds_to(equal.relative_mse, line)
         rows.append(
             {
                 "method": method,
@@ -338,6 +334,22 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def seconds_to(error: float, line: Sequence[Point]) -> float | None:
+    """Return when a method first has at most this ``error``, or None if it never has.
+
+    ``line`` has the method's points in rising order of seconds. The seconds are interpolated
+    between them. If even the first point has less error, they are that point's. The error of a
+    biased method may rise again.
+    """
+    if line[0].relative_mse <= error:
+        return line[0].seconds
+    for before, after in pairwise(line):
+        if after.relative_mse <= error:
+            points = [(point.relative_mse, point.seconds) for point in (before, after)]
+            return metrics.interpolated(error, points)
+    return None
 
 
 def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
