@@ -264,6 +264,20 @@ def test_linear_renders_are_composited_as_light(background, light, transparent, 
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE])
+def test_linear_renders_are_composited_as_the_truth_in_png(background, transparent, tmp_path):
+    for view in transparent.lightfield.views:
+        if view.name in TESTS:
+            transparent.write_image(view, transparent.path(view).with_suffix(".png"))
+    developed = SourceDataset(transparent.dataset, "", ".png")
+    path = tmp_path / "view_0001f.exr"
+    shutil.copy(transparent.dataset / "exr" / path.name, path)
+    errors, problem = compared(developed, path, background)
+    assert problem is None
+    # Colour and alpha of 8 bits are rounded, each by up to half a step.
+    assert errors["psnr"] > 45
+
+
+@pytest.mark.parametrize("background", [BLACK, WHITE])
 def test_renders_with_alpha_are_composited_over_the_background_too(
     transparent, tmp_path, background
 ):

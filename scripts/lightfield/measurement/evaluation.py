@@ -100,7 +100,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
     ``like`` is the picture to compare it with. If that is a PNG, the view is rounded as a PNG with
-    the same number of bits.
+    the same number of bits, and composited in sRGB. Otherwise it is composited as light.
     """
     transparent = source.lightfield.transparent
     if like.suffix == ".png":
@@ -112,7 +112,11 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
         check_size(source.path(view), source.lightfield, image.channels["R"])
         # In views that are not transparent, alpha marks where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
-        colour = _developed(image, alpha, source, background)
+        if alpha is not None and source.suffix == ".png":
+            light = decode_srgb(_encoded(image)) * alpha[..., np.newaxis]
+            colour = encode_srgb(_with_background(light, alpha, background))
+        else:
+            colour = _developed(image, alpha, source, background)
     has_depth = source.suffix == ".exr" and source.lightfield.depth
     return Pictures(
         colour,
@@ -188,8 +192,13 @@ def _developed(
         return _on_background(_encoded(image), alpha, background, largest)
     light = tone_map(image.colour, source.exposure, source.reinhard)
     if alpha is not None:
-        light = light + (1 - alpha[..., np.newaxis]) * decode_srgb(background)
+        light = _with_background(light, alpha, background)
     return np.asarray(encode_srgb(light), np.float64)
+
+
+def _with_background(light: Floats, alpha: Floats, background: Floats) -> Floats:
+    """Return light (h, w, 3), premultiplied by ``alpha`` (h, w), over an sRGB background."""
+    return light + (1 - alpha[..., np.newaxis]) * np.asarray(decode_srgb(background))
 
 
 def _on_background(
