@@ -80,8 +80,9 @@ def main() -> None:
                 target = arguments.output / path.relative_to(temporary)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 path.replace(target)
+    views_compared = "1 view" if len(tests) == 1 else f"{len(tests)} views"
     print(
-        f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, WS-PSNR {overall['ws_psnr']:.2f} dB, "
+        f"{views_compared}: PSNR {overall['psnr']:.2f} dB, WS-PSNR {overall['ws_psnr']:.2f} dB, "
         f"IV-PSNR {overall['iv_psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, "
         f"FLIP {overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
     )

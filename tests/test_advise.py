@@ -15,7 +15,7 @@ from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
-from lightfield.measurement import advice, threads, trials
+from lightfield.measurement import advice, calibration, error_vs_time, threads, trials
 from lightfield.measurement.metrics import make_reference
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -81,6 +81,49 @@ def advice_of(maker, windows, reference_samples):
 def simulated():
     advice_content = advice_of(Simulated(), 2, 512)
     return advice_content, {json.dumps(entry["change"]): entry for entry in advice_content["tried"]}
+
+
+def test_windows_too_small_for_a_stratum_are_refused():
+    with pytest.raises(
+        UserError, match=r"room: its windows of 7 × 7 pixels have no 64 pixels.*--size"
+    ):
+        advice.probe_experiment(Simulated(), 7, 1, 64, "room")
+
+
+@pytest.mark.parametrize(("asked", "rendered"), [(1, 8), (8, 8), (12, 16)])
+def test_a_reference_has_at_least_the_samples_that_are_asked_for(asked, rendered):
+    samples = []
+
+    class Recorded(Simulated):
+        def reference(self, window, seeds, samples_of_seed):
+            samples.append(seeds * samples_of_seed)
+            return super().reference(window, seeds, samples_of_seed)
+
+    content = error_vs_time.measure(
+        Recorded(),
+        RENDER,
+        size=32,
+        windows=1,
+        octaves=1,
+        reference_samples=asked,
+        seeds=2,
+        name="room",
+    )
+    assert set(samples) == {content["measured_on"]["reference_samples"]} == {rendered}
+
+
+class SimulatedProbes(Simulated):
+    def windows(self, size, count):
+        return trials.Trials.windows(self, size, count)
+
+
+def test_path_tracing_is_as_cheap_as_itself_below_the_references_own_error():
+    """Only plain path tracing reaches the target, because the simulated denoiser is biased."""
+    render = {**RENDER, "target_error": 1e-5}
+    record, _ = calibration.calibrate(SimulatedProbes(), render, 32, 2)
+    assert record["choice"]["denoise"] is False
+    assert record["references"]["own_error"][0] > 10 * render["target_error"]
+    assert record["times_fewer_samples"] == pytest.approx(1, abs=0.5)
 
 
 def test_a_change_that_saves_is_advised_with_its_yaml(simulated):

@@ -16,6 +16,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.dataset.corpus import CorpusSettings, Shares
 from lightfield.dataset.lightfield import LightField
+from lightfield.imaging import images
 from lightfield.report import corpus, status
 from lightfield.validation.corpus_integrity import corpus_faults
 
@@ -206,6 +207,22 @@ def test_a_member_that_is_built_anew_looks_anew(family):
     families.add_member(family, "0000", shade=5, wood="oak")
     content = make(family)
     assert content["members"][0]["depth"] == [10, 10]
+
+
+def test_members_without_depth_have_no_share_of_pixels_with_a_surface(family):
+    for number in range(6):
+        dataset = family / f"{number:04d}/plane"
+        field = LightField.read(dataset / "lightfield.json")
+        field.changed(depth=None).write(field.path)
+        for path in dataset.glob("exr/*.exr"):
+            channels = images.read_image(path, "RGB").channels
+            images.write_exr(path, {name: channels[name] for name in "RGB"})
+    content = make(family)
+    assert content["members"][0]["depth"] is None
+    assert content["members"][0]["covered"] is None
+    assert content["statistics"]["pictures"]["covered"] == {"counts": {}}
+    assert content["statistics"]["pictures"]["brightness"]["mean"] == pytest.approx(0.7, rel=1e-3)
+    assert "with a surface" not in (family / "index.html").read_text()
 
 
 # ---- shards ----------------------------------------------------------------------------------

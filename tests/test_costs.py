@@ -72,11 +72,9 @@ def dataset(tmp_path, run_program):
     folder, work = tmp_path / "results", tmp_path / "work"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [8, 4]})
     render = {"samples": 2, "denoise": False}
-    views = [View.placed(name, np.eye(4)) for name in "abc"]
     for path, size in (("exr/a.exr", 100), ("exr/b.exr", 200), ("flat/a.png", 70)):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_bytes(b"x" * size)
-    LightField({**lens.to_lightfield(), "render": render}, views).write(folder / "lightfield.json")
     (work / "scene.blend").parent.mkdir()
     (work / "scene.blend").write_bytes(b"x" * 5000)
     for path, row in {
@@ -90,7 +88,10 @@ def dataset(tmp_path, run_program):
         (work / path).parent.mkdir(parents=True, exist_ok=True)
         (work / path).write_text(HEAD + row + "\n")
 
-    def count(*lines, full=None, inventory=None):
+    def count(*lines, full=None, inventory=None, names="abc"):
+        views = [View.placed(name, np.eye(4)) for name in names]
+        content = {**lens.to_lightfield(), "render": render}
+        LightField(content, views).write(folder / "lightfield.json")
         journals = work / "journals"
         journals.mkdir(exist_ok=True)
         # This copy by the user belongs to no shard.
@@ -183,16 +184,16 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
     for name, seconds in zip("zabcd", [50.0, *traced], strict=True):
         lines.append(view(name, 10.0, wall=seconds + 1, traced=seconds, cpu=seconds + 1))
     full = {"views": 40, "resolution": [16, 8], "samples": 20}
-    extrapolation = dataset(*lines, full=full)["extrapolation"]
+    extrapolation = dataset(*lines, full=full, names="zabcd")["extrapolation"]
     assert (extrapolation["views"], extrapolation["resolution"], extrapolation["samples"]) == (
         40,
         [16, 8],
         20,
     )
     # Four times the pixels, ten times the samples. In proportion to pixels: the second that each
-    # view took beside path tracing, and the reprojection's jobs for three views.
+    # view took beside path tracing, and the reprojection's jobs for five views.
     path_tracing = 40 * statistics.mean(traced) * 40
-    each = 40 * (1.0 + 1.4 / 3) * 4
+    each = 40 * (1.0 + 1.4 / 5) * 4
     once = 1.0 + 1.0 + 3.0
     assert extrapolation["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
     # The standard error of a mean of 4 out of 40 views.
@@ -203,13 +204,68 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
     assert extrapolation["price_uncertainty"] / extrapolation["price"] == pytest.approx(
         extrapolation["core_hours_uncertainty"] / extrapolation["core_hours"]
     )
-    assert extrapolation["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
+    assert extrapolation["gigabytes"] == pytest.approx(300 / 5 * 40 * 4 / 1e9)
     assert "4 views: 8 × 4 pixels, 2 samples" in extrapolation["basis"]
     # The description follows from this build alone.
     assert "40 times the path tracing" in extrapolation["basis"]
     same = dataset(*lines)["extrapolation"]["basis"]
     assert "times the path tracing" not in same
     assert not re.search(r"\d\.\d", extrapolation["basis"] + same)
+
+
+def test_views_of_earlier_settings_do_not_tell_the_cost_of_the_full_dataset(dataset):
+    """The rig once had ten views of fewer samples. Their journal stays."""
+    of_dataset = [*start(2000.0), *(view(n, 2010.0, 6.0, traced=5.0, cpu=6.0) for n in "abc")]
+    expected = dataset(*of_dataset)["extrapolation"]
+    earlier = [view(n, 1010.0, 1.5, traced=0.5, cpu=1.5) for n in "abcdefghij"]
+    both = dataset(*start(1000.0, start_up=0.0), *earlier, *of_dataset)["extrapolation"]
+    assert "path tracing of 2 views:" in both["basis"]
+    # Only the first view of the earlier process adds what it took beside path tracing.
+    assert both["core_hours"] == pytest.approx(expected["core_hours"] + 1.0 / 3600)
+
+
+def test_times_of_a_core_and_of_a_graphics_card_are_not_averaged(dataset):
+    """A run on the processor was interrupted. The next one had a graphics card."""
+    on_core = [
+        *start(1000.0, start_up=0.0),
+        view("c", 1100.0, wall=100.0, traced=100.0, cpu=100.0),
+        view("a", 1200.0, wall=100.0, traced=100.0, cpu=100.0),
+    ]
+    on_card = [
+        *start(2000.0, start_up=0.0, device="GPU"),
+        view("b", 2002.0, wall=2.0, traced=2.0, cpu=1.0),
+        view("c", 2004.0, wall=2.0, traced=2.0, cpu=1.0),
+        end(2005.0, wall=5.0, cpu=2.0, memory=1),
+    ]
+    content = dataset(*on_core, *on_card)
+    assert content["device"] == "GPU"
+    extrapolation = content["extrapolation"]
+    # Three views of 2 s, and the scene's and the reprojection's jobs on one of four cores.
+    assert extrapolation["core_hours"] == pytest.approx((3 * 2 + (3.0 + 1.4) / 4) / 3600)
+    assert "path tracing of 1 view:" in extrapolation["basis"]
+    # In all, 200 s of a core, and 5 s of the machine.
+    machine = 5 + (200 + 3.0 + 1.4) / 4
+    assert content["energy_kwh"] == pytest.approx(100 * machine / 3.6e6)
+    assert "all of it while a graphics card renders" in content["attribution"]
+
+
+def test_the_bytes_of_exports_are_those_of_all_their_files(dataset, tmp_path):
+    folder = tmp_path / "results"
+    for path, size in (
+        ("transforms.json", 1),
+        ("exports/nerfstudio/transforms.json", 20),
+        ("flat/transforms.json", 300),
+        ("flat/exports/colmap/points3D.txt", 4000),
+    ):
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(b"x" * size)
+    # A linked view takes no more space.
+    (folder / "flat/exports/colmap/a.png").hardlink_to(folder / "flat/a.png")
+    table = tmp_path / "work/rig/export/flat/colmap.tsv"
+    table.parent.mkdir(parents=True)
+    table.write_text(HEAD + "4.0\t0:00:04\t200.0\t0\t0\t0\t0\t0\t50\t3.0\n")
+    sizes = {stage["stage"]: stage["bytes"] for stage in dataset(*KILLED, *RESUMED)["stages"]}
+    assert sizes == {"scene": 5000, "render": 300, "flat": 70, "export": 4321}
 
 
 def test_the_full_dataset_defaults_to_the_samples_of_the_blend(dataset):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -15,7 +16,7 @@ from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import strata, trials
-from lightfield.measurement.error_vs_time import evaluated, measured_point, whole_views_point
+from lightfield.measurement.error_vs_time import evaluated, measured_point, whole_views_point, write
 from lightfield.measurement.experiment import Method
 from lightfield.measurement.metrics import Reference, disagreement, make_reference
 from lightfield.measurement.strata import STRATA
@@ -243,6 +244,57 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     assert (same.total, same.added, same.share) == (0, 0, 0)
 
 
+def test_a_constant_error_has_a_slope_of_exactly_0(tmp_path):
+    """So it is if a denoiser's bias is all the error, as in a smooth sky."""
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+    points = []
+    for samples in (1, 2, 4, 8):
+        trial = trials.Trial(sky + np.float32(0.25), None, samples, float(samples), "CPU")
+        method = Method("denoised", {"samples": samples, "denoise": True})
+        points.append(measured_point(method, [[trial, trial]], [reference]))
+    plain = replace(points[0], method="plain")
+    evaluation = evaluated([plain, *points], 0.0)
+    write_json(tmp_path / "points.json", evaluation)
+    slope = evaluation["slopes"]["denoised"]["over_time"]
+    assert (slope["slope"], slope["slope_error"]) == (0, 0)
+
+
+def test_a_scene_without_noise_has_a_plot_that_says_so(tmp_path):
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+    trial = trials.Trial(sky, None, 1, 1.0, "CPU")
+    points = [measured_point(Method("plain", {"samples": 1}), [[trial, trial]], [reference])]
+    measured = evaluated(points, 0.0)
+    content = {"measured_on": {"device": "CPU"}, **measured, "neighbouring_views": []}
+    content["strata"] = {"environment": {"area": 1.0, **measured}}
+    write(tmp_path / "sky", content)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".json", ".md", ".png", ".svg"}
+    text = (tmp_path / "sky.svg").read_text()
+    assert text.count("No error is above the references' own.") == 2
+
+
+def test_a_methods_time_is_when_it_first_has_the_error():
+    """The error of the denoised renders ends at their bias, and rises a little at the end."""
+    sky = np.full((16, 16, 3), 0.5, np.float32)
+    reference = make_reference([sky] * 2, None, np.ones((16, 16), bool))
+
+    def line(name, errors):
+        method = Method(name, {"samples": 1})
+        trial = trials.Trial(sky * 2, None, 1, 1.0, "CPU")
+        point = measured_point(method, [[trial, trial]], [reference])
+        seconds = (10.0 * 2**number for number in range(len(errors)))
+        pairs = zip(errors, seconds, strict=True)
+        return [replace(point, relative_mse=error, seconds=at) for error, at in pairs]
+
+    points = line("plain", [0.08, 0.04, 0.01505]) + line("denoised", [0.05, 0.02, 0.015, 0.0152])
+    by_method = {row["method"]: row for row in evaluated(points, 0.0)["methods_at_most_samples"]}
+    assert by_method["plain"]["seconds_at_equal_error"] == pytest.approx(40)
+    # The power law from 0.02 after 20 s to 0.015 after 40 s.
+    expected = 20 * 2 ** (np.log(0.01505 / 0.02) / np.log(0.015 / 0.02))
+    assert by_method["denoised"]["seconds_at_equal_error"] == pytest.approx(expected)
+
+
 def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
@@ -252,6 +304,26 @@ def test_other_programs_can_read_the_files(measured, content):
     assert sum(row["pareto"] == "True" for row in whole_views) == len(content["pareto_front"])
     assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
     assert images.read_image(measured.folder / "room.png").channels
+
+
+def test_both_panels_of_the_plot_have_one_size_with_their_legends_below(measured):
+    root = ElementTree.parse(measured.folder / "room.svg").getroot()
+    by_id = {element.get("id"): element for element in root.iter() if element.get("id")}
+    panels = []
+    for name in ("axes_1", "axes_2"):
+        outline = next(by_id[name].iter("{http://www.w3.org/2000/svg}path")).get("d")
+        corners = np.array(re.findall(r"-?[\d.]+", outline), float).reshape(-1, 2)
+        panels.append((corners.min(axis=0), corners.max(axis=0)))
+    (first_start, first_end), (second_start, second_end) = panels
+    np.testing.assert_allclose(first_end - first_start, second_end - second_start, atol=0.1)
+    assert first_start[1] == pytest.approx(second_start[1])
+    size = np.array(root.get("viewBox").split()[2:], float)
+    assert (second_end < size).all()
+    for name, start, end in (("legend_1", *panels[0]), ("legend_2", *panels[1])):
+        legend = ElementTree.tostring(by_id[name], encoding="unicode")
+        texts = np.array(re.findall(r"translate\(([\d.]+) ([\d.]+)\) scale", legend), float)
+        assert (texts[:, 0] > start[0]).all() and (texts[:, 0] < end[0]).all()
+        assert (texts[:, 1] > end[1]).all() and (texts[:, 1] < size[1]).all()
 
 
 def test_a_second_run_renders_nothing(measured):

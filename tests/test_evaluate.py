@@ -14,6 +14,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import SourceDataset
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images
+from lightfield.imaging.tonemap import to_16_bit
 from lightfield.measurement import evaluation
 
 RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "split": "odd"}
@@ -163,6 +164,46 @@ def test_errors_are_those_of_the_changed_renders(dataset, tmp_path):
     assert row["normal"] == pytest.approx(45)
 
 
+@pytest.mark.parametrize("missing", [0, np.nan, np.inf])
+def test_missing_normals_count_as_perpendicular(dataset, tmp_path, missing):
+    render = tmp_path / "view_0001f.exr"
+    shutil.copy(dataset / "perspective" / render.name, render)
+    up = {channel: np.full((48, 64), channel == "B", np.float32) for channel in "RGB"}
+    for channel in up.values():
+        channel[:, :16] = missing
+    images.write_exr(tmp_path / "normal" / render.name, up)
+    row = rows_of(dataset, "perspective", render)["all"]
+    assert row["normal"] == pytest.approx(90 / 4)
+
+
+def test_normals_of_another_size_are_named(dataset, tmp_path):
+    render = tmp_path / "view_0001f.exr"
+    shutil.copy(dataset / "perspective" / render.name, render)
+    normals = tmp_path / "normal" / render.name
+    images.write_exr(normals, dict.fromkeys("RGB", np.ones((24, 64), np.float32)))
+    with pytest.raises(UserError, match=rf"{normals}: is 64 × 24, but .* says 64 × 48"):
+        rows_of(dataset, "perspective", render)
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".png"])
+def test_the_truth_has_no_error_in_16_bits(dataset, tmp_path, suffix):
+    light = images.read_image(dataset / "perspective" / "view_0001f.exr").colour
+    pixels = to_16_bit(light)
+    shutil.copytree(dataset / "perspective", tmp_path / "copy" / "perspective")
+    images.write_png(tmp_path / "copy" / "perspective" / "view_0001f.png", pixels)
+    render = tmp_path / "view_0001f.png"
+    source = SourceDataset(tmp_path / "copy", "perspective", suffix)
+    view = source.lightfield.views[1]
+    parts = {"all": np.ones((48, 64), bool)}
+    # A step of 16 bits is less than a rounding to 8 bits would hide.
+    for step, expected in ((0, math.inf), (1, 20 * math.log10(65535))):
+        images.write_png(render, pixels + np.uint16(step))
+        shown = evaluation.rendered(render, source, BLACK)
+        true = evaluation.truth(source, view, render, BLACK)
+        ((_, errors),) = evaluation.errors(shown, true, parts, source.lens)
+        assert errors["psnr"] == pytest.approx(expected)
+
+
 @pytest.fixture
 def transparent(tmp_path):
     """The source of views of a grey wall. Its alpha falls from 1 at the left to 0."""
@@ -223,6 +264,20 @@ def test_linear_renders_are_composited_as_light(background, light, transparent, 
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE])
+def test_linear_renders_are_composited_as_the_truth_in_png(background, transparent, tmp_path):
+    for view in transparent.lightfield.views:
+        if view.name in TESTS:
+            transparent.write_image(view, transparent.path(view).with_suffix(".png"))
+    developed = SourceDataset(transparent.dataset, "", ".png")
+    path = tmp_path / "view_0001f.exr"
+    shutil.copy(transparent.dataset / "exr" / path.name, path)
+    errors, problem = compared(developed, path, background)
+    assert problem is None
+    # Colour and alpha of 8 bits are rounded, each by up to half a step.
+    assert errors["psnr"] > 45
+
+
+@pytest.mark.parametrize("background", [BLACK, WHITE])
 def test_renders_with_alpha_are_composited_over_the_background_too(
     transparent, tmp_path, background
 ):
@@ -237,6 +292,20 @@ def test_renders_with_alpha_are_composited_over_the_background_too(
     _, problem = compared(transparent, tmp_path / f"{view.name}.png", background)
     # It differs by more than 0.1 in all but 16 columns, and three at the ramp's upper end.
     assert "has another alpha than the truth in 70% of its pixels" in problem
+
+
+def test_16_bit_renders_with_alpha_are_composited_as_the_truth(transparent, tmp_path):
+    view = transparent.lightfield.views[1]
+    alpha = images.read_image(transparent.path(view)).channels["A"].astype(np.float64)
+    wall = np.rint(65535 * (1.055 * 0.25 ** (1 / 2.4) - 0.055))
+    colour = np.where(alpha[..., None] > 0, np.full(3, wall), 0)
+    pixels = np.dstack([colour, np.rint(65535 * alpha)]).astype(np.uint16)
+    path = tmp_path / f"{view.name}.png"
+    images.write_png(path, pixels)
+    errors, problem = compared(transparent, path, WHITE)
+    assert problem is None
+    # At most a step of 16 bits: the light divided by its alpha is rounded.
+    assert errors["psnr"] >= 20 * math.log10(65535)
 
 
 def test_holes_in_renders_of_opaque_views_are_warned_of(dataset, tmp_path):

@@ -128,6 +128,17 @@ def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     assert (same.psnr, same.ssim, same.flip) == (np.inf, pytest.approx(1), 0)
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (2, 3), (8, 8), (10, 64), (64, 48)])
+def test_pictures_of_any_size_have_a_structural_similarity(shape):
+    """Source: Wang et al. 2004, equation 13, without any variance."""
+    truth = np.full((*shape, 3), 0.5)
+    shown = np.full((*shape, 3), 0.25)
+    similarity = metrics.ssim_map(truth, shown)
+    assert similarity.shape == truth.shape
+    expected = (2 * 0.5 * 0.25 + 0.01**2) / (0.5**2 + 0.25**2 + 0.01**2)
+    np.testing.assert_allclose(similarity, expected, rtol=1e-9)
+
+
 def test_common_metrics_use_unexposed_light():
     truth, all_pixels = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
     estimate = metrics.make_reference([truth] * 2, None, all_pixels)

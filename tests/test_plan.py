@@ -139,6 +139,16 @@ def test_the_table_adds_up_the_probes_measurements():
     )
 
 
+def test_times_of_a_core_and_of_a_graphics_card_have_no_sum():
+    probe = {"resolution": [64, 64], "samples": 4, "views": 10, "view_bytes": [1e6]}
+    on_core = probe | {"device": "CPU", "view_seconds": [60.0]}
+    on_card = probe | {"device": "GPU", "view_seconds": [0.5]}
+    text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {})
+    assert "| 60 ± 0 | 10 min |" in text and "| 0.5 ± 0 | 5 s |" in text
+    assert "| all | 20 | | | | — | — | — | 20 MB |" in text
+    assert "graphics card for a/c, and of one processor core for the others" in text
+
+
 def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
     """Path tracing has the error 1 / N. Denoised renders have half, and cost three samples more."""
     unchanged = {

@@ -844,3 +844,33 @@ def test_a_page_relights_a_view(lit, show):
 def test_a_page_without_light_groups_relights_nothing(sphere):
     text = sphere.page.read_text()
     assert 'id="lit"' not in text and "drawLit" not in text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0, "0"),
+        (-0.0, "0"),
+        (0.00123456, "0.001235"),
+        (0.0009, "9.00·10⁻⁴"),
+        (9999.4, "9999"),
+        (9999.6, "10000"),
+        (12345, "12345"),
+        (-42000.4, "-42000"),
+        (99999.4, "99999"),
+        (99999.6, "1.00·10⁵"),
+        (123456, "1.23·10⁵"),
+        (float("inf"), "∞"),
+        (float("nan"), "–"),
+    ],
+)
+def test_a_number_on_a_page_is_read_as_people_write_it(value, text):
+    assert page.cell(value) == text
+    assert page.cell(str(value)) == text
+
+
+@pytest.mark.parametrize(
+    ("size", "text"), [(0, "0 bytes"), (1, "1 byte"), (999.6, "1 kB"), (2e15, "2 PB")]
+)
+def test_a_size_on_a_page_has_its_unit(size, text):
+    assert page.measure(size, "peak_bytes") == text

@@ -192,6 +192,23 @@ rigs:
 """.replace("CAMERA", "lens: equidistant, fov: 180, resolution: [64, 64]")
 
 
+def test_a_single_camera_with_a_published_name_differs_from_the_print(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, table = tmp_path / "silvr.yaml", tmp_path / "rigs.md"
+    (tmp_path / "own.blend").touch()
+    head, _, _ = SCENE.replace("FILE", str(tmp_path / "own.blend")).partition("  LFCuboid_2x2x1")
+    camera = "{lens: equidistant, fov: 180, resolution: [64, 64]}"
+    rig = f"  LFSphere_e100cm_d170cm: {{type: plane, cameras: [1, 1], camera: {camera}}}\n"
+    scene.write_text(head + rig)
+    arguments = ["rig_table.py", scene, "--markdown", table, "--csv", tmp_path / "rigs.csv"]
+    monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
+    rig_table.main()
+    text = table.read_text(encoding="utf-8")
+    assert "LFSphere_e100cm_d170cm: 1 view, printed 642." in text
+    assert "its camera has no neighbour, printed 13 cm." in text
+
+
 def test_the_table_has_computed_figures_beside_the_printed_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,13 +14,14 @@ from sphere import look, look_at_ball, write_views
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.imaging.video import video
-from lightfield.measurement import summaries
+from lightfield.measurement import summaries, synthesis_quality
 from lightfield.report import tables
-from lightfield.synthesis.view import Sources
+from lightfield.synthesis.view import Sources, Synthesised
 
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 RIG = {"type": "sphere", "subdivisions": 2, "size": 1.0}
@@ -431,6 +432,84 @@ def test_places_are_inside_or_at_the_edge(measured):
     (near, near_part), (far, far_part) = (places[name] for name in sorted(places))
     assert (near, far) == ("inside", "edge")
     assert near_part < 0.5 < far_part < 1
+
+
+def synthesis_rows(folder, camera, rig, run_program):
+    """Return the rows of the quality of a dataset's test views, synthesised from its others."""
+    write_views(folder / "dataset", camera, rig)
+    run_program("synthesis_quality.py", folder / "dataset", "--output", folder / "quality")
+    with (folder / "quality.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_variants_have_no_more_views_and_no_fewer_pixels_than_there_are(tmp_path, run_program):
+    camera = {"lens": "equidistant", "fov": 90, "resolution": [12, 3]}
+    rig = {"type": "plane", "cameras": [4, 1], "size": 0.2}
+    rows = synthesis_rows(tmp_path, camera, rig, run_program)
+    values = {(row["variant"], row["value"]) for row in rows}
+    assert {value for variant, value in values if variant == "best"} == {"1", "2"}
+    assert {value for variant, value in values if variant == "resolution"} == {"6 × 1"}
+
+
+@pytest.mark.parametrize("width", [48, 51])
+def test_smaller_views_have_the_depth_of_their_pixels(tmp_path, width):
+    """A quarter of 51 pixels is rounded to 12, so not every fourth pixel is the right one."""
+    camera = {"lens": "rectilinear", "fov": 70, "resolution": [width, width]}
+    rig = {"type": "plane", "cameras": [2, 1], "size": 2.0}
+    write_views(tmp_path / "dataset", camera, rig)
+    source = SourceDataset(tmp_path / "dataset", "", ".exr")
+    views = source.lightfield.views
+    (small,) = (
+        variant.sources
+        for variant in synthesis_quality.variants(source, views)
+        if variant.value == "12 × 12"
+    )
+    _, distance = small.read(views[0])
+    _, truth = look(small.lens, views[0].matrix)
+    # From one small pixel to the next, the distance changes by up to 4 %.
+    assert np.abs(distance / truth - 1).max() < 0.006
+
+
+def test_errors_at_the_poles_of_a_panorama_count_by_their_solid_angle(tmp_path):
+    rig = {"type": "plane", "cameras": [2, 2], "size": 0.2}
+    write_views(tmp_path / "dataset", EYES["panorama"], rig)
+    truth = SourceDataset(tmp_path / "dataset", "", ".exr")
+    views = truth.lightfield.views
+    variant = next(synthesis_quality.variants(truth, views))
+
+    def row_of(rows_with_error):
+        colour = images.read_image(truth.path(views[0])).colour.copy()
+        colour[rows_with_error] *= 1.5
+        height, width = colour.shape[:2]
+        holes = np.zeros((height, width), bool)
+        made = Synthesised(colour, np.ones((height, width)), holes)
+        variant.sources.synthesise = lambda *_: made
+        return next(synthesis_quality.compare(variant, views, views[:1], truth, 0.0))
+
+    at_pole = row_of(np.s_[:8])
+    at_equator = row_of(np.s_[28:36])
+    # The eight rows at the pole have a fifth of the solid angle of those at the equator: 7 dB.
+    gain = {name: at_pole[name] - at_equator[name] for name in ("psnr", "ws_psnr", "iv_psnr")}
+    for metric in ("ws_psnr", "iv_psnr"):
+        assert gain[metric] - gain["psnr"] > 4
+
+
+def test_black_pixels_belong_to_no_kind_of_light(tmp_path, run_program):
+    rig = {"type": "plane", "cameras": [3, 3], "size": 0.2}
+    camera = {"lens": "rectilinear", "fov": 70, "resolution": [16, 16]}
+    folder = tmp_path / "dataset"
+    write_views(folder, camera, rig)
+    field = LightField.read(folder / "lightfield.json")
+    field.changed(render={"passes": [*PARTS_OF_LIGHT]}).write(field.path)
+    for view in field.views:
+        for name in PARTS_OF_LIGHT:
+            light = np.zeros((16, 16), np.float16)
+            light[:4] = name == "glossy_light"
+            images.write_exr(PASSES[name].path(folder, view.name), dict.fromkeys("RGB", light))
+    run_program("synthesis_quality.py", folder, "--output", tmp_path / "quality")
+    with (tmp_path / "quality.csv").open() as file:
+        parts = {(row["region"], float(row["part"])) for row in csv.DictReader(file)}
+    assert parts == {("all", 1.0), ("glossy", 0.25)}
 
 
 def test_a_page_has_these_tables(measured):

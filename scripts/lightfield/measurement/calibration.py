@@ -298,7 +298,8 @@ def calibrate(
     for each in (bench, held_out):
         each.measure(choice.method)
     # An error far below the references' own may be measured as 0 or less by chance.
-    plain_samples = search.plain_samples(max(choice.error, bench.own_error))
+    least_error = min(bench.own_error, target)
+    plain_samples = search.plain_samples(max(choice.error, least_error))
     record = {
         **choice_evidence(search, choice, bench),
         **confirmation(held_out.errors(choice.method), target),

@@ -24,11 +24,14 @@ from lightfield.measurement.sampling import cost_in_samples, standard_error
 # The stages that every dataset has, in the order of the work. Other stages come between.
 FIRST_STAGES = ("scene", "cameras", "render")
 LAST_STAGES = ("export", "validate", "report")
+# The file and the folder that exporters write beside the views.
+EXPORTED = ("transforms.json", "exports")
 # The files and folders of a stage. Without an entry, the folder has the stage's name.
 STAGE_PATHS = {
     "cameras": ("lightfield.json",),
     "render": ("exr", *PASSES, f"{GROUP_PREFIX}*"),
-    "export": ("transforms.json",),
+    # Exports of reprojected views lie in the reprojection's folder.
+    "export": (*EXPORTED, *(f"*/{name}" for name in EXPORTED)),
     "validate": ("validation.json",),
 }
 # Files of the report that differ from build to build do not count.
@@ -162,18 +165,36 @@ def job_times(path: Path) -> tuple[float, float, int]:
     return wall, cpu, memory
 
 
-def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
-    """Return the size of a stage's files in the dataset. 0 if it has none there."""
+def stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dict[str, int]:
+    """Return the size of the files of each stage. 0 for a stage without files in the dataset.
+
+    A file that exports link to takes no more space there. It counts in the first of its stages.
+    """
+    sizes = {}
+    counted: set[tuple[int, int]] = set()
+    for stage in stages:
+        sizes[stage] = 0
+        for file in stage_files(stage, dataset, blend):
+            status = file.stat()
+            if (status.st_dev, status.st_ino) not in counted:
+                counted.add((status.st_dev, status.st_ino))
+                sizes[stage] += status.st_size
+    return sizes
+
+
+def stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
+    """Return the files of a stage that count, in the folder ``dataset``."""
     if stage == "scene":
-        return blend.stat().st_size if blend else 0
-    size = 0
+        return [blend] if blend else []
+    files = []
     for name in STAGE_PATHS.get(stage, (stage,)):
-        found = dataset.glob(name)
-        files = [file for path in found for file in ([path] if path.is_file() else path.rglob("*"))]
-        for file in files:
-            if file.is_file() and file.name not in NOT_COUNTED:
-                size += file.stat().st_size
-    return size
+        for path in dataset.glob(name):
+            inside = [path] if path.is_file() else path.rglob("*")
+            files += [file for file in inside if file.is_file() and file.name not in NOT_COUNTED]
+    if stage == "export":
+        return files
+    exported = [dataset / stage / name for name in EXPORTED]
+    return [file for file in files if not any(file.is_relative_to(path) for path in exported)]
 
 
 @dataclass(frozen=True)
@@ -212,6 +233,20 @@ def on_processor(run: journal.Run) -> bool:
     return bool(run.start["device"] == "CPU")
 
 
+def on_card(run: journal.Run) -> bool:
+    """Return whether a process rendered views on a graphics card."""
+    return bool(run.views) and not on_processor(run)
+
+
+def latest_device(runs: Sequence[journal.Run]) -> str | None:
+    """Return the device that rendered the latest view. None without a rendered view."""
+    rendered = [run for run in runs if run.views]
+    if not rendered:
+        return None
+    latest = max(rendered, key=lambda run: run.views[-1]["finished"])
+    return str(latest.start["device"])
+
+
 def costs(
     dataset: Path,
     blend: Path | None,
@@ -236,8 +271,8 @@ def costs(
     shards = [shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
     stages = in_order(job_stages(benchmarks, scene_benchmarks) | {"render": render_stage(shards)})
-    sizes = {name: stage_bytes(name, dataset, blend) for name in stages}
-    device = next((run.start["device"] for run in reversed(runs) if run.views), None)
+    sizes = stage_bytes(stages, dataset, blend)
+    device = latest_device(runs)
     kwh = tariff.kwh(machine_seconds(stages, runs, tariff.cores))
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
@@ -257,7 +292,7 @@ def costs(
         "attribution": (
             f"{tariff.watts:g} W, the whole machine's, times wall time, times the part of its "
             f"{tariff.cores} cores that was busy"
-            + ("; all of it while a graphics card renders" if device not in (None, "CPU") else "")
+            + ("; all of it while a graphics card renders" if any(map(on_card, runs)) else "")
         ),
         "extrapolation": extrapolation(
             runs,
@@ -296,10 +331,7 @@ def machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], co
     other_stages = sum(
         stage.cpu_seconds / cores for name, stage in stages.items() if name != "render"
     )
-    rendering = sum(
-        run.wall_seconds if run.views and not on_processor(run) else run.cpu_seconds / cores
-        for run in runs
-    )
+    rendering = sum(run.wall_seconds if on_card(run) else run.cpu_seconds / cores for run in runs)
     return other_stages + rendering
 
 
@@ -341,8 +373,18 @@ def extrapolation(
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
-    """Return the cost of the full dataset, from the views of this one. None without views."""
-    all_renderings = [rendering for run in runs for rendering in renderings(run)]
+    """Return the cost of the full dataset, from the views of this one. None without views.
+
+    If both processors and graphics cards rendered, only views of the latest device count: times of
+    a core and of a whole machine have no mean.
+    """
+    by_processor = latest_device(runs) == "CPU"
+    runs = [run for run in runs if not run.views or on_processor(run) == by_processor]
+    # Journals may have views that the dataset had under earlier settings.
+    names = {view.name for view in lightfield.views}
+    all_renderings = [
+        rendering for run in runs for rendering in renderings(run) if rendering.view in names
+    ]
     if not all_renderings:
         return None
     latest = latest_renderings(all_renderings)
@@ -352,7 +394,6 @@ def extrapolation(
     if len(times) > 1:
         missing_part = max(0.0, 1 - len(times) / scale.views)
         error = scale.views * standard_error(times) * math.sqrt(missing_part)
-    by_processor = all(on_processor(run) for run in runs if run.views)
     # Beside a graphics card, a core's time is only a part of the machine's.
     part = 1 if by_processor else 1 / tariff.cores
     growing_stages = {"validate", FLOW.name, *reprojections}
@@ -401,9 +442,10 @@ def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) 
     lens = lightfield.lens
     render = lightfield.render
     denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render["denoise"] else ""
+    views = "view" if count == 1 else "views"
     device = "the processor" if by_processor else "a graphics card: hours are the machine's"
     text = (
-        f"path tracing of {count} views: {lens.width} × {lens.height} pixels, "
+        f"path tracing of {count} {views}: {lens.width} × {lens.height} pixels, "
         f"{render['samples']} samples{denoising}; in proportion to pixels and samples; "
         f"on {device}; all else as measured, the part that every view needs in proportion to "
         "views and pixels"

@@ -17,6 +17,7 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -34,6 +35,7 @@ from lightfield.measurement.experiment import (
     Renders,
     mean_own_error,
     over_views,
+    samples_of_reference,
 )
 from lightfield.measurement.sampling import DENOISED, standard_error
 from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
@@ -144,7 +146,7 @@ def measure(
         "measured_on": {
             **experiment.described(),
             "seeds": seeds,
-            "reference_samples": reference_samples,
+            "reference_samples": samples_of_reference(reference_samples),
             "device": experiment.device,
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },
@@ -307,9 +309,8 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
     One of plain path tracing's points sets the equal time and the equal error. With ``part`` 0.5 it
-    is the middle one, with 1 that of most samples. Figures are interpolated between a method's own
-    points, and None beyond them. If even a method's cheapest point has less error, the time is that
-    of this point.
+    is the middle one, with 1 that of most samples. The error at equal time is interpolated between
+    a method's own points, and None beyond them. The time is that of `seconds_to`.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
@@ -318,11 +319,7 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     rows = []
     for method in dict.fromkeys(p.method for p in points if p.method != OWN):
         line = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
-        seconds = metrics.interpolated(
-            equal.relative_mse, [(p.relative_mse, p.seconds) for p in line]
-        )
-        if seconds is None and line[0].relative_mse <= equal.relative_mse:
-            seconds = line[0].seconds
+        seconds = seconds_to(equal.relative_mse, line)
         rows.append(
             {
                 "method": method,
@@ -337,6 +334,22 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def seconds_to(error: float, line: Sequence[Point]) -> float | None:
+    """Return when a method first has at most this ``error``, or None if it never has.
+
+    ``line`` has the method's points in rising order of seconds. The seconds are interpolated
+    between them. If even the first point has less error, they are that point's. The error of a
+    biased method may rise again.
+    """
+    if line[0].relative_mse <= error:
+        return line[0].seconds
+    for before, after in pairwise(line):
+        if after.relative_mse <= error:
+            points = [(point.relative_mse, point.seconds) for point in (before, after)]
+            return metrics.interpolated(error, points)
+    return None
 
 
 def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
@@ -506,27 +519,27 @@ def _row(*cells: str | float | None) -> str:
 
 def draw(stem: Path, content: Mapping[str, Any]) -> None:
     """Draw error over time as ``stem``.svg and .png: by method, and beside it by stratum."""
-    with plots.plot(stem, 1, 2, size=(18, 6.5)) as (by_method_axes, by_stratum_axes):
+    unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
+    with plots.plot(stem, 1, 2, size=(14, 8.4)) as (by_method_axes, by_stratum_axes):
         _draw_methods(by_method_axes, content)
-        unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
-        by_method_axes.set(
-            xscale="log",
-            yscale="log",
-            title=f"{stem.name}: error against render time",
-            xlabel=f"render time, {unit} seconds per megapixel",
-            ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
-        )
-        # Put both legends outside of the axes: they would hide curves.
-        by_method_axes.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+        by_method_axes.set_title(f"{stem.name}: error against render time")
         _draw_strata(by_stratum_axes, content)
-        by_stratum_axes.set(
-            xscale="log",
-            yscale="log",
-            title="by what pixels show",
-            xlabel=by_method_axes.get_xlabel(),
-        )
-        by_stratum_axes.xaxis.set_minor_formatter("")
-        by_stratum_axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+        by_stratum_axes.set_title("by what pixels show")
+        for axes in (by_method_axes, by_stratum_axes):
+            if axes.has_data():
+                # Put the legend below the axes: it would hide curves.
+                axes.legend(loc="upper left", bbox_to_anchor=(0, -0.12), fontsize=9)
+            else:
+                # A logarithmic axis without data has no limits.
+                axes.set(xlim=(1, 100), ylim=(1e-3, 1))
+                axes.text(2, 0.03, "No error is above the references' own.")
+            axes.set(
+                xscale="log",
+                yscale="log",
+                xlabel=f"render time, {unit} seconds per megapixel",
+                ylabel="relative mean squared error\nof all but the worst thousandth of pixels",
+            )
+            axes.xaxis.set_minor_formatter("")
 
 
 def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
@@ -534,6 +547,8 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
     methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
     for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
         points = [p for p in content["points"] if p["method"] == method and p["resolved"]]
+        if not points:
+            continue
         axes.errorbar(
             _column("seconds", points),
             _column("relative_mse", points),
@@ -543,14 +558,15 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
             linewidth=1,
             label=method + _slopes(content["slopes"].get(method, {})),
         )
-    axes.plot(
-        _column("seconds", content["pareto_front"]),
-        _column("relative_mse", content["pareto_front"]),
-        color=plots.GREY,
-        linewidth=6,
-        alpha=0.3,
-        label="Pareto front",
-    )
+    if content["pareto_front"]:
+        axes.plot(
+            _column("seconds", content["pareto_front"]),
+            _column("relative_mse", content["pareto_front"]),
+            color=plots.GREY,
+            linewidth=6,
+            alpha=0.3,
+            label="Pareto front",
+        )
     own_points = [point for point in content["settings"] if point["resolved"]]
     if own_points:
         axes.plot(
@@ -563,13 +579,15 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
             markerfacecolor="none",
             label=OWN,
         )
-    axes.axhline(
-        content["reference_error"],
-        color="black",
-        linestyle=":",
-        linewidth=1,
-        label="the references' own error (subtracted)",
-    )
+    # A logarithmic axis has no place for references without noise.
+    if content["pareto_front"] and content["reference_error"] > 0:
+        axes.axhline(
+            content["reference_error"],
+            color="black",
+            linestyle=":",
+            linewidth=1,
+            label="the references' own error (subtracted)",
+        )
 
 
 def _draw_strata(axes: Any, content: Mapping[str, Any]) -> None:
@@ -578,6 +596,8 @@ def _draw_strata(axes: Any, content: Mapping[str, Any]) -> None:
     for (stratum, measured), colour, marker in strata_and_styles:
         for method, line in ((PLAIN, "-"), (DENOISED, ":")):
             points = [p for p in measured["points"] if p["method"] == method and p["resolved"]]
+            if not points:
+                continue
             axes.plot(
                 _column("seconds", points),
                 _column("relative_mse", points),
@@ -602,6 +622,6 @@ def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:
         ("of_all_pixels_over_time", " (all pixels {})"),
     ):
         if name in lines:
-            slope = f"{lines[name]['slope']:.2f} ± {lines[name]['slope_error']:.2f}"
+            slope = f"{lines[name]['slope']:z.2f} ± {lines[name]['slope_error']:.2f}"
             text += form.format(slope.replace("-", "−"))
     return text

@@ -25,7 +25,7 @@ from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
-from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
+from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_16_bit, tone_map
 from lightfield.measurement import metrics
 
 # Neighbouring depths of different surfaces differ by more than this part.
@@ -99,24 +99,30 @@ def mask(path: Path, source: SourceDataset) -> Bools:
 def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> Pictures:
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
-    ``like`` is the picture to compare it with. If that is a PNG, the view is rounded as a PNG.
+    ``like`` is the picture to compare it with. If that is a PNG, the view is rounded as a PNG with
+    the same number of bits, and composited in sRGB. Otherwise it is composited as light.
     """
     transparent = source.lightfield.transparent
     if like.suffix == ".png":
-        alpha = source.alpha(view) / 255 if transparent else None
-        colour = _on_background(source.colour(view) / 255, alpha, background, 255)
+        largest = np.iinfo(images.read_image(like, ["R"]).channels["R"].dtype).max
+        colour, alpha = _rounded(source, view, largest)
+        colour = _on_background(colour, alpha, background, largest)
     else:
         image = images.read_image(source.path(view))
         check_size(source.path(view), source.lightfield, image.channels["R"])
         # In views that are not transparent, alpha marks where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
-        colour = _developed(image, alpha, source, background)
+        if alpha is not None and source.suffix == ".png":
+            light = decode_srgb(_encoded(image)) * alpha[..., np.newaxis]
+            colour = encode_srgb(_with_background(light, alpha, background))
+        else:
+            colour = _developed(image, alpha, source, background)
     has_depth = source.suffix == ".exr" and source.lightfield.depth
     return Pictures(
         colour,
         alpha,
         source.depth(view, source.lightfield.depth or "") if has_depth else None,
-        _normals(source.dataset / source.name / NORMALS / f"{view.name}.exr"),
+        _normals(source.dataset / source.name / NORMALS / f"{view.name}.exr", source),
     )
 
 
@@ -132,8 +138,36 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
     alpha = _alpha(image)
     colour = _developed(image, alpha, source, background)
     depth = image.channels.get("Z")
-    normals = _normals(path.parent / NORMALS / f"{path.stem}.exr")
+    normals = _normals(path.parent / NORMALS / f"{path.stem}.exr", source)
     return Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals)
+
+
+def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, Floats | None]:
+    """Return a dataset's view as a PNG whose values end at ``largest``: sRGB colour and alpha.
+
+    Both are 0 to 1, the colour (h, w, 3) without background, the alpha (h, w). The alpha is None if
+    the dataset is not transparent.
+    """
+    transparent = source.lightfield.transparent
+    if largest == 255:
+        return source.colour(view) / 255, source.alpha(view) / 255 if transparent else None
+    image = images.read_image(source.path(view))
+    check_size(source.path(view), source.lightfield, image.channels["R"])
+    alpha = _alpha(image) if transparent else None
+    if image.channels["R"].dtype.kind == "u":
+        return _encoded(image), alpha
+    light = image.colour
+    if alpha is not None:
+        alpha = np.rint(alpha * largest) / largest
+        covered = image.channels["A"][..., np.newaxis].astype(np.float32)
+        light = light / np.where(covered > 0, covered, 1)
+    return to_16_bit(tone_map(light, source.exposure, source.reinhard)) / largest, alpha
+
+
+def _encoded(image: images.Image) -> Floats:
+    """Return the colour (h, w, 3) of a picture of whole numbers, 0 to 1."""
+    pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
+    return pixels / np.iinfo(pixels.dtype).max
 
 
 def _alpha(image: images.Image) -> Floats | None:
@@ -154,13 +188,17 @@ def _developed(
     is not. Its sRGB values are blended, as trainers do with RGBA pictures.
     """
     if image.channels["R"].dtype.kind == "u":
-        pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
-        largest = np.iinfo(pixels.dtype).max
-        return _on_background(pixels / largest, alpha, background, largest)
+        largest = np.iinfo(image.channels["R"].dtype).max
+        return _on_background(_encoded(image), alpha, background, largest)
     light = tone_map(image.colour, source.exposure, source.reinhard)
     if alpha is not None:
-        light = light + (1 - alpha[..., np.newaxis]) * decode_srgb(background)
+        light = _with_background(light, alpha, background)
     return np.asarray(encode_srgb(light), np.float64)
+
+
+def _with_background(light: Floats, alpha: Floats, background: Floats) -> Floats:
+    """Return light (h, w, 3), premultiplied by ``alpha`` (h, w), over an sRGB background."""
+    return light + (1 - alpha[..., np.newaxis]) * np.asarray(decode_srgb(background))
 
 
 def _on_background(
@@ -287,20 +325,28 @@ def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return mean_rows
 
 
-def _normals(path: Path) -> Floats | None:
+def _normals(path: Path, source: SourceDataset) -> Floats | None:
+    """Return the normals (h, w, 3) in a file. None without the file."""
     if not path.is_file():
         return None
-    return images.read_image(path, "RGB").colour.astype(np.float64)
+    normals = images.read_image(path, "RGB").colour.astype(np.float64)
+    check_size(path, source.lightfield, normals)
+    return normals
 
 
 def _angle(normals: Floats, truth: Floats) -> float | None:
-    """Return the mean angle in degrees between normals (n, 3), where the truth has a normal."""
+    """Return the mean angle in degrees between normals (n, 3), where the truth has a normal.
+
+    A missing normal, one of length 0 or not finite, counts as perpendicular to the truth.
+    """
     has_normal = np.linalg.norm(truth, axis=-1) > 0.5
     if not has_normal.any():
         return None
     normals = normals[has_normal]
     truth = truth[has_normal]
-    lengths = np.linalg.norm(normals, axis=-1)
-    cosine = (normals * truth).sum(axis=-1) / np.maximum(lengths, 1e-12)
-    sine = np.linalg.norm(np.cross(normals, truth), axis=-1)
-    return float(np.degrees(np.arctan2(sine / np.maximum(lengths, 1e-12), cosine)).mean())
+    is_missing = ~np.isfinite(normals).all(axis=-1) | ~normals.any(axis=-1)
+    with np.errstate(invalid="ignore"):
+        cosine = (normals * truth).sum(axis=-1)
+        sine = np.linalg.norm(np.cross(normals, truth), axis=-1)
+        angles = np.arctan2(sine, cosine)
+    return float(np.degrees(np.where(is_missing, np.pi / 2, angles)).mean())

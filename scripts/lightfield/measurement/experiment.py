@@ -6,12 +6,14 @@ comparing these renders with a reference of the same window (see `metrics`). `er
 """
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import fmean
 from typing import Any
 
+from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.metrics import Reference
@@ -75,20 +77,28 @@ class Experiment:
         samples: int,
         name: str,
     ) -> "Experiment":
-        """Render references of ``samples`` samples a pixel, and split them by stratum.
+        """Render references of at least ``samples`` samples a pixel, and split them by stratum.
 
         ``areas`` is each stratum's part of the whole views. ``name`` starts the progress lines.
+        Raises `UserError` if no window has enough pixels of a stratum.
         """
         # The pilot renders first, because it sets up Cycles for the parts of light.
         classes = strata.classes_of(maker, windows)
         progress = Progress(len(windows), f"{name}: references")
+        samples_of_seed = samples_of_reference(samples) // REFERENCE_SEEDS
         references = []
         for window in windows:
-            references.append(maker.reference(window, REFERENCE_SEEDS, samples // REFERENCE_SEEDS))
+            references.append(maker.reference(window, REFERENCE_SEEDS, samples_of_seed))
             progress.done()
         references = metrics.exposed_alike(references)
         by_stratum = split_by_stratum(references, classes)
         counted = {stratum: by_stratum[stratum] for stratum in areas if stratum in by_stratum}
+        if not counted:
+            raise UserError(
+                f"{name}: its windows of {windows[0].width} × {windows[0].height} pixels have no "
+                f"{strata.FEWEST_PIXELS} pixels that show the same kind of light; give a larger "
+                "--size, or more pixels to the views"
+            )
         return cls(maker, windows, references, counted, areas)
 
     @cached_property
@@ -162,6 +172,11 @@ class Experiment:
             "size": self.windows[0].width,
             "resolution": [self.maker.lens.width, self.maker.lens.height],
         }
+
+
+def samples_of_reference(least: int) -> int:
+    """Return the samples of a stratified reference: at least ``least``, and equal for all seeds."""
+    return REFERENCE_SEEDS * math.ceil(least / REFERENCE_SEEDS)
 
 
 def split_by_stratum(

@@ -50,6 +50,8 @@ Mask = NDArray[np.bool_]
 EPSILON = 0.01
 # The part of the pixels, those with the largest errors, that does not count.
 OUTLIERS = 0.001
+# The pixels along a side of SSIM's window: 3.5 standard deviations of 1.5 pixels around its middle.
+SSIM_WINDOW = 11
 # From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
 TO_YCBCR = np.array(
     [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
@@ -183,11 +185,15 @@ def compare(
 def ssim_map(truth: Array, shown: Array) -> Array:
     """Return the structural similarity (h, w, 3) of sRGB pictures in [0, 1]. 1 is equal.
 
-    Source: Wang et al. 2004, with its Gaussian window of 1.5 pixels.
+    Source: Wang et al. 2004, with its Gaussian window of 1.5 pixels. Pictures continue mirrored
+    beyond their borders.
     """
+    # scikit-image refuses pictures smaller than its window.
+    border = SSIM_WINDOW // 2
+    margins = ((border, border), (border, border), (0, 0))
     similarity: Array = structural_similarity(
-        truth,
-        shown,
+        np.pad(truth, margins, mode="symmetric"),
+        np.pad(shown, margins, mode="symmetric"),
         data_range=1.0,
         channel_axis=-1,
         gaussian_weights=True,
@@ -195,7 +201,7 @@ def ssim_map(truth: Array, shown: Array) -> Array:
         use_sample_covariance=False,
         full=True,
     )[1]
-    return similarity
+    return similarity[border:-border, border:-border]
 
 
 def flip_map(truth: Array, shown: Array) -> Array:
@@ -382,7 +388,9 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
     line = linregress(np.log(x), np.log(y))
-    return Line(float(line.slope), float(line.stderr), float(np.exp(line.intercept)))
+    # Of equal y, which a level line fits exactly, SciPy does not know the error.
+    slope_error = 0.0 if min(y) == max(y) else float(line.stderr)
+    return Line(float(line.slope), slope_error, float(np.exp(line.intercept)))
 
 
 def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:

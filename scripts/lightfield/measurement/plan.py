@@ -147,11 +147,16 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
 
 
 def sums_row(expected: Sequence[Expected]) -> str:
-    """Return the table's last row: the sums over all datasets."""
+    """Return the table's last row: the sums over all datasets.
+
+    Times of a core and of a graphics card have no sum.
+    """
     views = sum(dataset.views for dataset in expected)
+    size = sum(dataset.bytes for dataset in expected)
+    if 0 < len(on_card(expected)) < len(expected):
+        return f"| all | {views} | | | | — | {_times([None, None])} | {size_text(size)} |"
     seconds = sum(dataset.seconds for dataset in expected)
     error = math.hypot(*(dataset.views * dataset.view_error for dataset in expected))
-    size = sum(dataset.bytes for dataset in expected)
     columns = zip(*(dataset.cheaper_seconds for dataset in expected), strict=True)
     cheaper = [None if None in column else sum(column) for column in columns]
     return (
@@ -160,10 +165,21 @@ def sums_row(expected: Sequence[Expected]) -> str:
     )
 
 
+def on_card(expected: Sequence[Expected]) -> list[str]:
+    """Return the names of the datasets whose probes a graphics card rendered."""
+    return [dataset.name for dataset in expected if dataset.probe["device"] != "CPU"]
+
+
 def device_of(expected: Sequence[Expected]) -> str:
     """Return the device of the times, and how long this machine's cores take."""
-    if any(dataset.probe["device"] != "CPU" for dataset in expected):
+    names = on_card(expected)
+    if len(names) == len(expected):
         return "Times of the graphics card."
+    if names:
+        return (
+            f"Times of the graphics card for {', '.join(names)}, and of one processor core for "
+            "the others. They have no sum."
+        )
     cores = processors.available()
     seconds = sum(dataset.seconds for dataset in expected) / cores
     return f"Times of one processor core; this machine's {cores} take {time_text(seconds)}."

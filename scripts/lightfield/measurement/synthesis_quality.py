@@ -20,6 +20,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
@@ -59,16 +60,20 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
         fewer = make(subset, read)
         yield Variant("views", str(len(subset)), fewer, BEST, sum(sizes[v.name] for v in subset))
     for best in (1, 2, 4, 8):
-        yield Variant("best", str(best), all_views, best, size)
+        if best <= len(views):
+            yield Variant("best", str(best), all_views, best, size)
     for part in (2, 4):
+        if part > min(lens.width, lens.height):
+            break
         small = lens.resized(lens.width // part, lens.height // part)
 
-        def shrunk(view: View, small: Lens = small, part: int = part) -> tuple[Array, Array]:
+        def shrunk(view: View, small: Lens = small) -> tuple[Array, Array]:
             colour, distance = read(view)
-            first = part // 2
-            return pictures.shrunk(np.nan_to_num(colour), small.width, small.height), distance[
-                first::part, first::part
-            ][: small.height, : small.width]
+            # The pixels in which the middles of the small pixels lie.
+            rows = (2 * np.arange(small.height) + 1) * lens.height // (2 * small.height)
+            columns = (2 * np.arange(small.width) + 1) * lens.width // (2 * small.width)
+            small_colour = pictures.shrunk(np.nan_to_num(colour), small.width, small.height)
+            return small_colour, distance[np.ix_(rows, columns)]
 
         coarse = Sources(small, views, shrunk, fills_holes=fills_holes)
         yield Variant(
@@ -110,7 +115,8 @@ def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[
 def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]:
     """Return the pixels (h, w) of each region of a true view, out of those ``inside`` the lens.
 
-    If the view has the passes of all kinds of light, each kind has a region.
+    If the view has the passes of all kinds of light, each kind has a region. Black pixels show
+    none.
     """
     by_region = {WHOLE: inside}
     if {*PARTS_OF_LIGHT} <= {render_pass.name for render_pass in truth.lightfield.passes}:
@@ -119,7 +125,8 @@ def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]
         light = np.array([images.read_image(path, "RGB").colour.mean(axis=-1) for path in paths])
         most = light.argmax(axis=0)
         for number, name in enumerate(PARTS_OF_LIGHT):
-            by_region[name.removesuffix("_light")] = inside & (most == number)
+            is_most = (most == number) & (light[number] > 0)
+            by_region[name.removesuffix("_light")] = inside & is_most
     return {name: pixels for name, pixels in by_region.items() if pixels.any()}
 
 
@@ -139,6 +146,7 @@ def compare(
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
     angles = metrics.solid_angles(truth.lens)
+    weights = angles if isinstance(truth.lens, Equirectangular) else None
     cameras = np.array([view.matrix for view in around])
     eyes = np.array([view.matrix for view in views])
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
@@ -164,7 +172,7 @@ def compare(
                 "psnr": metrics.ws_psnr(true_picture, picture, pixels),
                 "psnr_black": metrics.ws_psnr(true_picture, black, pixels),
                 "ws_psnr": metrics.ws_psnr(true_picture, picture, np.where(pixels, angles, 0)),
-                "iv_psnr": metrics.iv_psnr(true_picture, picture, pixels),
+                "iv_psnr": metrics.iv_psnr(true_picture, picture, pixels, weights),
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
                 "flip_black": float(black_flips[pixels].mean()),

@@ -99,7 +99,7 @@ def _statistics(
         "farthest_metres": [farthest for _, farthest in depths],
     }
     for name in ("brightness", "over_exposed", "covered"):
-        distributions[name] = [entry[name] for entry in valid if name in entry]
+        distributions[name] = [entry[name] for entry in valid if entry.get(name) is not None]
     return {
         "members": len(members),
         "valid": len(valid),

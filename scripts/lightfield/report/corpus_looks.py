@@ -102,20 +102,21 @@ def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
     - ``depth``: the least and the largest distance in metres, or null without any surface.
     - ``brightness``: the mean luminance of what is visible; transparent pixels do not count.
     - ``over_exposed``: the share of this beyond 1 in a channel.
-    - ``covered``: the share of the pixels that show a surface.
+    - ``covered``: the share of the pixels that show a surface, or null without depth.
     - ``thumbnail``: the SHA-256 of the thumbnail.
     """
     datasets = [folder / member.name / rig for rig in sorted(member.datasets)]
     views = [view for dataset in datasets for view in _measured_views(dataset)]
     opacity = sum(view["opacity"] for view in views)
     depths = [depth for view in views for depth in view["depth"]]
+    covered = [view["covered"] for view in views if view["covered"] is not None]
     content = _webp(views[len(views) // 2]["image"])
     write_bytes(thumbnail(folder, member.name), content)
     return {
         "depth": [round(min(depths), 4), round(max(depths), 4)] if depths else None,
         "brightness": _share(sum(view["light"] for view in views), opacity),
         "over_exposed": _share(sum(view["over_exposed"] for view in views), opacity),
-        "covered": round(float(np.mean([view["covered"] for view in views])), 4),
+        "covered": round(float(np.mean(covered)), 4) if covered else None,
         "thumbnail": hashlib.sha256(content).hexdigest(),
     }
 
@@ -157,7 +158,7 @@ def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
         "light": float(pictures.luminance(colour).sum(dtype=np.float64)),
         "over_exposed": float(alpha[(colour > 1).any(axis=-1)].sum(dtype=np.float64)),
         "depth": [float(hit.min()), float(hit.max())] if hit.size else [],
-        "covered": hit.size / distance.size,
+        "covered": hit.size / distance.size if "Z" in image.channels else None,
     }
 
 

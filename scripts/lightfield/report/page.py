@@ -71,11 +71,13 @@ def plot(stem: Path) -> str | None:
 
 def bytes_(value: float) -> str:
     """Return a number of bytes as text: 12.3 MB."""
-    for unit in ("bytes", "kB", "MB", "GB"):
+    if value == 1:
+        return "1 byte"
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if value < 999.5:
             return f"{value:.3g} {unit}"
         value /= 1000
-    return f"{value:.3g} TB"
+    return f"{value:.3g} PB"
 
 
 def seconds(value: float) -> str:
@@ -87,10 +89,12 @@ def number(value: float) -> str:
     """Return a number as text with a few digits, in powers of ten if it is very small or large."""
     if not math.isfinite(value):
         return "∞" if value > 0 else "–"
-    if value != 0 and not 1e-3 <= abs(value) < 1e5:
+    if 9999.5 <= abs(value) < 99999.5:
+        return f"{value:.0f}"
+    if value != 0 and not 1e-3 <= abs(value) < 9999.5:
         mantissa, exponent = f"{value:.2e}".split("e")
         return f"{mantissa}·10{_superscript(int(exponent))}"
-    return f"{value:.4g}"
+    return f"{value:z.4g}"
 
 
 def cell(value: Any) -> str:

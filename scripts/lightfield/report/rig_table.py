@@ -150,9 +150,12 @@ def _differences(setups: Sequence[Setup]) -> list[str]:
         views, distance = setup.printed
         where = f"- {setup.scene}/{setup.rig}:"
         if setup.views != views:
-            differences.append(f"{where} {setup.views} views, printed {views}.")
-        if round(100 * setup.nearest) != distance:
-            same = round(100 * setup.neighbours) == distance
+            computed = "1 view" if setup.views == 1 else f"{setup.views} views"
+            differences.append(f"{where} {computed}, printed {views}.")
+        if math.isnan(setup.nearest):
+            differences.append(f"{where} its camera has no neighbour, printed {distance} cm.")
+        elif round(100 * setup.nearest) != distance:
+            same = not math.isnan(setup.neighbours) and round(100 * setup.neighbours) == distance
             differences.append(
                 f"{where} the nearest camera is {_centimetres(setup.nearest)} away on average, "
                 f"printed {distance} cm; the mean over all neighbours, "

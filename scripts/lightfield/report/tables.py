@@ -216,7 +216,7 @@ def _slopes(slopes: Mapping[str, Any]) -> Table:
     def text(fit: Any) -> str | None:
         if not isinstance(fit, Mapping) or "slope" not in fit:
             return None
-        return f"{fit['slope']:.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
+        return f"{fit['slope']:z.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
 
     rows = []
     for method, fits in slopes.items():

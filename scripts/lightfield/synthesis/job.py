@@ -62,9 +62,10 @@ def run(arguments: argparse.Namespace) -> None:
                 add_to_video(picture)
             holes.append(made.hole_fraction(rays))
             progress.done()
+    made_views = "1 view" if len(holes) == 1 else f"{len(holes)} views"
     print(
-        f"{len(holes)} views of {arguments.best} each; holes: {np.mean(holes):.3%} of their "
-        f"pixels, at most {max(holes):.3%} of one"
+        f"{made_views} of {min(arguments.best, len(views))} each; holes: {np.mean(holes):.3%} of "
+        f"their pixels, at most {max(holes):.3%} of one"
     )
 
 
