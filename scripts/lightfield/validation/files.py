@@ -105,7 +105,14 @@ class ImageSet:
     def camera(self, view: int) -> Camera:
         depth = self.lightfield.depth
         assert depth is not None
-        return Camera(self.lightfield.lens, self.lightfield.matrices[view], depth, self.grain)
+        lens = self.lightfield.lens
+        return Camera(lens, self.lightfield.matrices[view], depth, self.grain, self._spacing)
+
+    @cached_property
+    def _spacing(self) -> int:
+        """How many of its pixels are as wide as a pixel of a source view, in the middle."""
+        angle = _central_angle(self.lightfield.lens)
+        return math.ceil(self.grain / angle) if self.grain > angle > 0 else 1
 
 
 @dataclass(frozen=True)

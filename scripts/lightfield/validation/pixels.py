@@ -16,7 +16,7 @@ from lightfield.dataset.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency, depth_questions, light_sums
+from lightfield.validation import consistency, depth_questions, light_sums, reprojected
 from lightfield.validation.consistency import Answer, Patches
 from lightfield.validation.depth_questions import Question
 from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
@@ -48,6 +48,7 @@ class Facts:
     - ``clamped``, ``nan``: how many rendered values were clamped, or were not a number.
     - ``machine``: the machine that rendered the view.
     - ``marked``: whether the pixels without a source could be checked.
+    - ``compared``: whether a reprojected view was compared with the rendered one.
     - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
@@ -63,6 +64,7 @@ class Facts:
     nan: int | None = None
     machine: str | None = None
     marked: bool = False
+    compared: bool = False
     constant: bool = False
     missed: float = 0.0
     patches: Patches | None = None
@@ -166,6 +168,7 @@ class Examiner:
             facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
         if not is_rendered:
             self._compare_marks(file, image, facts)
+            self._compare_with_source(file, image, facts)
         elif images.NAN_ATTRIBUTE in image.attributes:
             facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
@@ -305,6 +308,27 @@ class Examiner:
         coloured = any(image.channels[name][without].any() for name in "RGB")
         facts.fault("marks", "has colour in pixels without a source", coloured)
 
+    def _compare_with_source(self, file: File, image: images.Image, facts: Facts) -> None:
+        """Check that a reprojected view shows what the rendered view shows."""
+        target = self.sets[file.set]
+        source = rendered(self.sets)
+        number = source_view(source, target.views[file.view])
+        if source is None or number is None:
+            return
+        name = f"{IMAGES}/{source.views[number]}.exr"
+        try:
+            original = images.read_image(self.dataset / name)
+        except UserError:
+            return  # The check of the images reports it.
+        problem = _format_problem(File(name, 0, number), source, original)
+        height, width = next(iter(original.channels.values())).shape
+        lens = source.lightfield.lens
+        if problem or (width, height) != (lens.width, lens.height):
+            return
+        facts.compared = True
+        for text in reprojected.faults(target, file.view, image, source, number, original):
+            facts.fault("source", f"{text} {name}")
+
     def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
         """Return where the lens has a ray, and where it has none. Both exclude the rim."""
         if lens not in self.regions:
@@ -360,8 +384,12 @@ def checks(
         checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
     if image_set.name:
         marked = {file: fact for file, fact in readable.items() if fact.marked}
-        text = "mark the pixels that their source cannot see"
-        return [*checks, _outcome(image_set, "marks", marked, text)]
+        compared = {file: fact for file, fact in readable.items() if fact.compared}
+        return [
+            *checks,
+            _outcome(image_set, "marks", marked, "mark the pixels that their source cannot see"),
+            _outcome(image_set, "source", compared, "show what their source shows"),
+        ]
     if volumes and with_depth:
         missed = sum(fact.missed for fact in with_depth.values()) / len(with_depth)
         names = ", ".join(volumes[:8]) + (" …" if len(volumes) > 8 else "")
