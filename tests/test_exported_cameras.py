@@ -597,6 +597,30 @@ def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
 
 
 @pytest.mark.parametrize(
+    ("name", "kind", "file"),
+    [
+        ("perspective", "instant_ngp", "transforms.json"),
+        ("perspective", "nerfstudio", "transforms.json"),
+        ("fisheye", "lichtfeld", "transforms.json"),
+        ("perspective", "poses_csv", "poses.csv"),
+    ],
+)
+def test_an_export_without_views_is_named(name, kind, file, dataset):
+    path = home(dataset, name) / ("" if kind == "instant_ngp" else f"exports/{kind}") / file
+    right = path.read_bytes()
+    if path.suffix == ".csv":
+        path.write_bytes(right.partition(b"\n")[0] + b"\n")
+    else:
+        write_json(path, read_json(path) | {"frames": []})
+    try:
+        assert any(
+            f"this export for {kind} has no view" in line for line in problems(dataset, name, kind)
+        )
+    finally:
+        path.write_bytes(right)
+
+
+@pytest.mark.parametrize(
     ("name", "kind", "file", "old", "new", "said"),
     [
         ("perspective", "instant_ngp", "", "view_0003f.exr", "view_0002f.exr", "lacks view_0003f"),

@@ -177,6 +177,29 @@ def test_validation_checks_flow(what, computed, tmp_path):
     assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
 
 
+WRONG_FLOW = {
+    "negated": (lambda c: {**c, "X": -c["X"], "Y": -c["Y"]}, "not where their depth puts them"),
+    "axes swapped": (lambda c: {**c, "X": c["Y"], "Y": c["X"]}, "not where their depth puts them"),
+    "mirrored": (lambda c: {k: np.fliplr(v) for k, v in c.items()}, "not where their depth"),
+    "a tenth of a pixel off": (
+        lambda c: {**c, "X": c["X"] + np.float32(0.1) * (c["V"] == 1)},
+        "not where their depth puts them",
+    ),
+    "mask the other way round": (lambda c: {**c, "V": 1 - c["V"]}, ""),
+    "all hidden": (lambda c: {**c, "V": 0 * c["V"]}, "values of V are not what the depth"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG_FLOW)
+def test_flow_that_contradicts_the_depth_of_both_views_is_named(what, computed, tmp_path):
+    folder = shutil.copytree(computed, tmp_path / "dataset")
+    path = folder / "flow/view_0000f_to_view_0001f.exr"
+    change, problem = WRONG_FLOW[what]
+    images.write_exr(path, change(dict(images.read_image(path).channels)))
+    (said,) = flow_check(folder).problems
+    assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
+
+
 @pytest.mark.parametrize("changed", ["view_0000f", "view_0001f"])
 def test_flow_follows_a_change_of_either_view(changed, computed, tmp_path, run_program):
     folder = shutil.copytree(computed, tmp_path / "dataset")

@@ -762,6 +762,11 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
     ),
     "a name twice": (bad_frame("name", "view_0000f"), "view_0000f: is the name of two frames"),
     "rotation of another": (bad_frame("rotation", [0, 0, 0]), "world_matrix"),
+    "poses of another exposure": (
+        bad_frame("exposure", {"start": np.eye(4).tolist(), "end": np.eye(4).tolist()}),
+        "exposure: has not the pose",
+    ),
+    "no poses of an exposure": (bad_frame("exposure", {"start": 1}), "exposure: has not the pose"),
     "mirrored axis": (
         listed(turn([BAD], np.diag([-1.0, 1.0, 1.0]))),
         "view_0002f: world_matrix: is not that of its position and rotation",

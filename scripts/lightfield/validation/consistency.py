@@ -311,7 +311,7 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     verdict[residual < -tolerance] = OCCLUDED
     verdict[residual > tolerance] = CONTRADICT
     rough = np.flatnonzero(~smooth)
-    nearest, farthest = _recorded_range(camera, depth, columns[rough], rows[rough])
+    nearest, farthest = recorded_range(camera, depth, columns[rough], rows[rough])
     distance = np.linalg.norm(queried.points[rough] - camera.position, axis=1)
     slack = tolerance[rough] + footprint[rough]
     verdict[rough] = AGREE
@@ -335,7 +335,7 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     )
 
 
-def _recorded_range(
+def recorded_range(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Return the least and largest distance in 3 × 3 pixels. NaN where a pixel has no source."""

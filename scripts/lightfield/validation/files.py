@@ -15,7 +15,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset_paths import REPORT_FILES
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.dataset.sensors import (
     BRACKET_FILES,
@@ -24,6 +24,7 @@ from lightfield.dataset.sensors import (
     settings_in,
 )
 from lightfield.geometry import rotations
+from lightfield.geometry.exposure import pose_between
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
 from lightfield.validation.result import Check
@@ -187,6 +188,8 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
         )
         if not difference < tolerance:
             faults[view.name] = "world_matrix: is not that of its position and rotation"
+        elif _moves_elsewhere(view, tolerance):
+            faults[view.name] = "exposure: has not the pose of world_matrix in its middle"
         elif source:
             number = source_view(source, view.name)
             if number is None:
@@ -201,6 +204,17 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
         [*faults],
         [f"{path}: frames: {view}: {fault}" for view, fault in faults.items()],
     )
+
+
+def _moves_elsewhere(view: View, tolerance: float) -> bool:
+    """Return whether a moving camera is not at the view's pose in the middle of its exposure."""
+    try:
+        if view.exposure is None:
+            return False
+        middle = pose_between(*view.exposure, 0.5)
+        return not np.abs(middle - view.matrix).max() < tolerance
+    except (LookupError, TypeError, ValueError):
+        return True  # These are no two matrices.
 
 
 def _central_angle(lens: Lens) -> float:

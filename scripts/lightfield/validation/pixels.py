@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
 from lightfield.dataset.passes import MANIFEST, NAMES, Pass
-from lightfield.geometry.flow import in_frame
+from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency, depth_questions, light_sums, reprojected
@@ -36,6 +36,10 @@ NOT_UNIT = 1e-4
 # Outside the image circle, at most this part of the values may exceed FAINT.
 MOST_LIT_OUTSIDE = 0.05
 FAINT = 0.001
+# A flow may be this many pixels off the place that follows from depth.
+FLOW_OFF = 0.01
+# A point is hidden if it is farther away than this factor times the farthest surface around.
+HIDDEN = 1.011
 # Regions of this many differently turned views are kept in memory.
 MOST_REGIONS = 16
 
@@ -259,21 +263,63 @@ class Examiner:
             lens = self.sets[file.set].lightfield.lens
             wrong = int((visible & ~in_frame(lens, pixels[:2])).sum())
             facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
+            for text in self._flow_faults(file, pixels, visible):
+                facts.fault("passes", text)
+
+    def _flow_faults(self, file: File, flow: NDArray[Any], visible: Bools) -> Iterator[str]:
+        """Yield how a ``flow`` (3, h, w) differs from what follows from the depth of two views."""
+        image_set = self.sets[file.set]
+        target = image_set.numbers.get(image_set.lightfield.views[file.view].others["flow"])
+        depth = self._depth(image_set, file.view)
+        if target is None:
+            yield "leads to no view"
+            return
+        target_depth = self._depth(image_set, target)
+        if depth is None or target_depth is None:
+            return  # Another check reports it.
+        camera = image_set.camera(file.view)
+        other = image_set.camera(target)
+        rows, columns = np.nonzero(np.isfinite(depth) & np.isfinite(flow).all(axis=0))
+        points = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
+        places = np.stack([columns, rows], axis=-1) + 0.5 + flow[:2, rows, columns].T
+        is_visible = visible[rows, columns]
+        off = other.pixels(points) - places
+        off[:, 0] = shorter(other.lens, off[:, 0])
+        wrong = int((is_visible & ~(np.abs(off) <= FLOW_OFF).all(axis=-1)).sum())
+        if wrong:
+            yield f"{wrong} visible points are not where their depth puts them"
+            return
+        # Only where the other view has 3 × 3 pixels around.
+        inside = ((places >= 1) & (places < [other.lens.width - 1, other.lens.height - 1])).all(
+            axis=-1
+        )
+        column, row = np.floor(places[inside]).astype(np.int64).T
+        nearest, farthest = consistency.recorded_range(other, target_depth, column, row)
+        distance = np.linalg.norm(points[inside] - other.position, axis=-1)
+        is_hidden = distance > HIDDEN * farthest
+        is_open = distance <= nearest
+        wrong = int(np.where(is_visible[inside], is_hidden, is_open).sum())
+        if wrong:
+            yield f"{wrong} values of V are not what the depth of both views says"
+
+    def _depth(self, image_set: ImageSet, view: int) -> NDArray[Any] | None:
+        """Return the depth (height, width) of a view of a set. None if it has none of its size."""
+        if image_set.lightfield.depth is None:
+            return None
+        lens = image_set.lightfield.lens
+        path = self.dataset / image_set.folder / f"{image_set.views[view]}.exr"
+        try:
+            depth = images.read_image(path, ["Z"]).channels["Z"]
+        except UserError:
+            return None
+        return depth if depth.shape == (lens.height, lens.width) else None
 
     def _misses(self, file: File) -> Bools | None:
         """Return where the rendered view of a pass hits nothing. None without its depth."""
         image_set = self.sets[file.set]
-        lens = image_set.lightfield.lens
-        if image_set.name or not image_set.lightfield.depth:
-            return None
-        try:
-            path = self.dataset / f"{IMAGES}/{image_set.views[file.view]}.exr"
-            depth = images.read_image(path, ["Z"]).channels["Z"]
-        except UserError:
-            return None  # The check of the images reports it.
+        depth = None if image_set.name else self._depth(image_set, file.view)
         # In half floats, inf may also be a depth of more than 65504 m.
-        is_certain = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
-        return np.isposinf(depth) if is_certain else None
+        return np.isposinf(depth) if depth is not None and depth.dtype == np.float32 else None
 
     def _numbers(self, view_pass: Pass) -> set[int]:
         """Return the numbers in the names file of a pass. Empty if it cannot be read."""
