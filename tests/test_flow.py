@@ -144,6 +144,16 @@ def check_warp(dataset, flow):
     assert np.median(error) < 1e-3
 
 
+@pytest.mark.parametrize("rig", [ROW, {"type": "cuboid", "cameras": [1, 1, 1], "size": 0.5}])
+@pytest.mark.parametrize("name", LENSES)
+def test_flow_of_every_lens_agrees_with_the_depth_of_both_views(name, rig, tmp_path, run_program):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES[name] | {"resolution": [48, 24 if name == "panorama" else 48]}, rig)
+    LightField.read(folder / "lightfield.json").with_flow().write(folder / "lightfield.json")
+    run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    assert flow_check(folder).passed
+
+
 SPOILED = {
     "missing": (None, "is missing"),
     "mask": ({"V": 0.5}, "2304 values of V are neither 0 nor 1"),

@@ -285,20 +285,21 @@ class Examiner:
         is_visible = visible[rows, columns]
         off = other.pixels(points) - places
         off[:, 0] = shorter(other.lens, off[:, 0])
-        wrong = int((is_visible & ~(np.abs(off) <= FLOW_OFF).all(axis=-1)).sum())
+        # NaN where the other view has no ray to a point.
+        is_there = (np.abs(off) <= FLOW_OFF).all(axis=-1)
+        wrong = int((is_visible & ~is_there).sum())
         if wrong:
             yield f"{wrong} visible points are not where their depth puts them"
             return
         # Only where the other view has 3 × 3 pixels around.
-        inside = ((places >= 1) & (places < [other.lens.width - 1, other.lens.height - 1])).all(
-            axis=-1
-        )
-        column, row = np.floor(places[inside]).astype(np.int64).T
+        last = np.array([other.lens.width, other.lens.height]) - 1
+        compared = is_there & ((places >= 1) & (places < last)).all(axis=-1)
+        column, row = np.floor(places[compared]).astype(np.int64).T
         nearest, farthest = consistency.recorded_range(other, target_depth, column, row)
-        distance = np.linalg.norm(points[inside] - other.position, axis=-1)
+        distance = np.linalg.norm(points[compared] - other.position, axis=-1)
         is_hidden = distance > HIDDEN * farthest
         is_open = distance <= nearest
-        wrong = int(np.where(is_visible[inside], is_hidden, is_open).sum())
+        wrong = int(np.where(is_visible[compared], is_hidden, is_open).sum())
         if wrong:
             yield f"{wrong} values of V are not what the depth of both views says"
 
