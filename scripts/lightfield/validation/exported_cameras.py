@@ -165,6 +165,7 @@ def check(
             views += len(exported.views)
             problems += exported.faults
             problems += faults(exported, expected)
+            problems += _missing_parts(path, expected)
             if cube and not cube.fits_depth:
                 problems += unit_cube.faults(cube, image_set.lightfield.matrices)
         if paths:
@@ -194,6 +195,17 @@ def faults(exported: Exported, expected: Expected) -> Iterator[str]:
         yield from _name_faults(exported, expected)
     for part in exported.parts:
         yield from _different_names(part.place, part.names, expected.parts[part.part], expected)
+
+
+def _missing_parts(path: Path, expected: Expected) -> Iterator[str]:
+    """Yield the lists for instant-ngp that a transforms.json lacks: one of each part's views."""
+    if path.name != "transforms.json":
+        return
+    for part in PARTS:
+        has_views = any(view.split == part for view in expected.image_set.lightfield.views)
+        list_of_part = path.with_stem(f"{path.stem}_{part}")
+        if has_views and not list_of_part.is_file():
+            yield f"{list_of_part}: is missing, but {expected.path} has views for {part}"
 
 
 def _lens_fault(camera: Camera, lens: Lens) -> str | None:
