@@ -1088,3 +1088,73 @@ def test_depth_is_compared_where_a_set_has_its_views_as_png_too(dataset, tmp_pat
     assert picture_problems(folder, "perspective", "nerfstudio") == []
     DOUBLED(folder / "perspective/exports/nerfstudio/depths" / f"{VIEW}.png")
     assert len(picture_problems(folder, "perspective", "nerfstudio")) == 1
+
+
+# ---- boxes ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def boxed(tmp_path_factory):
+    """Three views with a pass of two objects each, and their boxes."""
+    folder = tmp_path_factory.mktemp("boxed") / "scene" / "dataset"
+    write_views(folder, LENSES["perspective"], {"type": "lattice", "cameras": [3, 1, 1], "size": 1})
+    lightfield = LightField.read(folder / "lightfield.json").changed(passes=["object"])
+    lightfield.write(folder / "lightfield.json")
+    for index, view in enumerate(lightfield.views):
+        numbers = np.ones((48, 64), np.uint32)
+        numbers[10 : 20 + index, 30:35] = 2
+        images.write_exr(folder / "object" / f"{view.name}.exr", {"Y": numbers})
+    write_json(folder / "object" / "names.json", {"Wall": 1, "Ball": 2})
+    write_export(folder, "views", "coco", {})
+    return folder
+
+
+def swap_images(content):
+    first, second, _ = content["images"]
+    first["file_name"], second["file_name"] = second["file_name"], first["file_name"]
+
+
+WRONG_BOXES = {
+    "two images swapped": (swap_images, "is not the box of its object"),
+    "last image missing": (lambda content: content["images"].pop(), "view_0002f 0 times"),
+    "an image twice": (
+        lambda content: content["images"].append(content["images"][0] | {"id": 9}),
+        "view_0000f 2 times",
+    ),
+    "a box missing": (lambda content: content["annotations"].pop(), "lacks 1"),
+    "a box twice": (
+        lambda content: content["annotations"].append(content["annotations"][-1] | {"id": 99}),
+        "has 3 boxes of 2 objects",
+    ),
+    "a pixel wider": (
+        lambda content: content["annotations"][1]["bbox"].__setitem__(2, 6),
+        "annotations: 2: is not the box of its object",
+    ),
+    "rows for columns": (
+        lambda content: content["annotations"][1].update(bbox=[10, 30, 10, 5]),
+        "annotations: 2: is not the box of its object",
+    ),
+    "another object": (
+        lambda content: content["annotations"][1].update(category_id=1),
+        "annotations: 2: is not the box of its object",
+    ),
+    "another area": (
+        lambda content: content["annotations"][1].update(area=49),
+        "annotations: 2: is not the box of its object",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_BOXES)
+def test_boxes_that_the_passes_do_not_show_are_named(case, boxed):
+    assert problems(boxed, "views", "coco") == []
+    path = boxed / "exports/coco/instances.json"
+    right = path.read_bytes()
+    content = read_json(path)
+    change, said = WRONG_BOXES[case]
+    change(content)
+    write_json(path, content)
+    try:
+        assert any(said in problem for problem in problems(boxed, "views", "coco"))
+    finally:
+        path.write_bytes(right)

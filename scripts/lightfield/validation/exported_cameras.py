@@ -20,7 +20,7 @@ from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation import unit_cube
+from lightfield.validation import exported_boxes, unit_cube
 from lightfield.validation.files import ImageSet, Manifest, lists_of
 from lightfield.validation.readers import read
 from lightfield.validation.readers.cameras import Camera, PolynomialFisheye
@@ -166,6 +166,7 @@ def check(
             problems += exported.faults
             problems += faults(exported, expected)
             problems += _missing_parts(path, expected)
+            problems += exported_boxes.faults(exported, dataset, image_set)
             if cube and not cube.fits_depth:
                 problems += unit_cube.faults(cube, image_set.lightfield.matrices)
         if paths:

@@ -125,6 +125,29 @@ class Cloud:
 
 
 @dataclass(frozen=True)
+class Box:
+    """What an annotation says: its ``number``, left, top, width and height, and area in pixels.
+
+    ``category`` is the number of an object, and ``instance`` that of its instance.
+    """
+
+    number: int
+    sides: tuple[float, ...]
+    area: float
+    category: int
+    instance: int
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The ``boxes`` of a ``view``. ``place`` is the file that has them."""
+
+    place: str
+    view: str
+    boxes: list[Box]
+
+
+@dataclass(frozen=True)
 class Flow:
     """An image of a view's scene flow: X, Y, Z in metres, and V, which is 1 where it is known."""
 
@@ -152,10 +175,9 @@ class UnitCube:
 class Exported:
     """One export.
 
-    ``views_of`` names the part of the split whose views it holds. None for all views. ``flows`` is
-    None for an export without flow. ``faults``
-    are lines about contradictions in its files, and with what its consumer needs. Each line names
-    the file.
+    ``views_of`` names the part of the split whose views it holds. None for all views. ``boxes`` and
+    ``flows`` are None for an export without them. ``faults`` are lines about contradictions in its
+    files, and with what its consumer needs. Each line names the file.
     """
 
     views: list[ExportedView] = field(default_factory=list)
@@ -166,6 +188,7 @@ class Exported:
     depth_map: DepthMap | None = None
     pictures: list[Picture] = field(default_factory=list)
     clouds: list[Cloud] = field(default_factory=list)
+    boxes: list[Boxes] | None = None
     flows: list[Flow] | None = None
     cube: UnitCube | None = None
     faults: list[str] = field(default_factory=list)
