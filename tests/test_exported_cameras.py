@@ -1090,6 +1090,36 @@ def test_depth_is_compared_where_a_set_has_its_views_as_png_too(dataset, tmp_pat
     assert len(picture_problems(folder, "perspective", "nerfstudio")) == 1
 
 
+@pytest.mark.parametrize(
+    "kind", ["colmap", "nerfstudio", "nerf_synthetic", "opendibr", "miv", "lichtfeld", "hci"]
+)
+@pytest.mark.parametrize("transparent", [False, True])
+def test_developed_and_transparent_pictures_show_their_views(transparent, kind, tmp_path):
+    folder = tmp_path / "scene" / "dataset"
+    write_views(folder, VIEWS, RIG, see=look_at_ball)
+    write_views(folder / "flat", LENSES["perspective"], RIG, see=look_at_ball)
+    lightfield = LightField.read(folder / "flat/lightfield.json")
+    if transparent:
+        lightfield = lightfield.changed(render={"transparent": True})
+        lightfield.write(folder / "flat/lightfield.json")
+    rng = np.random.default_rng(0)
+    for view in lightfield.views:
+        path = folder / "flat" / f"{view.name}.exr"
+        channels = dict(images.read_image(path).channels)
+        alpha = np.clip(1.5 * rng.random((48, 64)) - 0.25, 0, 1).astype(np.float16)
+        for name in "RGB":
+            light = channels[name] * 2.0 ** rng.integers(-12, 9, (48, 64))
+            channels[name] = (light * (alpha if transparent else 1)).astype(np.float16)
+        if transparent:
+            channels["A"] = alpha
+        images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: lightfield.depth})
+    options = {"exposure": -2.5, "reinhard": 3}
+    settings = TypeAdapter(settings_of(kind)).validate_python({"sources": ["flat"], **options})
+    source = SourceDataset(folder, "flat", ".exr", **options)
+    export.run(kind, source, settings, folder / "flat" / "exports" / kind)
+    assert picture_problems(folder, "flat", kind) == []
+
+
 # ---- boxes ----------------------------------------------------------------------------------
 
 

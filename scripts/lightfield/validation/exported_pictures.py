@@ -183,12 +183,16 @@ class _ShownView:
         return np.asarray(alpha / largest, np.float64)
 
     def encoded(self, picture: Picture) -> Floats:
-        """Return the sRGB colour (height, width, 3), 0 to 1, as an export develops it."""
+        """Return the sRGB colour (height, width, 3), 0 to 1, as an export develops it.
+
+        Video has no alpha. There a transparent view is in front of black.
+        """
         if self.is_encoded:
             planes = [self.image.channels[name] for name in "RGB"]
             return np.stack(planes, axis=-1) / np.iinfo(planes[0].dtype).max
         light = self.image.colour.astype(np.float64)
-        light /= np.where(self.alpha > 0, self.alpha, 1)[..., None]
+        if picture.kind != "luma":
+            light /= np.where(self.alpha > 0, self.alpha, 1)[..., None]
         exposure, white = picture.development
         brighter = np.maximum(light, 0) * np.exp2(exposure)
         # A white of 1 changes nothing. Source: Reinhard et al. 2002, equation 4.
