@@ -762,6 +762,10 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
     ),
     "a name twice": (bad_frame("name", "view_0000f"), "view_0000f: is the name of two frames"),
     "rotation of another": (bad_frame("rotation", [0, 0, 0]), "world_matrix"),
+    "a part that no split has": (
+        bad_frame("split", "val"),
+        "split: is 'val'; must be train, validation, test, or missing",
+    ),
     "poses of another exposure": (
         bad_frame("exposure", {"start": np.eye(4).tolist(), "end": np.eye(4).tolist()}),
         "exposure: has not the pose",

@@ -26,6 +26,7 @@ from lightfield.dataset.sensors import (
 from lightfield.geometry import rotations
 from lightfield.geometry.exposure import pose_between
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.consistency import Camera
 from lightfield.validation.result import Check
 
@@ -175,7 +176,10 @@ def source_view(source: ImageSet | None, name: str) -> int | None:
 
 
 def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
-    """Check that each pose is rigid, the same in both forms, and at its source's position."""
+    """Check each view's pose and split.
+
+    A pose is rigid, the same in both forms, and at its source's position.
+    """
     views = image_set.lightfield.views
     # Blender keeps poses in float32.
     tolerance = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
@@ -188,6 +192,8 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
         )
         if not difference < tolerance:
             faults[view.name] = "world_matrix: is not that of its position and rotation"
+        elif view.split not in (None, *PARTS):
+            faults[view.name] = f"split: is {view.split!r}; must be {', '.join(PARTS)}, or missing"
         elif _moves_elsewhere(view, tolerance):
             faults[view.name] = "exposure: has not the pose of world_matrix in its middle"
         elif source:
