@@ -1252,6 +1252,16 @@ def test_a_reprojected_view_that_shows_something_else_is_named(
     assert problem.endswith(f" exr/{view}.exr")
 
 
+def test_negative_light_as_of_saturated_colours_may_be_reprojected(magnified_dataset: Path) -> None:
+    def negative(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {**channels, "R": np.full_like(channels["R"], -0.2)}
+
+    repaint(magnified_dataset, names(magnified_dataset)[0], negative)
+    repaint_flat(magnified_dataset, ".exr", negative)
+    repaint_flat(magnified_dataset, ".png", lambda channels: {**channels, "R": 0 * channels["R"]})
+    assert check(validate(magnified_dataset, ["flat"]), "flat/source").passed
+
+
 def test_two_reprojected_views_that_are_swapped_are_named(magnified_dataset: Path) -> None:
     first, _, last = (magnified_dataset / "flat" / f"{n}.exr" for n in names(magnified_dataset))
     first_bytes = first.read_bytes()

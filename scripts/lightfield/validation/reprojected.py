@@ -89,9 +89,10 @@ def faults(
 
 
 def _has_same_light(target: ImageSet) -> bool:
-    """Return whether the views show the light of their source, with no more than tone mapping."""
+    """Return whether the views show the light of their source, with a known tone mapping."""
     lightfield = target.lightfield
-    return not (lightfield.is_relit or lightfield.transparent or target.sensor)
+    is_changed = lightfield.is_relit or lightfield.transparent or target.sensor is not None
+    return "reprojection" in lightfield.content and not is_changed
 
 
 def _wrong_colours(
@@ -120,7 +121,8 @@ def _wrong_colours(
         low = _developed(window.min(axis=(1, 2)), target, is_encoded)
         high = _developed(window.max(axis=(1, 2)), target, is_encoded)
         slack = OVERSHOOT * (high - low) + (STEP if is_encoded else ROUNDING * (1e-2 + high))
-        values = pixels[chosen]
+        # The limits are clipped, too: saturated colours of other primaries may be negative.
+        values = np.maximum(pixels[chosen], 0)
         parts.append(((values < low - slack) | (values > high + slack)).any(axis=1))
     return np.concatenate(parts)
 
@@ -130,7 +132,7 @@ def _developed(light: Floats, target: ImageSet, is_encoded: bool) -> Floats:
 
     Source of the curve: Reinhard et al. 2002, equation 4.
     """
-    settings = target.lightfield.content.get("reprojection", {})
+    settings = target.lightfield.content["reprojection"]
     white = settings.get("reinhard", 1)
     brighter = np.maximum(light, 0) * 2.0 ** settings.get("exposure", 0)
     # A white of 1 changes nothing.
