@@ -23,7 +23,8 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, zarr_store
 from lightfield.export.source import SourceDataset
-from lightfield.validation import exported_cameras
+from lightfield.imaging import images
+from lightfield.validation import exported_cameras, exported_pictures
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, read_sets
 from lightfield.validation.pixels import Examiner
@@ -170,6 +171,10 @@ def test_correct_exports_agree_with_their_views(name, dataset):
     checks = {check.name.removeprefix(prefix): check for check in result.checks}
     for check in (checks["exported_cameras"], checks["exported_depth"]):
         assert check.passed, check.problems
+    if exports_with_pictures := EXPORTS[name].keys() - {"poses_csv", "point_cloud", "ncore"}:
+        assert checks["exported_pictures"].passed, checks["exported_pictures"].problems
+        figures = checks["exported_pictures"].figures
+        assert figures["compared"] >= 10 * len(exports_with_pictures)
     exports_of_set = EXPORTS[name]
     kinds = {"colmap", "nerfstudio", "scannetpp", "ncore", "lichtfeld", "point_cloud"}
     with_points = kinds & exports_of_set.keys()
@@ -597,6 +602,30 @@ def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
 
 
 @pytest.mark.parametrize(
+    ("name", "kind", "file"),
+    [
+        ("perspective", "instant_ngp", "transforms.json"),
+        ("perspective", "nerfstudio", "transforms.json"),
+        ("fisheye", "lichtfeld", "transforms.json"),
+        ("perspective", "poses_csv", "poses.csv"),
+    ],
+)
+def test_an_export_without_views_is_named(name, kind, file, dataset):
+    path = home(dataset, name) / ("" if kind == "instant_ngp" else f"exports/{kind}") / file
+    right = path.read_bytes()
+    if path.suffix == ".csv":
+        path.write_bytes(right.partition(b"\n")[0] + b"\n")
+    else:
+        write_json(path, read_json(path) | {"frames": []})
+    try:
+        assert any(
+            f"this export for {kind} has no view" in line for line in problems(dataset, name, kind)
+        )
+    finally:
+        path.write_bytes(right)
+
+
+@pytest.mark.parametrize(
     ("name", "kind", "file", "old", "new", "said"),
     [
         ("perspective", "instant_ngp", "", "view_0003f.exr", "view_0002f.exr", "lacks view_0003f"),
@@ -908,3 +937,254 @@ def test_a_lightfield_may_have_a_pose_in_two_roundings(tmp_path):
     write_export(folder, "views", "nerfstudio", {"points": 60})
     for kind in ("instant_ngp", "nerfstudio"):
         assert problems(folder, "views", kind) == []
+
+
+# ---- pictures -------------------------------------------------------------------------------
+
+
+def picture_problems(folder, name, kind):
+    """Return what is wrong with the pictures of one export."""
+    wanted = {(home(folder, name) / "exports" / kind / "export.json").resolve()}
+    if kind == "instant_ngp":
+        wanted = {(home(folder, name) / "transforms.json").resolve()}
+    sets, _ = read_sets(folder, [] if name == "views" else [name])
+    _, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
+    checks = exported_pictures.checks(
+        folder,
+        sets,
+        exports,
+        lambda asked: [exported_pictures.answer(folder, sets, question) for question in asked],
+    )
+    return [line for check in checks for line in check.problems]
+
+
+def each_pixel(change):
+    """Return a change of a PNG's pixels."""
+
+    def changed_png(path):
+        channels = images.read_image(path).channels
+        pixels = np.stack([*channels.values()], axis=-1)
+        images.write_png(path, np.ascontiguousarray(change(pixels)).astype(pixels.dtype))
+
+    return changed_png
+
+
+def each_float(change):
+    """Return a change of the numbers after a header."""
+
+    def changed_floats(path):
+        content = path.read_bytes()
+        size = 4 * 64 * 48
+        numbers = change(np.frombuffer(content[-size:], "<f4").reshape(48, 64))
+        path.write_bytes(content[:-size] + np.ascontiguousarray(numbers, "<f4").tobytes())
+
+    return changed_floats
+
+
+def neighbours(path):
+    """Put the picture of the next view in the place of this one."""
+    path.write_bytes(sorted(path.parent.glob(f"*{path.suffix}"))[5].read_bytes())
+
+
+VIEW = "view_0003f"
+MIRRORED = each_pixel(np.fliplr)
+SHIFTED = each_pixel(lambda pixels: np.roll(pixels, 1, axis=1))
+INVERTED = each_pixel(lambda pixels: 255 - pixels)
+OTHER_CHANNELS = each_pixel(lambda pixels: pixels[..., ::-1])
+DARKER = each_pixel(lambda pixels: pixels - (pixels > 1) * 2)
+DOUBLED = each_pixel(lambda pixels: 2 * pixels)
+SCALED = each_pixel(lambda pixels: np.rint(pixels * 1.02))
+# The set, the export, a picture, and what is wrong with it.
+WRONG_PICTURES = [
+    ("perspective", "colmap", f"images/{VIEW}.png", MIRRORED, "colour"),
+    ("perspective", "colmap", f"images/{VIEW}.png", OTHER_CHANNELS, "colour"),
+    ("perspective", "colmap", f"images/{VIEW}.png", DARKER, "colour"),
+    (
+        *("perspective", "colmap", f"stereo/depth_maps/{VIEW}.png.geometric.bin"),
+        *(each_float(lambda depth: 1.02 * depth), "depth"),
+    ),
+    (
+        *("perspective", "colmap", f"stereo/depth_maps/{VIEW}.png.geometric.bin"),
+        *(each_float(np.flipud), "depth"),
+    ),
+    ("fisheye", "colmap", f"masks/{VIEW}.png.png", INVERTED, "mask"),
+    ("fisheye", "colmap", f"masks/{VIEW}.png.png", SHIFTED, "mask"),
+    ("panorama", "nerfstudio", f"images/{VIEW}.png", SHIFTED, "colour"),
+    ("perspective", "nerfstudio", f"images/{VIEW}.png", neighbours, "colour"),
+    ("perspective", "nerfstudio", f"depths/{VIEW}.png", neighbours, "depth"),
+    ("perspective", "nerfstudio", f"depths/{VIEW}.png", DOUBLED, "depth"),
+    ("perspective", "nerfstudio", f"depths/{VIEW}.png", SCALED, "depth"),
+    ("wide", "nerfstudio", f"masks/{VIEW}.png", INVERTED, "mask"),
+    ("perspective", "nerf_synthetic", f"train/{VIEW}.png", MIRRORED, "colour"),
+    ("perspective", "opendibr", f"{VIEW}_texture.png", SHIFTED, "colour"),
+    ("perspective", "opendibr", f"{VIEW}_depth.png", SCALED, "depth"),
+    ("fisheye", "opendibr", f"{VIEW}_depth.png", MIRRORED, "depth"),
+    ("perspective", "hci", "input_Cam003.png", MIRRORED, "colour"),
+    ("perspective", "hci", "gt_depth_lowres_Cam003.pfm", each_float(np.flipud), "depth"),
+    ("perspective", "hci", "gt_disp_lowres_Cam003.pfm", each_float(lambda d: -d), "depth"),
+    ("perspective", "hci", "gt_disp_lowres.pfm", each_float(np.flipud), "depth"),
+    ("fisheye", "lichtfeld", f"images/{VIEW}.png", OTHER_CHANNELS, "colour"),
+    ("fisheye", "lichtfeld", f"masks/{VIEW}.png", INVERTED, "mask"),
+    ("fisheye", "lichtfeld", f"depth/{VIEW}.png", MIRRORED, "depth"),
+    ("fisheye", "scannetpp", f"image_undistorted_fisheye/{VIEW}.png", MIRRORED, "colour"),
+    ("fisheye", "scannetpp", f"image_undistorted_fisheye/{VIEW}_mask.png", INVERTED, "mask"),
+    ("perspective", "instant_ngp", f"instant_ngp/depth/{VIEW}.png", neighbours, "depth"),
+    ("perspective", "miv", f"{VIEW}_texture_64x48_yuv420p10le.yuv", neighbours, "luma"),
+    ("perspective", "miv", f"{VIEW}_depth_64x48_yuv420p16le.yuv", neighbours, "depth"),
+]
+
+
+@pytest.mark.parametrize(("name", "kind", "file", "change", "what"), WRONG_PICTURES)
+def test_a_picture_that_does_not_show_its_view_is_named(name, kind, file, change, what, dataset):
+    path = home(dataset, name) / ("" if kind == "instant_ngp" else f"exports/{kind}") / file
+    right = path.read_bytes()
+    assert picture_problems(dataset, name, kind) == []
+    change(path)
+    try:
+        (problem,) = picture_problems(dataset, name, kind)
+    finally:
+        path.write_bytes(right)
+    assert problem.startswith(f"{path.relative_to(dataset)}: has another {what} than its view in ")
+
+
+@pytest.mark.parametrize(
+    ("kind", "file"),
+    [
+        ("colmap", f"masks/{VIEW}.png.png"),
+        ("lichtfeld", f"masks/{VIEW}.png"),
+        ("scannetpp", f"image_undistorted_fisheye/{VIEW}_mask.png"),
+    ],
+)
+def test_a_mask_that_is_missing_is_named(kind, file, dataset):
+    path = dataset / "fisheye" / "exports" / kind / file
+    right = path.read_bytes()
+    path.unlink()
+    try:
+        (problem,) = picture_problems(dataset, "fisheye", kind)
+    finally:
+        path.write_bytes(right)
+    assert problem.startswith(f"{path.relative_to(dataset)}: has no mask, but ")
+
+
+def test_a_missing_list_of_a_part_is_named(dataset):
+    path = dataset / "split" / "transforms_test.json"
+    right = path.read_bytes()
+    path.unlink()
+    try:
+        (problem,) = problems(dataset, "split", "instant_ngp")
+    finally:
+        path.write_bytes(right)
+    assert problem.startswith("split/transforms_test.json: is missing, but ")
+
+
+def test_depth_is_compared_where_a_set_has_its_views_as_png_too(dataset, tmp_path):
+    folder = tmp_path / "scene" / "dataset"
+    shutil.copytree(dataset / "exr", folder / "exr")
+    shutil.copyfile(dataset / "lightfield.json", folder / "lightfield.json")
+    shutil.copytree(dataset / "perspective", folder / "perspective")
+    for view in LightField.read(folder / "perspective/lightfield.json").views:
+        picture = folder / "perspective/exports/colmap/images" / f"{view.name}.png"
+        shutil.copyfile(picture, folder / "perspective" / f"{view.name}.png")
+    assert picture_problems(folder, "perspective", "nerfstudio") == []
+    DOUBLED(folder / "perspective/exports/nerfstudio/depths" / f"{VIEW}.png")
+    assert len(picture_problems(folder, "perspective", "nerfstudio")) == 1
+
+
+@pytest.mark.parametrize(
+    "kind", ["colmap", "nerfstudio", "nerf_synthetic", "opendibr", "miv", "lichtfeld", "hci"]
+)
+@pytest.mark.parametrize("transparent", [False, True])
+def test_developed_and_transparent_pictures_show_their_views(transparent, kind, tmp_path):
+    folder = tmp_path / "scene" / "dataset"
+    write_views(folder, VIEWS, RIG, see=look_at_ball)
+    write_views(folder / "flat", LENSES["perspective"], RIG, see=look_at_ball)
+    lightfield = LightField.read(folder / "flat/lightfield.json")
+    if transparent:
+        lightfield = lightfield.changed(render={"transparent": True})
+        lightfield.write(folder / "flat/lightfield.json")
+    rng = np.random.default_rng(0)
+    for view in lightfield.views:
+        path = folder / "flat" / f"{view.name}.exr"
+        channels = dict(images.read_image(path).channels)
+        alpha = np.clip(1.5 * rng.random((48, 64)) - 0.25, 0, 1).astype(np.float16)
+        for name in "RGB":
+            light = channels[name] * 2.0 ** rng.integers(-12, 9, (48, 64))
+            channels[name] = (light * (alpha if transparent else 1)).astype(np.float16)
+        if transparent:
+            channels["A"] = alpha
+        images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: lightfield.depth})
+    options = {"exposure": -2.5, "reinhard": 3}
+    settings = TypeAdapter(settings_of(kind)).validate_python({"sources": ["flat"], **options})
+    source = SourceDataset(folder, "flat", ".exr", **options)
+    export.run(kind, source, settings, folder / "flat" / "exports" / kind)
+    assert picture_problems(folder, "flat", kind) == []
+
+
+# ---- boxes ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def boxed(tmp_path_factory):
+    """Three views with a pass of two objects each, and their boxes."""
+    folder = tmp_path_factory.mktemp("boxed") / "scene" / "dataset"
+    write_views(folder, LENSES["perspective"], {"type": "lattice", "cameras": [3, 1, 1], "size": 1})
+    lightfield = LightField.read(folder / "lightfield.json").changed(passes=["object"])
+    lightfield.write(folder / "lightfield.json")
+    for index, view in enumerate(lightfield.views):
+        numbers = np.ones((48, 64), np.uint32)
+        numbers[10 : 20 + index, 30:35] = 2
+        images.write_exr(folder / "object" / f"{view.name}.exr", {"Y": numbers})
+    write_json(folder / "object" / "names.json", {"Wall": 1, "Ball": 2})
+    write_export(folder, "views", "coco", {})
+    return folder
+
+
+def swap_images(content):
+    first, second, _ = content["images"]
+    first["file_name"], second["file_name"] = second["file_name"], first["file_name"]
+
+
+WRONG_BOXES = {
+    "two images swapped": (swap_images, "is not the box of its object"),
+    "last image missing": (lambda content: content["images"].pop(), "view_0002f 0 times"),
+    "an image twice": (
+        lambda content: content["images"].append(content["images"][0] | {"id": 9}),
+        "view_0000f 2 times",
+    ),
+    "a box missing": (lambda content: content["annotations"].pop(), "lacks 1"),
+    "a box twice": (
+        lambda content: content["annotations"].append(content["annotations"][-1] | {"id": 99}),
+        "has 3 boxes of 2 objects",
+    ),
+    "a pixel wider": (
+        lambda content: content["annotations"][1]["bbox"].__setitem__(2, 6),
+        "annotations: 2: is not the box of its object",
+    ),
+    "rows for columns": (
+        lambda content: content["annotations"][1].update(bbox=[10, 30, 10, 5]),
+        "annotations: 2: is not the box of its object",
+    ),
+    "another object": (
+        lambda content: content["annotations"][1].update(category_id=1),
+        "annotations: 2: is not the box of its object",
+    ),
+    "another area": (
+        lambda content: content["annotations"][1].update(area=49),
+        "annotations: 2: is not the box of its object",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_BOXES)
+def test_boxes_that_the_passes_do_not_show_are_named(case, boxed):
+    assert problems(boxed, "views", "coco") == []
+    path = boxed / "exports/coco/instances.json"
+    right = path.read_bytes()
+    content = read_json(path)
+    change, said = WRONG_BOXES[case]
+    change(content)
+    write_json(path, content)
+    try:
+        assert any(said in problem for problem in problems(boxed, "views", "coco"))
+    finally:
+        path.write_bytes(right)

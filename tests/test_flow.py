@@ -144,6 +144,16 @@ def check_warp(dataset, flow):
     assert np.median(error) < 1e-3
 
 
+@pytest.mark.parametrize("rig", [ROW, {"type": "cuboid", "cameras": [1, 1, 1], "size": 0.5}])
+@pytest.mark.parametrize("name", LENSES)
+def test_flow_of_every_lens_agrees_with_the_depth_of_both_views(name, rig, tmp_path, run_program):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES[name] | {"resolution": [48, 24 if name == "panorama" else 48]}, rig)
+    LightField.read(folder / "lightfield.json").with_flow().write(folder / "lightfield.json")
+    run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    assert flow_check(folder).passed
+
+
 SPOILED = {
     "missing": (None, "is missing"),
     "mask": ({"V": 0.5}, "2304 values of V are neither 0 nor 1"),
@@ -173,6 +183,29 @@ def test_validation_checks_flow(what, computed, tmp_path):
         channels = dict(images.read_image(path).channels)
         planes = {name: np.full((48, 48), value, np.float32) for name, value in wrong.items()}
         images.write_exr(path, channels | planes)
+    (said,) = flow_check(folder).problems
+    assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
+
+
+WRONG_FLOW = {
+    "negated": (lambda c: {**c, "X": -c["X"], "Y": -c["Y"]}, "not where their depth puts them"),
+    "axes swapped": (lambda c: {**c, "X": c["Y"], "Y": c["X"]}, "not where their depth puts them"),
+    "mirrored": (lambda c: {k: np.fliplr(v) for k, v in c.items()}, "not where their depth"),
+    "a tenth of a pixel off": (
+        lambda c: {**c, "X": c["X"] + np.float32(0.1) * (c["V"] == 1)},
+        "not where their depth puts them",
+    ),
+    "mask the other way round": (lambda c: {**c, "V": 1 - c["V"]}, ""),
+    "all hidden": (lambda c: {**c, "V": 0 * c["V"]}, "values of V are not what the depth"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG_FLOW)
+def test_flow_that_contradicts_the_depth_of_both_views_is_named(what, computed, tmp_path):
+    folder = shutil.copytree(computed, tmp_path / "dataset")
+    path = folder / "flow/view_0000f_to_view_0001f.exr"
+    change, problem = WRONG_FLOW[what]
+    images.write_exr(path, change(dict(images.read_image(path).channels)))
     (said,) = flow_check(folder).problems
     assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
 

@@ -286,6 +286,15 @@ def test_an_unfinished_dataset_is_not_published(folder, tmp_path):
     assert not (tmp_path / NAME).exists()
 
 
+def test_a_view_of_an_unknown_part_is_named_and_not_left_out(folder, tmp_path):
+    dataset = shutil.copytree(folder, tmp_path / "dataset")
+    lightfield = LightField.read(dataset / "lightfield.json").to_json()
+    lightfield["frames"][1]["split"] = "val"
+    (dataset / "lightfield.json").write_text(json.dumps(lightfield))
+    with pytest.raises(UserError, match="view_0001f: split: is 'val'; must be train, validation"):
+        published(dataset, tmp_path / NAME)
+
+
 def test_the_frames_of_a_sequence_are_samples_of_their_own(folder, tmp_path):
     for frame in ("f00001", "f00002"):
         shutil.copytree(folder, tmp_path / "sequence" / frame)

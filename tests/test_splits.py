@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -230,3 +231,23 @@ def test_validation_finds_deviations_from_the_split(scene, tmp_path):
         problems()
     with pytest.raises(UserError, match=r"splits\.json: belongs to the rigs in .*, but .* is not"):
         splits_check.check(path, tmp_path / "copy", [])
+
+
+@pytest.mark.parametrize("end", ["l", "Lamp", "Lamp_001", "Lamp_001_2"])
+def test_views_that_are_named_after_a_light_or_a_face_have_the_split_of_their_view(end, tmp_path):
+    lens = rigs.from_settings(PLANE | {"camera": PERSPECTIVE}).camera.make()
+    lightfield = LightField.from_rig(PLANE | {"split": {"test": ["view_0001f"]}}, lens)
+    write_json(tmp_path / "splits.json", splits_content({"rig": lightfield}))
+    lightfield.write(tmp_path / "rig" / "lightfield.json")
+
+    def problems(split_of_first_view):
+        views = [replace(view, name=f"{view.name}_{end}") for view in lightfield.views]
+        views[0] = replace(views[0], others={"split": split_of_first_view})
+        lightfield.changed(views=views).write(tmp_path / "rig" / "lights" / "lightfield.json")
+        sets = read_sets(tmp_path / "rig", ["lights"])[0]
+        return splits_check.check(tmp_path / "splits.json", tmp_path / "rig", sets).problems
+
+    assert problems("train") == []
+    assert problems("test") == [
+        f"lights/lightfield.json: frames: view_0000f_{end}: split is another"
+    ]

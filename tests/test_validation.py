@@ -30,6 +30,7 @@ from lightfield.dataset.passes import NAMES, PASSES, matte_header
 from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
+from lightfield.imaging.tonemap import to_8_bit
 from lightfield.validation import consistency, files, geometry
 from lightfield.validation import validate as validation
 from lightfield.validation.result import Check, Result
@@ -761,6 +762,15 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
     ),
     "a name twice": (bad_frame("name", "view_0000f"), "view_0000f: is the name of two frames"),
     "rotation of another": (bad_frame("rotation", [0, 0, 0]), "world_matrix"),
+    "a part that no split has": (
+        bad_frame("split", "val"),
+        "split: is 'val'; must be train, validation, test, or missing",
+    ),
+    "poses of another exposure": (
+        bad_frame("exposure", {"start": np.eye(4).tolist(), "end": np.eye(4).tolist()}),
+        "exposure: has not the pose",
+    ),
+    "no poses of an exposure": (bad_frame("exposure", {"start": 1}), "exposure: has not the pose"),
     "mirrored axis": (
         listed(turn([BAD], np.diag([-1.0, 1.0, 1.0]))),
         "view_0002f: world_matrix: is not that of its position and rotation",
@@ -1102,9 +1112,9 @@ def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] =
         channels["Z"] = np.where(behind, np.float32(np.nan), channels["Z"])
         channels = spoil(channels)
         images.write_exr(folder / f"{view.name}.exr", channels)
-        eight_bit = [(channels[name] * np.float16(255)).astype(np.uint8) for name in "RGB"]
+        colour = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float32)
         alpha = np.where(np.isnan(channels["Z"]), 0, 255).astype(np.uint8)
-        images.write_png(folder / f"{view.name}.png", np.dstack([*eight_bit, alpha]))
+        images.write_png(folder / f"{view.name}.png", np.dstack([to_8_bit(colour), alpha]))
         images.write_png(folder / f"dynamic_mask_{view.name}.png", 255 - alpha)
     lightfield.write(folder / NAME)
 
@@ -1170,6 +1180,95 @@ def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
     result = validate(small_dataset, ["panorama"])
     assert f"panorama/{name}" in failed(result)
     assert all(check.startswith("panorama/") for check in failed(result))
+
+
+@pytest.fixture(scope="session")
+def right_magnified_dataset(
+    right_small_dataset: Path, tmp_path_factory: Any, run_program: Any
+) -> Path:
+    """A dataset with a reprojection that has four pixels across each pixel of its source."""
+    dataset = tmp_path_factory.mktemp("magnified") / "room" / "plane"
+    shutil.copytree(right_small_dataset, dataset)
+    files = ["--input-cfg", dataset / NAME, "-i", dataset / "exr", "-o", dataset / "flat"]
+    files += ["--output-cfg", dataset / "flat" / NAME]
+    development = ["--exr", "--png", "--exposure", "-1", "--reinhard", "4"]
+    optics = ["--rectilinear", "18,36", "--output-resolution", "128,128"]
+    result = run_program("reproject.py", *files, *development, *optics)
+    assert result.returncode == 0, result.stderr
+    return dataset
+
+
+@pytest.fixture
+def magnified_dataset(right_magnified_dataset: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(right_magnified_dataset, tmp_path / "room" / "plane"))
+
+
+def test_a_magnified_reprojection_is_valid(right_magnified_dataset: Path) -> None:
+    result = validate(right_magnified_dataset, ["flat"])
+    assert failed(result) == []
+    agreement = check(result, "flat/geometry").figures
+    assert agreement["contradict"] < 0.005
+    assert agreement["points"] > 1000
+    assert check(result, "flat/source").detail.startswith("6 of 6 ")
+
+
+def repaint_flat(
+    dataset: Path, suffix: str, change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+) -> None:
+    """Change the channels of the first reprojected view."""
+    path = dataset / "flat" / f"{names(dataset)[0]}{suffix}"
+    image = images.read_image(path)
+    channels = change(dict(image.channels))
+    if suffix == ".exr":
+        images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: "z"})
+    else:
+        images.write_png(path, np.stack([channels[name] for name in image.channels], axis=-1))
+
+
+WRONG_PIXELS: dict[str, tuple[str, Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]]] = {
+    "mirrored": (".exr", each(np.fliplr)),
+    "upside down": (".exr", each(np.flipud)),
+    "transposed": (".exr", each(np.transpose)),
+    "depth 2 % too large": (".exr", scaled(1.02)),
+    "depth in millimetres": (".exr", scaled(1000)),
+    "red for blue": (".exr", lambda c: {**c, "R": c["B"], "B": c["R"]}),
+    "twice as bright": (".exr", lambda c: {**c, **{name: 2 * c[name] for name in "RGB"}}),
+    "red for blue in 8 bits": (".png", lambda c: {**c, "R": c["B"], "B": c["R"]}),
+    "half as bright in 8 bits": (".png", each(lambda pixels: pixels // 2)),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_PIXELS)
+def test_a_reprojected_view_that_shows_something_else_is_named(
+    case: str, magnified_dataset: Path
+) -> None:
+    suffix, change = WRONG_PIXELS[case]
+    repaint_flat(magnified_dataset, suffix, change)
+    result = validate(magnified_dataset, ["flat"])
+    view = names(magnified_dataset)[0]
+    assert check(result, "flat/source").views == [view]
+    (problem,) = check(result, "flat/source").problems
+    assert problem.startswith(f"flat/{view}{suffix}: ")
+    assert problem.endswith(f" exr/{view}.exr")
+
+
+def test_negative_light_as_of_saturated_colours_may_be_reprojected(magnified_dataset: Path) -> None:
+    def negative(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {**channels, "R": np.full_like(channels["R"], -0.2)}
+
+    repaint(magnified_dataset, names(magnified_dataset)[0], negative)
+    repaint_flat(magnified_dataset, ".exr", negative)
+    repaint_flat(magnified_dataset, ".png", lambda channels: {**channels, "R": 0 * channels["R"]})
+    assert check(validate(magnified_dataset, ["flat"]), "flat/source").passed
+
+
+def test_two_reprojected_views_that_are_swapped_are_named(magnified_dataset: Path) -> None:
+    first, _, last = (magnified_dataset / "flat" / f"{n}.exr" for n in names(magnified_dataset))
+    first_bytes = first.read_bytes()
+    first.write_bytes(last.read_bytes())
+    last.write_bytes(first_bytes)
+    result = validate(magnified_dataset, ["flat"])
+    assert check(result, "flat/source").views == sorted([first.stem, last.stem])
 
 
 def marked_from(columns: float) -> Callable[[dict[str, np.ndarray]], Any]:

@@ -75,12 +75,15 @@ class Camera:
     - ``depth``: ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
     - ``grain``: the angle in radians of a source view's pixel, if this view was reprojected. A
       depth may come from that far beside its pixel's centre.
+    - ``spacing``: the number of pixels between neighbours in a patch. A magnified view may have one
+      depth in all pixels that are nearer to each other.
     """
 
     lens: Lens
     world_matrix: Array
     depth: str
     grain: float = 0.0
+    spacing: int = 1
 
     @property
     def position(self) -> Array:
@@ -112,7 +115,7 @@ class Patches:
     - ``error`` (n,): how far the plane may lie off the surface. The causes are the grain and the
       file's number format.
     - ``curvature`` (n, 3): the second derivatives of the surface's height above the plane, per
-      pixel squared: along columns, along rows, and mixed.
+      squared step of the patch: along columns, along rows, and mixed.
     """
 
     points: Array
@@ -131,8 +134,9 @@ class Patches:
     def height(self, columns: Array | float = 0.0, rows: Array | float = 0.0) -> Array:
         """Return how far the curved surface lies in front of the plane, (n,) in metres.
 
-        ``columns`` and ``rows`` (n,) say where, in pixels from the middle pixel's centre. The plane
-        goes through the mean of the nine points, so a bulging surface lies in front of it.
+        ``columns`` and ``rows`` (n,) say where, in steps of the patch from the middle pixel's
+        centre. The plane goes through the mean of the nine points, so a bulging surface lies in
+        front of it.
         """
         along_columns, along_rows, mixed = self.curvature.T
         bend = along_columns * (columns**2 / 2 - 1 / 3) + along_rows * (rows**2 / 2 - 1 / 3)
@@ -144,8 +148,7 @@ def _patches(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Patches, NDArray[np.bool_]]:
     """Fit planes to 3 × 3 pixels about inner pixels. Also return which are smooth surfaces (n,)."""
-    columns = columns[:, np.newaxis] + _COLUMNS
-    rows = rows[:, np.newaxis] + _ROWS
+    columns, rows = _nine(camera, columns, rows)
     values = depth[rows, columns]
     with np.errstate(invalid="ignore", over="ignore"):
         points = camera.lift(values.astype(np.float64), columns, rows)
@@ -183,6 +186,16 @@ def _patches(
     return Patches(centres, normals, spread, footprint, error, curvature), smooth
 
 
+def _nine(
+    camera: Camera, columns: NDArray[np.int64], rows: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the columns and the rows (n, 9) of the patches about inner pixels (n,)."""
+    return (
+        columns[:, np.newaxis] + camera.spacing * _COLUMNS,
+        rows[:, np.newaxis] + camera.spacing * _ROWS,
+    )
+
+
 def _curvature(heights: Array) -> Array:
     """Return `Patches.curvature` (n, 3) of nine points' heights (n, 9) above their plane.
 
@@ -200,10 +213,12 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
     """Return up to ``rays`` smooth patches of a view, spread evenly over it.
 
     The image is divided into square cells. Each cell gives the smoothest of four fixed places.
-    ``depth`` is (height, width) of a float type, with misses +inf. Below 3 × 3 there is no patch.
+    ``depth`` is (height, width) of a float type, with misses +inf. An image that is smaller than a
+    patch has none.
     """
     height, width = depth.shape
-    if min(height, width) < 3:
+    rim = camera.spacing
+    if min(height, width) < 1 + 2 * rim:
         none = np.zeros(0, np.int64)
         return _patches(camera, depth, none, none)[0]
     cell = max((height * width / rays) ** 0.5, 2.0)
@@ -211,8 +226,8 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
     # The four places in a cell are the corners of a turned square: none share a row or column.
     places = np.array([(0.3, 0.1), (0.9, 0.3), (0.1, 0.7), (0.7, 0.9)])
     y, x = np.mgrid[0:down, 0:across].reshape(2, -1, 1) + places.T[:, np.newaxis]
-    rows = np.clip(y * (height / down), 1, height - 2).astype(np.int64)
-    columns = np.clip(x * (width / across), 1, width - 2).astype(np.int64)
+    rows = np.clip(y * (height / down), rim, height - 1 - rim).astype(np.int64)
+    columns = np.clip(x * (width / across), rim, width - 1 - rim).astype(np.int64)
     patches, smooth = _patches(camera, depth, columns.ravel(), rows.ravel())
     roughness = np.full(len(smooth), np.inf)
     roughness[smooth] = patches.spread[smooth] / patches.footprint[smooth]
@@ -261,9 +276,10 @@ def _visible_patches(patches: Patches, camera: Camera) -> tuple[NDArray[np.bool_
     distance = np.linalg.norm(sight, axis=1)
     facing = np.einsum("ij,ij->i", patches.normals, sight) > GRAZING_COSINE * distance
     pixels = camera.pixels(patches.points)
-    last = np.array([camera.lens.width, camera.lens.height]) - 1.0
+    rim = float(camera.spacing)
+    last = np.array([camera.lens.width, camera.lens.height]) - rim
     with np.errstate(invalid="ignore"):
-        inside = ((pixels >= 1.0) & (pixels < last)).all(axis=1)
+        inside = ((pixels >= rim) & (pixels < last)).all(axis=1)
     return facing & inside, pixels
 
 
@@ -278,7 +294,7 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     columns, rows = np.floor(pixels).astype(np.int64).T
     recorded, smooth = _patches(camera, depth, columns, rows)
     residual = np.einsum("ij,ij->i", recorded.normals, queried.points - recorded.points)
-    off_centre = pixels - np.floor(pixels) - 0.5
+    off_centre = (pixels - np.floor(pixels) - 0.5) / camera.spacing
     recorded_height = recorded.height(off_centre[:, 0], off_centre[:, 1])
     curved_residual = residual + queried.height() - recorded_height
     # The queried centre is a mean of nine jittered points. The recorded plane is evaluated up to
@@ -295,7 +311,7 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     verdict[residual < -tolerance] = OCCLUDED
     verdict[residual > tolerance] = CONTRADICT
     rough = np.flatnonzero(~smooth)
-    nearest, farthest = _recorded_range(camera, depth, columns[rough], rows[rough])
+    nearest, farthest = recorded_range(camera, depth, columns[rough], rows[rough])
     distance = np.linalg.norm(queried.points[rough] - camera.position, axis=1)
     slack = tolerance[rough] + footprint[rough]
     verdict[rough] = AGREE
@@ -319,12 +335,11 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     )
 
 
-def _recorded_range(
+def recorded_range(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Return the least and largest distance in 3 × 3 pixels. NaN where a pixel has no source."""
-    columns = columns[:, np.newaxis] + _COLUMNS
-    rows = rows[:, np.newaxis] + _ROWS
+    columns, rows = _nine(camera, columns, rows)
     nine = depth[rows, columns].astype(np.float64)
     points = camera.lift(nine, columns, rows)
     with np.errstate(invalid="ignore"):

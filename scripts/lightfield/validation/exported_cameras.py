@@ -20,7 +20,7 @@ from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation import unit_cube
+from lightfield.validation import exported_boxes, unit_cube
 from lightfield.validation.files import ImageSet, Manifest, lists_of
 from lightfield.validation.readers import read
 from lightfield.validation.readers.cameras import Camera, PolynomialFisheye
@@ -165,6 +165,8 @@ def check(
             views += len(exported.views)
             problems += exported.faults
             problems += faults(exported, expected)
+            problems += _missing_parts(path, expected)
+            problems += exported_boxes.faults(exported, dataset, image_set)
             if cube and not cube.fits_depth:
                 problems += unit_cube.faults(cube, image_set.lightfield.matrices)
         if paths:
@@ -194,6 +196,17 @@ def faults(exported: Exported, expected: Expected) -> Iterator[str]:
         yield from _name_faults(exported, expected)
     for part in exported.parts:
         yield from _different_names(part.place, part.names, expected.parts[part.part], expected)
+
+
+def _missing_parts(path: Path, expected: Expected) -> Iterator[str]:
+    """Yield the lists for instant-ngp that a transforms.json lacks: one of each part's views."""
+    if path.name != "transforms.json":
+        return
+    for part in PARTS:
+        has_views = any(view.split == part for view in expected.image_set.lightfield.views)
+        list_of_part = path.with_stem(f"{path.stem}_{part}")
+        if has_views and not list_of_part.is_file():
+            yield f"{list_of_part}: is missing, but {expected.path} has views for {part}"
 
 
 def _lens_fault(camera: Camera, lens: Lens) -> str | None:

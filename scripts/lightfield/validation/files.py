@@ -15,7 +15,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset_paths import REPORT_FILES
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.dataset.sensors import (
     BRACKET_FILES,
@@ -24,7 +24,9 @@ from lightfield.dataset.sensors import (
     settings_in,
 )
 from lightfield.geometry import rotations
+from lightfield.geometry.exposure import pose_between
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.consistency import Camera
 from lightfield.validation.result import Check
 
@@ -105,7 +107,14 @@ class ImageSet:
     def camera(self, view: int) -> Camera:
         depth = self.lightfield.depth
         assert depth is not None
-        return Camera(self.lightfield.lens, self.lightfield.matrices[view], depth, self.grain)
+        lens = self.lightfield.lens
+        return Camera(lens, self.lightfield.matrices[view], depth, self.grain, self._spacing)
+
+    @cached_property
+    def _spacing(self) -> int:
+        """How many of its pixels are as wide as a pixel of a source view, in the middle."""
+        angle = _central_angle(self.lightfield.lens)
+        return math.ceil(self.grain / angle) if self.grain > angle > 0 else 1
 
 
 @dataclass(frozen=True)
@@ -167,7 +176,10 @@ def source_view(source: ImageSet | None, name: str) -> int | None:
 
 
 def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
-    """Check that each pose is rigid, the same in both forms, and at its source's position."""
+    """Check each view's pose and split.
+
+    A pose is rigid, the same in both forms, and at its source's position.
+    """
     views = image_set.lightfield.views
     # Blender keeps poses in float32.
     tolerance = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
@@ -180,6 +192,10 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
         )
         if not difference < tolerance:
             faults[view.name] = "world_matrix: is not that of its position and rotation"
+        elif view.split not in (None, *PARTS):
+            faults[view.name] = f"split: is {view.split!r}; must be {', '.join(PARTS)}, or missing"
+        elif _moves_elsewhere(view, tolerance):
+            faults[view.name] = "exposure: has not the pose of world_matrix in its middle"
         elif source:
             number = source_view(source, view.name)
             if number is None:
@@ -194,6 +210,17 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
         [*faults],
         [f"{path}: frames: {view}: {fault}" for view, fault in faults.items()],
     )
+
+
+def _moves_elsewhere(view: View, tolerance: float) -> bool:
+    """Return whether a moving camera is not at the view's pose in the middle of its exposure."""
+    try:
+        if view.exposure is None:
+            return False
+        middle = pose_between(*view.exposure, 0.5)
+        return not np.abs(middle - view.matrix).max() < tolerance
+    except (LookupError, TypeError, ValueError):
+        return True  # These are no two matrices.
 
 
 def _central_angle(lens: Lens) -> float:

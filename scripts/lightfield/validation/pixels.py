@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
 from lightfield.dataset.passes import MANIFEST, NAMES, Pass
-from lightfield.geometry.flow import in_frame
+from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency, depth_questions, light_sums
+from lightfield.validation import consistency, depth_questions, light_sums, reprojected
 from lightfield.validation.consistency import Answer, Patches
 from lightfield.validation.depth_questions import Question
 from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
@@ -36,6 +36,10 @@ NOT_UNIT = 1e-4
 # Outside the image circle, at most this part of the values may exceed FAINT.
 MOST_LIT_OUTSIDE = 0.05
 FAINT = 0.001
+# A flow may be this many pixels off the place that follows from depth.
+FLOW_OFF = 0.01
+# A point is hidden if it is farther away than this factor times the farthest surface around.
+HIDDEN = 1.011
 # Regions of this many differently turned views are kept in memory.
 MOST_REGIONS = 16
 
@@ -48,6 +52,7 @@ class Facts:
     - ``clamped``, ``nan``: how many rendered values were clamped, or were not a number.
     - ``machine``: the machine that rendered the view.
     - ``marked``: whether the pixels without a source could be checked.
+    - ``compared``: whether a reprojected view was compared with the rendered one.
     - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
@@ -63,6 +68,7 @@ class Facts:
     nan: int | None = None
     machine: str | None = None
     marked: bool = False
+    compared: bool = False
     constant: bool = False
     missed: float = 0.0
     patches: Patches | None = None
@@ -166,6 +172,7 @@ class Examiner:
             facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
         if not is_rendered:
             self._compare_marks(file, image, facts)
+            self._compare_with_source(file, image, facts)
         elif images.NAN_ATTRIBUTE in image.attributes:
             facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
@@ -256,21 +263,64 @@ class Examiner:
             lens = self.sets[file.set].lightfield.lens
             wrong = int((visible & ~in_frame(lens, pixels[:2])).sum())
             facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
+            for text in self._flow_faults(file, pixels, visible):
+                facts.fault("passes", text)
+
+    def _flow_faults(self, file: File, flow: NDArray[Any], visible: Bools) -> Iterator[str]:
+        """Yield how a ``flow`` (3, h, w) differs from what follows from the depth of two views."""
+        image_set = self.sets[file.set]
+        target = image_set.numbers.get(image_set.lightfield.views[file.view].others["flow"])
+        depth = self._depth(image_set, file.view)
+        if target is None:
+            yield "leads to no view"
+            return
+        target_depth = self._depth(image_set, target)
+        if depth is None or target_depth is None:
+            return  # Another check reports it.
+        camera = image_set.camera(file.view)
+        other = image_set.camera(target)
+        rows, columns = np.nonzero(np.isfinite(depth) & np.isfinite(flow).all(axis=0))
+        points = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
+        places = np.stack([columns, rows], axis=-1) + 0.5 + flow[:2, rows, columns].T
+        is_visible = visible[rows, columns]
+        off = other.pixels(points) - places
+        off[:, 0] = shorter(other.lens, off[:, 0])
+        # NaN where the other view has no ray to a point.
+        is_there = (np.abs(off) <= FLOW_OFF).all(axis=-1)
+        wrong = int((is_visible & ~is_there).sum())
+        if wrong:
+            yield f"{wrong} visible points are not where their depth puts them"
+            return
+        # Only where the other view has 3 × 3 pixels around.
+        last = np.array([other.lens.width, other.lens.height]) - 1
+        compared = is_there & ((places >= 1) & (places < last)).all(axis=-1)
+        column, row = np.floor(places[compared]).astype(np.int64).T
+        nearest, farthest = consistency.recorded_range(other, target_depth, column, row)
+        distance = np.linalg.norm(points[compared] - other.position, axis=-1)
+        is_hidden = distance > HIDDEN * farthest
+        is_open = distance <= nearest
+        wrong = int(np.where(is_visible[compared], is_hidden, is_open).sum())
+        if wrong:
+            yield f"{wrong} values of V are not what the depth of both views says"
+
+    def _depth(self, image_set: ImageSet, view: int) -> NDArray[Any] | None:
+        """Return the depth (height, width) of a view of a set. None if it has none of its size."""
+        if image_set.lightfield.depth is None:
+            return None
+        lens = image_set.lightfield.lens
+        path = self.dataset / image_set.folder / f"{image_set.views[view]}.exr"
+        try:
+            depth = images.read_image(path, ["Z"]).channels["Z"]
+        except UserError:
+            return None
+        return depth if depth.shape == (lens.height, lens.width) else None
 
     def _misses(self, file: File) -> Bools | None:
         """Return where the rendered view of a pass hits nothing. None without its depth."""
         image_set = self.sets[file.set]
-        lens = image_set.lightfield.lens
-        if image_set.name or not image_set.lightfield.depth:
-            return None
-        try:
-            path = self.dataset / f"{IMAGES}/{image_set.views[file.view]}.exr"
-            depth = images.read_image(path, ["Z"]).channels["Z"]
-        except UserError:
-            return None  # The check of the images reports it.
+        depth = None if image_set.name else self._depth(image_set, file.view)
         # In half floats, inf may also be a depth of more than 65504 m.
-        is_certain = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
-        return np.isposinf(depth) if is_certain else None
+        return np.isposinf(depth) if depth is not None and depth.dtype == np.float32 else None
 
     def _numbers(self, view_pass: Pass) -> set[int]:
         """Return the numbers in the names file of a pass. Empty if it cannot be read."""
@@ -304,6 +354,27 @@ class Examiner:
         facts.fault("marks", f"{wrong} pixels with a source are marked as without", wrong)
         coloured = any(image.channels[name][without].any() for name in "RGB")
         facts.fault("marks", "has colour in pixels without a source", coloured)
+
+    def _compare_with_source(self, file: File, image: images.Image, facts: Facts) -> None:
+        """Check that a reprojected view shows what the rendered view shows."""
+        target = self.sets[file.set]
+        source = rendered(self.sets)
+        number = source_view(source, target.views[file.view])
+        if source is None or number is None:
+            return
+        name = f"{IMAGES}/{source.views[number]}.exr"
+        try:
+            original = images.read_image(self.dataset / name)
+        except UserError:
+            return  # The check of the images reports it.
+        problem = _format_problem(File(name, 0, number), source, original)
+        height, width = next(iter(original.channels.values())).shape
+        lens = source.lightfield.lens
+        if problem or (width, height) != (lens.width, lens.height):
+            return
+        facts.compared = True
+        for text in reprojected.faults(target, file.view, image, source, number, original):
+            facts.fault("source", f"{text} {name}")
 
     def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
         """Return where the lens has a ray, and where it has none. Both exclude the rim."""
@@ -360,8 +431,12 @@ def checks(
         checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
     if image_set.name:
         marked = {file: fact for file, fact in readable.items() if fact.marked}
-        text = "mark the pixels that their source cannot see"
-        return [*checks, _outcome(image_set, "marks", marked, text)]
+        compared = {file: fact for file, fact in readable.items() if fact.compared}
+        return [
+            *checks,
+            _outcome(image_set, "marks", marked, "mark the pixels that their source cannot see"),
+            _outcome(image_set, "source", compared, "show what their source shows"),
+        ]
     if volumes and with_depth:
         missed = sum(fact.missed for fact in with_depth.values()) / len(with_depth)
         names = ", ".join(volumes[:8]) + (" …" if len(volumes) > 8 else "")

@@ -11,7 +11,7 @@ from lightfield.core.files import read_json
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation.files import ImageSet
+from lightfield.validation.files import ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
 # Two poses are the same if they agree to this many decimals, in metres and in the rotation matrix.
@@ -47,11 +47,13 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
     ]
     lightfield = lightfields.get(dataset.relative_to(home).as_posix())
     split = {view.name: view.split for view in lightfield.views} if lightfield else {}
+    source = rendered(sets)
     for image_set in sets:
         for view in image_set.lightfield.views:
-            # A face of a cube map is named after its view.
-            names = {view.name, view.name.rpartition("_")[0]}
-            if view.split not in [split[name] for name in names & split.keys()]:
+            number = source_view(source, view.name)
+            if source is None or number is None:
+                continue  # The check of lightfield.json reports it.
+            if view.split != split.get(source.views[number]):
                 problems.append(f"{image_set.prefix}{NAME}: frames: {view.name}: split is another")
     problems += _shared_poses(lightfields)
     detail = ", ".join(f"{len(parts[part])} {part}" for part in PARTS)

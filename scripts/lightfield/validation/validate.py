@@ -32,6 +32,7 @@ from lightfield.dataset.shard_files import read_record
 from lightfield.validation import (
     depth_questions,
     exported_cameras,
+    exported_pictures,
     files,
     geometry,
     machines,
@@ -178,6 +179,12 @@ def _check_images(
         answers = {
             (file.set, file.view): fact.of_depth for file, fact in facts.items() if fact.of_depth
         }
+        checks += exported_pictures.checks(
+            dataset,
+            sets,
+            set_exports,
+            lambda questions: parallel_map(_answer_pictures, questions),
+        )
         checks += exported_depth.checks(
             answers, lambda questions: parallel_map(_answer_depth, questions)
         )
@@ -279,6 +286,10 @@ def _examine(file_and_question: tuple[File, Question | None]) -> tuple[File, Fac
 
 def _answer_depth(file_and_question: tuple[File, Question]) -> depth_questions.Answer | None:
     return _examiner.answer_depth(*file_and_question)
+
+
+def _answer_pictures(question: exported_pictures.Question) -> exported_pictures.Answer:
+    return exported_pictures.answer(_examiner.dataset, _examiner.sets, question)
 
 
 def _answer(question: geometry.Question) -> list[Answer]:

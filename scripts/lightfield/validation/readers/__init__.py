@@ -60,6 +60,8 @@ READERS = {
     "scannetpp": scannetpp.read,
 }
 
+WITHOUT_VIEWS = ("coco", "mesh", "point_cloud")
+"""The exports that have no poses of views."""
 
 SEQUENCE_READERS = {
     "colmap_frames": colmap_frames.read,
@@ -77,10 +79,15 @@ def read(path: Path, size: tuple[int, int]) -> Exported:
     consumer could not open.
     """
     if path.name != MANIFEST:
-        return instant_ngp.read(path)
-    name, options = _format_and_options(path, READERS)
-    with reading(path, f"list of an export for {name}"):
-        return READERS[name](path, size, options)
+        name = "instant_ngp"
+        exported = instant_ngp.read(path)
+    else:
+        name, options = _format_and_options(path, READERS)
+        with reading(path, f"list of an export for {name}"):
+            exported = READERS[name](path, size, options)
+    if not exported.views and name not in WITHOUT_VIEWS:
+        exported.faults.append(f"{path}: this export for {name} has no view")
+    return exported
 
 
 def read_sequence(

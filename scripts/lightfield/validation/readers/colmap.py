@@ -25,6 +25,7 @@ from lightfield.validation.readers.contents import (
     ExportedView,
     Floats,
     Part,
+    development,
     from_texts,
     numbers,
 )
@@ -109,11 +110,15 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         with reading(tests, "list of images"):
             names = [Path(line).stem for line in tests.read_text(encoding="utf-8").splitlines()]
         exported.parts.append(Part(str(tests), "test", names))
-    if options["depth"]:
-        for image in model.images:
-            _check_depth_map(
-                listing.parent / "stereo/depth_maps" / f"{image.name}.geometric.bin", size, exported
-            )
+    for image in model.images:
+        view = Path(image.name).stem
+        colour = listing.parent / "images" / image.name
+        exported.add_picture(colour, view, "colour", development=development(options))
+        exported.add_mask(listing.parent / "masks" / f"{image.name}.png", view)
+        if options["depth"]:
+            depth = listing.parent / "stereo/depth_maps" / f"{image.name}.geometric.bin"
+            _check_depth_map(depth, size, exported)
+            exported.add_picture(depth, view, "metres", size=size)
     return exported
 
 

@@ -1,7 +1,7 @@
 """What an export says of a dataset, in the axes and metres of lightfield.json."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,37 @@ class DepthMap:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """A picture of a view, and what its numbers mean.
+
+    - ``place``: where it is, for messages.
+    - ``path``: the file. None for a mask that is missing: then all pixels count.
+    - ``view``: the name of the view. None for the view nearest to ``position`` (3,).
+    - ``kind``: "colour" in sRGB, or the pixels of the view itself in EXR; "luma" of ``bits`` bits;
+      "alpha"; "mask" (0: ignored); "hidden" (0: not ignored). Of depth: "steps" of ``unit`` metres,
+      0 for none; "metres", 0 for none; "disparity", ``unit`` divided by the depth, 0 for none;
+      "relative", 65535 at the farthest surface, 0 for none; "levels" of normalised disparity of
+      ``bits`` bits between the two depths ``limits``, where depth has ``lowest`` at least.
+    - ``meaning``: which depth, "z" or "distance".
+    - ``development``: exposure and white with which light becomes sRGB.
+    - ``size``: width and height of a file without a header of its own.
+    """
+
+    place: str
+    path: Path | None
+    view: str | None
+    kind: str
+    meaning: str = "z"
+    unit: float = 1.0
+    bits: int = 16
+    limits: tuple[float, float] = (0.0, math.inf)
+    lowest: int = 0
+    development: tuple[float, float] = (0.0, 1.0)
+    size: tuple[int, int] = (0, 0)
+    position: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Cloud:
     """World points (n, 3) in metres. The file calls them by their ``numbers`` (n,)."""
 
@@ -91,6 +122,29 @@ class Cloud:
 
     def name(self, index: int) -> str:
         return f"{self.file}: {self.kind} {self.numbers[index]}"
+
+
+@dataclass(frozen=True)
+class Box:
+    """What an annotation says: its ``number``, left, top, width and height, and area in pixels.
+
+    ``category`` is the number of an object, and ``instance`` that of its instance.
+    """
+
+    number: int
+    sides: tuple[float, ...]
+    area: float
+    category: int
+    instance: int
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The ``boxes`` of a ``view``. ``place`` is the file that has them."""
+
+    place: str
+    view: str
+    boxes: list[Box]
 
 
 @dataclass(frozen=True)
@@ -121,10 +175,9 @@ class UnitCube:
 class Exported:
     """One export.
 
-    ``views_of`` names the part of the split whose views it holds. None for all views. ``flows`` is
-    None for an export without flow. ``faults``
-    are lines about contradictions in its files, and with what its consumer needs. Each line names
-    the file.
+    ``views_of`` names the part of the split whose views it holds. None for all views. ``boxes`` and
+    ``flows`` are None for an export without them. ``faults`` are lines about contradictions in its
+    files, and with what its consumer needs. Each line names the file.
     """
 
     views: list[ExportedView] = field(default_factory=list)
@@ -133,10 +186,22 @@ class Exported:
     parts: list[Part] = field(default_factory=list)
     ranges: list[DepthRange] = field(default_factory=list)
     depth_map: DepthMap | None = None
+    pictures: list[Picture] = field(default_factory=list)
     clouds: list[Cloud] = field(default_factory=list)
+    boxes: list[Boxes] | None = None
     flows: list[Flow] | None = None
     cube: UnitCube | None = None
     faults: list[str] = field(default_factory=list)
+
+    def add_picture(self, path: Path, view: str | None, kind: str, **meaning: Any) -> None:
+        """Add a picture of a view, if it exists. Other checks report missing files."""
+        if path.is_file():
+            self.pictures.append(Picture(str(path), path, view, kind, **meaning))
+
+    def add_mask(self, path: Path, view: str) -> None:
+        """Add the mask of a view. If the file is missing, all pixels of the view count."""
+        exists = path.is_file()
+        self.pictures.append(Picture(str(path), path if exists else None, view, "mask"))
 
     def expect(self, place: str, actual: Any, expected: Any) -> None:
         """Note a fault if a number or a text is not the ``expected`` one."""
@@ -152,6 +217,11 @@ class Exported:
             self.faults.append(f"{place}: is {path.name}; must be {picture.format(view)}")
         elif not path.is_file():
             self.faults.append(f"{place}: there is no file {path}")
+
+
+def development(options: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the exposure and the white of an export's options."""
+    return float(options.get("exposure", 0)), float(options.get("reinhard", 1))
 
 
 def same(actual: Any, expected: Any) -> bool:

@@ -22,6 +22,7 @@ from lightfield.validation.readers.contents import (
     Exported,
     ExportedCamera,
     ExportedView,
+    development,
     number,
 )
 
@@ -64,6 +65,17 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             matrix[:3, 3] += baseline * (right * middle[:3, 0] - down * middle[:3, 1])
             exported.views.append(ExportedView(path, f"Cam{index:03}", None, matrix))
             _check_files(folder, f"_Cam{index:03}", (width, height), exported)
+            of_view = {"position": tuple(matrix[:3, 3].tolist()), "size": (width, height)}
+            colours = development(options)
+            picture = folder / f"input_Cam{index:03}.png"
+            exported.add_picture(picture, None, "colour", development=colours, **of_view)
+            unit = baseline * focal
+            for kind, name in (("metres", "depth"), ("disparity", "disp")):
+                map_path = folder / f"gt_{name}_lowres_Cam{index:03}.pfm"
+                exported.add_picture(map_path, None, kind, unit=unit, **of_view)
+                if index == rows // 2 * columns + columns // 2:
+                    middle_map = folder / f"gt_{name}_lowres.pfm"
+                    exported.add_picture(middle_map, None, kind, unit=unit, **of_view)
         exported.expect(f"{path}: offset", value("offset"), 0.0)
         exported.expect(f"{path}: depth_map_scale", value("depth_map_scale"), 1.0)
         # Cameras with parallel axes focus at infinity: d = b f / Z, and 0 for a miss.

@@ -24,6 +24,8 @@ from lightfield.validation.readers.contents import (
     same,
 )
 
+# The mask beside a picture.
+MASK = "dynamic_mask_{}.png"
 # Columns: the axes of lightfield.json in the loader's world.
 WORLD = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
@@ -46,6 +48,14 @@ def read(path: Path) -> Exported:
                 if "depth_path" in frame:
                     picture = path.parent / str(frame["depth_path"])
                     exported.expect_picture(f"{path}: {place}: depth_path", picture, name, "{}.png")
+                    # The loader scales a pinhole's rays to length 1 along the axis. Other rays have
+                    # length 1.
+                    is_pinhole = isinstance(exported.cameras[0].camera, Pinhole)
+                    meaning = "z" if is_pinhole else "distance"
+                    unit = number(content["integer_depth_scale"])
+                    exported.add_picture(picture, name, "steps", meaning=meaning, unit=unit)
+                mask = path.parent / Path(str(frame["file_path"])).with_name(MASK.format(name))
+                exported.add_picture(mask, name, "hidden")
         options = dict(content["options"])
         _compare_options(path, content, options, exported)
         is_given = options["scale"] is not None

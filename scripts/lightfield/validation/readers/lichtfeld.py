@@ -11,6 +11,7 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     Part,
+    development,
     number,
     numbers,
 )
@@ -33,6 +34,10 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 matrix = numbers(frame["transform_matrix"], (4, 4))
                 exported.views.append(ExportedView(path, place, picture.stem, matrix))
                 exported.expect_picture(f"{path}: {place}", picture, picture.stem, image)
+                view = picture.stem
+                exported.add_picture(picture, view, "colour", development=development(options))
+                exported.add_mask(folder / "masks" / f"{view}.png", view)
+                exported.add_picture(folder / "depth" / f"{view}.png", view, "relative")
         cloud, faults = read_ply(folder / str(content["ply_file_path"]))
     exported.clouds.append(cloud)
     exported.faults += faults

@@ -16,6 +16,7 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     Floats,
+    development,
     numbers,
 )
 from lightfield.validation.readers.omaf import depth_range_of, lens_of
@@ -46,6 +47,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 exported.ranges.append(depth_range_of(where, names[index], camera))
                 exported.expect(f"{where}: HasInvalidDepth", camera["HasInvalidDepth"], True)
                 _check_videos(where, listing.parent, camera, content["Frames_number"], exported)
+                _add_pictures(listing.parent, camera, options, exported)
         middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
         center = content["BoundingBox_center"]
         exported.expect(f"{path}: BoundingBox_center", center, middle.tolist())
@@ -59,6 +61,26 @@ def _matrix(camera: dict[str, Any]) -> Floats:
     matrix[:3, :3] = euler_to_matrix(np.array([roll, pitch, yaw])) @ _CAMERA
     matrix[:3, 3] = numbers(camera["Position"], (3,))
     return matrix
+
+
+def _add_pictures(
+    folder: Path, camera: dict[str, Any], options: dict[str, Any], exported: Exported
+) -> None:
+    """Add the texture and the depth of the camera that was read last. Level 0 means no depth."""
+    width, height = camera["Resolution"]
+    depth_range = exported.ranges[-1]
+    for kind, bits in (("texture", camera["BitDepthColor"]), ("depth", camera["BitDepthDepth"])):
+        exported.add_picture(
+            folder / f"{camera['Name']}_{kind}_{width}x{height}_yuv420p{bits}le.yuv",
+            depth_range.view,
+            "luma" if kind == "texture" else "levels",
+            meaning=depth_range.meaning,
+            limits=(depth_range.near, depth_range.far),
+            lowest=1,
+            bits=bits,
+            size=(width, height),
+            development=development(options),
+        )
 
 
 def _check_videos(

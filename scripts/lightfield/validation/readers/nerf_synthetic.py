@@ -14,6 +14,7 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     Part,
+    development,
     number,
     numbers,
 )
@@ -39,6 +40,9 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                     view = picture.stem
                     names.append(view)
                     exported.expect_picture(f"{path}: {place}: file_path", picture, view, "{}.png")
+                    colours = development(options)
+                    exported.add_picture(picture, view, "colour", development=colours)
+                    exported.add_picture(picture, view, "alpha")
                     matrix = numbers(frame["transform_matrix"], (4, 4))
                     exported.views.append(ExportedView(path, place, view, matrix))
         exported.parts.append(Part(str(path), name, names))

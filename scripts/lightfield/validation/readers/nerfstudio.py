@@ -16,6 +16,7 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     Part,
+    development,
     number,
     numbers,
 )
@@ -46,6 +47,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                     if key in frame:
                         picture = folder / str(frame[key])
                         exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
+                _add_pictures(folder, frame, name, options, exported)
         # Either all frames have a mask, or none. The options say whether they have depth.
         masks = sum("mask_path" in frame for frame in frames)
         exported.expect(f"{path}: frames with a mask_path", masks, len(frames) if masks else 0)
@@ -59,6 +61,21 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     exported.clouds.append(cloud)
     exported.faults += faults
     return exported
+
+
+def _add_pictures(
+    folder: Path, frame: dict[str, Any], view: str, options: dict[str, Any], exported: Exported
+) -> None:
+    """Add the picture of a frame, its mask, and its depth in millimetres."""
+    colour = folder / str(frame["file_path"])
+    exported.add_picture(colour, view, "colour", development=development(options))
+    exported.add_mask(folder / str(frame.get("mask_path", f"masks/{view}.png")), view)
+    if "depth_file_path" in frame:
+        # A pinhole's rays have length 1 along the axis. Other rays have length 1.
+        is_pinhole = isinstance(exported.cameras[0].camera, Pinhole)
+        meaning = "z" if is_pinhole else "distance"
+        depth = folder / str(frame["depth_file_path"])
+        exported.add_picture(depth, view, "steps", meaning=meaning, unit=0.001)
 
 
 def _camera(content: dict[str, Any]) -> Camera:

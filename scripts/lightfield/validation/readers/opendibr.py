@@ -16,6 +16,7 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     Floats,
+    development,
     numbers,
 )
 from lightfield.validation.readers.omaf import depth_range_of, lens_of
@@ -38,6 +39,8 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         for index, camera in enumerate(cameras, 1):
             with reading(f"{path}: cameras[{index}]", "camera"):
                 _read_camera(path, f"cameras[{index}]", camera, pictures, exported)
+                if options["format"] == "png":
+                    _add_pictures(path.parent, camera, options, exported)
         with reading(f"{path}: cameras[0]", "camera"):
             _check_viewport(f"{path}: cameras[0]", viewport, exported)
     return exported
@@ -62,6 +65,24 @@ def _read_camera(
     exported.views.append(ExportedView(path, place, name, _matrix(camera)))
     exported.cameras.append(ExportedCamera(where, lens_of(camera)))
     exported.ranges.append(depth_range_of(where, name, camera))
+
+
+def _add_pictures(
+    folder: Path, camera: dict[str, Any], options: dict[str, Any], exported: Exported
+) -> None:
+    """Add the texture and the depth of the camera that was read last."""
+    view = exported.views[-1].name
+    depth_range = exported.ranges[-1]
+    colours = development(options)
+    exported.add_picture(folder / camera["NameColor"], view, "colour", development=colours)
+    exported.add_picture(
+        folder / camera["NameDepth"],
+        view,
+        "levels",
+        meaning=depth_range.meaning,
+        limits=(depth_range.near, depth_range.far),
+        bits=int(camera["BitDepthDepth"]),
+    )
 
 
 def _matrix(camera: dict[str, Any]) -> Floats:

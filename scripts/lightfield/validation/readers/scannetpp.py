@@ -5,7 +5,7 @@ from typing import Any
 
 from lightfield.core.files import read_json, reading
 from lightfield.validation.readers.colmap import exported_model, read_model
-from lightfield.validation.readers.contents import Exported, Part
+from lightfield.validation.readers.contents import Exported, Part, development
 
 IMAGES = "image_undistorted_fisheye"
 
@@ -14,6 +14,11 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     """Read the model of an export, and its train_test_lists.json."""
     folder = listing.parent
     exported = exported_model(read_model(folder / "colmap", ".txt"), folder / IMAGES)
+    for view in exported.views:
+        name = view.name or ""
+        colour = folder / IMAGES / f"{name}.png"
+        exported.add_picture(colour, name, "colour", development=development(options))
+        exported.add_mask(folder / IMAGES / f"{name}_mask.png", name)
     path = folder / "train_test_lists.json"
     with reading(path, "list of ScanNet++'s"):
         content = read_json(path)
