@@ -401,6 +401,21 @@ def test_slow_pictures_in_motion_use_few_views(tab):
     assert counts == [2, VIEWS]
 
 
+def test_pictures_in_motion_have_hardly_more_holes_than_standing_ones(tab):
+    opened = tab()
+    opened.evaluate("walk.mode = MODES.indexOf('holes')")
+    random = np.random.default_rng(5)
+    holes = {True: 0.0, False: 0.0}
+    for _ in range(12):
+        place = random.uniform(-0.35, 0.35, 3).tolist()
+        yaw, pitch = random.uniform(-math.pi, math.pi), random.uniform(-0.8, 0.8)
+        for is_in_motion in holes:
+            shown = look_from(opened, place, yaw, pitch, is_in_motion)
+            # Holes are pink, all else is grey.
+            holes[is_in_motion] += (shown[..., 0] > shown[..., 1] + 0.3).mean() / 12
+    assert holes[True] < holes[False] + 0.005
+
+
 LARGE = {"lens": "equidistant", "fov": 180, "resolution": [450, 450]}
 
 
