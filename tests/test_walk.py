@@ -215,6 +215,98 @@ def test_the_eye_moves_by_keys_mouse_and_touch(tab):
     assert opened.evaluate(state) == home
 
 
+def test_a_shortcut_of_the_browser_moves_nothing(tab):
+    opened = tab()
+    opened.locator("#walk-overlay").focus()
+    opened.evaluate(
+        "addEventListener('keydown', (event) => { window.isTaken = event.defaultPrevented; })"
+    )
+    for shortcut in ("Control+a", "Control+-", "Meta+d", "Alt+w"):
+        opened.keyboard.press(shortcut)
+        assert opened.evaluate("window.isTaken") is False
+        assert opened.evaluate("walk.keys.size") == 0
+    opened.keyboard.press("w")
+    assert opened.evaluate("window.isTaken") is True
+
+
+def test_a_key_released_after_shift_does_not_stick(tab):
+    opened = tab()
+    opened.locator("#walk-overlay").focus()
+    key = """([type, key]) => walk.overlay.dispatchEvent(
+        new KeyboardEvent(type, { key, code: "Equal", bubbles: true }))"""
+    opened.evaluate(key, ["keydown", "+"])
+    assert opened.evaluate("walk.keys.size") == 1
+    opened.evaluate(key, ["keyup", "="])
+    assert opened.evaluate("walk.keys.size") == 0
+
+
+def test_a_key_pressed_twice_between_two_pictures_moves_no_faster(tab):
+    opened = tab()
+    parts_of_extent = opened.evaluate(
+        """() => {
+            const scheduled = [];
+            const request = window.requestAnimationFrame;
+            window.requestAnimationFrame = (draw) => scheduled.push(draw);
+            const before = walk.at;
+            for (const name of ["keydown", "keyup", "keydown"]) {
+                walk.overlay.dispatchEvent(new KeyboardEvent(name, { key: "d", code: "KeyD" }));
+            }
+            for (const draw of scheduled.splice(0)) draw(performance.now() + 50);
+            window.requestAnimationFrame = request;
+            walk.keys.clear();
+            return Math.hypot(...minus(walk.at, before)) / walk.extent;
+        }"""
+    )
+    # 0.6 times the extent in a second.
+    assert parts_of_extent == pytest.approx(0.6 * 0.05, rel=0.3)
+
+
+@pytest.mark.parametrize("canvas", ["walk-overlay", "rig"])
+def test_the_wheel_scrolls_the_page_until_a_picture_is_clicked(tab, canvas):
+    opened = tab()
+    opened.evaluate("(name) => element(name).scrollIntoView({ block: 'center' })", canvas)
+    opened.locator(f"#{canvas}").hover()
+    state = "[scrollY, ...walk.at, rig.zoom]"
+    before = opened.evaluate(state)
+    opened.mouse.wheel(0, -100)
+    opened.wait_for_timeout(500)
+    scrolled = opened.evaluate(state)
+    assert scrolled[0] < before[0]
+    assert scrolled[1:] == before[1:]
+    opened.locator(f"#{canvas}").focus()
+    opened.mouse.wheel(0, -100)
+    opened.wait_for_timeout(500)
+    moved = opened.evaluate(state)
+    assert moved[0] == scrolled[0]
+    assert moved[1:] != scrolled[1:]
+
+
+def test_the_walk_goes_on_after_the_graphics_card_was_lost(tab):
+    opened = tab()
+    before = look_from(opened, [0, 0, 0], 0, 0)
+    opened.evaluate(
+        "window.context = walk.gl.getExtension('WEBGL_lose_context'), context.loseContext()"
+    )
+    status = opened.locator("#walk-status")
+    status.wait_for()
+    assert "continue" in status.inner_text()
+    opened.evaluate("context.restoreContext()")
+    status.wait_for(state="hidden")
+    wait(opened)
+    assert (look_from(opened, [0, 0, 0], 0, 0) == before).all()
+
+
+def test_a_browser_without_webgl_2_says_so(small, show):
+    page = small / "without_webgl.html"
+    without = "<script>HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more)"
+    without += " { return kind === 'webgl2' ? null : get.call(this, kind, ...more); })"
+    without += "(HTMLCanvasElement.prototype.getContext);</script>"
+    page.write_text((small / "index.html").read_text().replace("<body>", "<body>" + without))
+    opened = show(page)
+    assert "WebGL 2" in opened.locator("#walk-status").inner_text()
+    assert opened.locator("#walk-controls").is_hidden()
+
+
 NARROW = {"lens": "rectilinear", "fov": 50, "resolution": [48, 48]}
 AROUND = {"size": 3.0, "center": BALL.tolist(), "camera": NARROW}
 DOWN = {"type": "plane", "cameras": [3, 3], "size": 0.5, "rotation": [-90, 0, 0]}
@@ -307,6 +399,21 @@ def test_slow_pictures_in_motion_use_few_views(tab):
             break
         opened.wait_for_timeout(100)
     assert counts == [2, VIEWS]
+
+
+def test_pictures_in_motion_have_hardly_more_holes_than_standing_ones(tab):
+    opened = tab()
+    opened.evaluate("walk.mode = MODES.indexOf('holes')")
+    random = np.random.default_rng(5)
+    holes = {True: 0.0, False: 0.0}
+    for _ in range(12):
+        place = random.uniform(-0.35, 0.35, 3).tolist()
+        yaw, pitch = random.uniform(-math.pi, math.pi), random.uniform(-0.8, 0.8)
+        for is_in_motion in holes:
+            shown = look_from(opened, place, yaw, pitch, is_in_motion)
+            # Holes are pink, all else is grey.
+            holes[is_in_motion] += (shown[..., 0] > shown[..., 1] + 0.3).mean() / 12
+    assert holes[True] < holes[False] + 0.005
 
 
 LARGE = {"lens": "equidistant", "fov": 180, "resolution": [450, 450]}

@@ -30,6 +30,8 @@ const zoomTo = (value) => {
 };
 
 function pointerDown(event) {
+  // A right button opens a menu, which may swallow the button's release.
+  if (event.button !== 0) return;
   rig.canvas.setPointerCapture(event.pointerId);
   rig.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
   rig.moved = 0;
@@ -73,6 +75,8 @@ function pointerLeave() {
 }
 
 function turnWheel(event) {
+  // The wheel scrolls the page until the user has clicked the rig.
+  if (document.activeElement !== rig.canvas) return;
   event.preventDefault();
   zoomTo(rig.zoom * Math.exp(-0.0015 * event.deltaY));
   drawRig();

@@ -6,6 +6,8 @@ import { WALK, walk } from "./state.js";
 // In motion, views are chosen again only if the eye has moved by more than this part of the rig's extent, or turned by
 // more than this many radians.
 export const IN_MOTION = 0.03;
+// A few views of a picture in motion leave half as many directions unseen as with 1.
+const COVERING = 1000;
 
 // Return whether a source sees in a direction, given in its own axes.
 function isSeen(x, y, z) {
@@ -55,21 +57,22 @@ function qualities(view, at, directions) {
 }
 
 // Return the sum over all directions of the logarithm of the worth of this view and the views taken so far.
-function gainOf(values, sums) {
+function gainOf(values, sums, covering) {
   let gain = 0;
-  for (let place = 0; place < sums.length; place++) gain += Math.log1p(sums[place] + values[place]);
+  for (let place = 0; place < sums.length; place++) gain += Math.log1p(covering * (sums[place] + values[place]));
   return gain;
 }
 
-// Return the views that together best see what the eye looks at. Repeatedly takes the view that adds most.
-export function bestViews(sources, count, at, eyeAxes, spread) {
+// Return the views that together best see what the eye looks at. Repeatedly takes the view that adds most. The larger
+// `covering` is, the more it counts to see a direction at all.
+export function bestViews(sources, count, at, eyeAxes, spread, covering = 1) {
   const directions = directionsOfEye(eyeAxes, spread);
   const valued = sources.map((source) => ({ source, values: qualities(source.view, at, directions) }));
   const sums = new Float64Array(WALK.distances.length * directions.length);
   const chosen = [];
   while (chosen.length < Math.min(count, sources.length)) {
     const rest = valued.filter(({ source }) => !chosen.includes(source));
-    const gains = rest.map(({ values }) => gainOf(values, sums));
+    const gains = rest.map(({ values }) => gainOf(values, sums, covering));
     const best = rest[gains.indexOf(Math.max(...gains))];
     chosen.push(best.source);
     best.values.forEach((value, place) => {
@@ -100,6 +103,7 @@ export function choose(count, eyeAxes, spread, slack) {
   walk.lastChoice = now;
   walk.choices += 1;
   walk.wanted = bestViews(walk.order, walk.sources, walk.at, eyeAxes, spread);
-  // They were taken one after the other, so the first few are also the best few.
-  walk.chosen = missing() ? bestViews(loaded, count, walk.at, eyeAxes, spread) : walk.wanted.slice(0, count);
+  if (missing()) walk.chosen = bestViews(loaded, count, walk.at, eyeAxes, spread);
+  else if (count >= walk.wanted.length) walk.chosen = walk.wanted;
+  else walk.chosen = bestViews(walk.wanted, count, walk.at, eyeAxes, spread, COVERING);
 }

@@ -5,13 +5,15 @@ import { drawWalkSoon } from "./drawing.js";
 import { fieldOfView } from "./eye.js";
 import { listenForHeadset } from "./headset.js";
 import { goHome, placeHash, showMode } from "./home.js";
-import { TURNING, WALKING, ZOOMING, keepMoving, moveEye, turnEye } from "./motion.js";
+import { TURNING, WALKING, ZOOMING, keepMoving, moveEye, turnEye, zoomBy } from "./motion.js";
 import { MODES, walk } from "./state.js";
 
 // One finger turns the eye, two fingers move it.
 function listenToPointers(overlay) {
   const pointers = new Map();
   overlay.addEventListener("pointerdown", (event) => {
+    // A right button opens a menu, which may swallow the button's release.
+    if (event.button !== 0) return;
     overlay.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     overlay.focus({ preventScroll: true });
@@ -29,24 +31,35 @@ function listenToPointers(overlay) {
   for (const name of ["pointerup", "pointercancel"]) {
     overlay.addEventListener(name, (event) => pointers.delete(event.pointerId));
   }
-  const moveForward = (event) => {
+  const followWheel = (event) => {
+    // The wheel scrolls the page until the user has clicked the picture.
+    if (document.activeElement !== overlay) return;
     event.preventDefault();
-    moveEye(-0.0005 * event.deltaY, 0, 0);
+    // A browser reports a pinch on a touchpad as the wheel with the control key.
+    if (event.ctrlKey) zoomBy(Math.exp(-0.01 * event.deltaY));
+    else moveEye(-0.0005 * event.deltaY, 0, 0);
   };
-  overlay.addEventListener("wheel", moveForward, { passive: false });
+  overlay.addEventListener("wheel", followWheel, { passive: false });
 }
 
 const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
 
 function listenToKeys(overlay) {
   overlay.addEventListener("keydown", (event) => {
+    // With these keys the browser does something else: it zooms the page, or marks all of it.
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const key = keyOf(event);
     if (!(key in WALKING || key in TURNING || key in ZOOMING)) return;
     event.preventDefault();
-    if (!walk.keys.size) keepMoving(performance.now());
-    walk.keys.add(key);
+    // The release of a key may have another `key`, if Shift was released before. Its `code` stays the same.
+    walk.keys.set(event.code, key);
+    keepMoving();
   });
-  overlay.addEventListener("keyup", (event) => walk.keys.delete(keyOf(event)));
+  overlay.addEventListener("keyup", (event) => {
+    walk.keys.delete(event.code);
+    // On macOS, keys that are released while Command is held have no keyup.
+    if (event.key === "Meta") walk.keys.clear();
+  });
   overlay.addEventListener("blur", () => walk.keys.clear());
 }
 

@@ -16,7 +16,7 @@ const FINE = 2;
 // A picture in motion has this part of the pixels across and down. The browser enlarges it.
 const COARSE = 0.33;
 // The picture counts as still this many milliseconds after the last motion.
-const REST = 200;
+export const REST = 200;
 
 // Resize the canvas to a part of its pixels across and down. Return its new width and height.
 function sizeCanvas(part) {
@@ -82,17 +82,25 @@ function drawOverlay(eyeAxes, spread) {
     drawVolume(context, project);
     drawCameras(context, project);
   }
+  showReadout();
+}
+
+export function showReadout() {
   // Adding 0 turns −0 into 0.
   const place = walk.at.map((value) => (Math.round(100 * value) / 100 + 0).toFixed(2));
-  element("walk-readout").textContent = [
-    `${place.join(", ")} m`,
+  const loaded = walk.order.filter((source) => source.isLoaded).length;
+  const parts = [
+    `at ${place.join(", ")} m`,
     `${metresToEdge(walk.at).toFixed(2)} m to the edge`,
-    `${walk.chosen.length} of ${walk.order.length} views`,
-  ].join(" · ");
+    `made of ${walk.chosen.length} of ${walk.order.length} views`,
+  ];
+  if (loaded < walk.order.length) parts.push(`${loaded} loaded so far`);
+  element("walk-readout").textContent = parts.join(" · ");
 }
 
 export const drawWalkSoon = onceAFrame(() => {
   if (!walk.ready) return;
+  walk.drawnAt = performance.now();
   drawWalk(walk.slow);
   clearTimeout(walk.rest);
   if (walk.slow) walk.rest = setTimeout(drawAllSources, REST);
@@ -100,7 +108,7 @@ export const drawWalkSoon = onceAFrame(() => {
 
 // Draw from all sources, and measure how long that takes. Reading a pixel waits until the drawing is done.
 function drawAllSources() {
-  if (missing()) return;
+  if (!walk.ready || missing()) return;
   const { gl } = walk;
   const start = performance.now();
   drawWalk();

@@ -7,7 +7,7 @@ import { bytesOf, decoded, depthOf } from "../page/packing.js";
 import { minus } from "../page/vectors.js";
 import { bestViews, missing } from "./choice.js";
 import { listen } from "./controls.js";
-import { drawWalkSoon } from "./drawing.js";
+import { REST, drawWalkSoon, showReadout } from "./drawing.js";
 import { axes, scales } from "./eye.js";
 import { goHome, restorePlace } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
@@ -31,14 +31,42 @@ import { program, texture } from "./webgl.js";
 // The walk begins with this many sources.
 const FIRST = 2;
 
-// Load all sources one after the other, first those that the eye wants. Call `begin` as soon as a few are loaded.
-async function loadSources(begin) {
+// Show a message in place of the picture, or hide it.
+function showStatus(message) {
+  const status = element("walk-status");
+  status.textContent = message;
+  status.hidden = !message;
+}
+
+// Wait while the eye moves and has all views that it wants, because loading a view holds up the next picture.
+async function untilStill() {
+  while (!missing() && performance.now() - walk.drawnAt < REST) {
+    await new Promise((resolve) => {
+      setTimeout(resolve, REST);
+    });
+  }
+}
+
+// Load all sources one after the other, first those that the eye wants. Begin to draw as soon as a few are loaded. A
+// graphics card that is lost meanwhile ends this: `restart` loads all sources again.
+async function loadSources() {
+  walk.loads += 1;
+  const thisLoad = walk.loads;
   for (let number = 0; number < walk.order.length; number++) {
+    await untilStill();
+    if (thisLoad !== walk.loads) return;
     const source = missing() || walk.order.find((other) => !other.isLoaded);
     const { light, depth } = source.entry;
-    upload(source, ...(await Promise.all([decoded(light), decoded(depth)])));
-    if (number + 1 === Math.min(FIRST, walk.order.length)) begin();
+    const pictures = await Promise.all([decoded(light), decoded(depth)]);
+    if (thisLoad !== walk.loads) return;
+    upload(source, ...pictures);
+    if (number + 1 === Math.min(FIRST, walk.order.length)) {
+      walk.ready = true;
+      showStatus("");
+      drawWalkSoon();
+    }
     if (walk.wanted.includes(source) && !missing()) drawWalkSoon();
+    if (walk.ready) showReadout();
   }
 }
 
@@ -62,6 +90,9 @@ function paletteTexture(gl) {
   return texture(gl, gl.TEXTURE_2D, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
 }
 
+// Let shaders draw into floats. Return null if the graphics card cannot.
+const enableFloats = (gl) => gl.getExtension("EXT_color_buffer_float");
+
 function prepareDrawing(gl) {
   walk.gl = gl;
   walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
@@ -75,10 +106,13 @@ function prepareDrawing(gl) {
   walk.palette = paletteTexture(gl);
 }
 
-async function prepareSources() {
-  walk.rays = await unpackedRays();
+function uploadRays() {
   const { gl } = walk;
   walk.raysTexture = texture(gl, gl.TEXTURE_2D, gl.RGBA32F, ...DATA.size, 0, gl.RGBA, gl.FLOAT, walk.rays);
+}
+
+async function prepareSources() {
+  walk.rays = await unpackedRays();
   walk.toRim = (await decoded(WALK.toRim)).filter((_, place) => place % 4 === 0);
   walk.sight = bytesOf(WALK.sight);
   walk.inverses = Float32Array.from({ length: DATA.depth.steps }, (_, code) => 1 / depthOf(code, DATA.depth.range));
@@ -87,23 +121,50 @@ async function prepareSources() {
   walk.extent = Math.max(...places.map((at) => Math.hypot(...minus(at, places[0])))) || 1;
 }
 
+// Bring everything onto the graphics card again.
+function restart() {
+  walk.stages = [];
+  walk.lastChoice = null;
+  for (const source of walk.order) source.isLoaded = false;
+  enableFloats(walk.gl);
+  prepareDrawing(walk.gl);
+  // Without rays `startWalk` has not come so far yet.
+  if (!walk.rays) return;
+  uploadRays();
+  loadSources();
+}
+
+// Browsers take the graphics card away from a page: when a phone sleeps, or when many pages use it.
+function followLosses() {
+  walk.canvas.addEventListener("webglcontextlost", (event) => {
+    // Without this the browser does not give the graphics card back.
+    event.preventDefault();
+    // This ends `loadSources`.
+    walk.loads += 1;
+    walk.ready = false;
+    showStatus("The browser has stopped 3D graphics for now. The walk will continue.");
+  });
+  walk.canvas.addEventListener("webglcontextrestored", restart);
+}
+
 async function startWalk() {
   if (!WALK) return;
   const gl = walk.canvas.getContext("webgl2", { antialias: false, alpha: false, preserveDrawingBuffer: true });
-  if (!gl || !gl.getExtension("EXT_color_buffer_float")) {
-    element("walk-section").hidden = true;
+  if (!gl || !enableFloats(gl)) {
+    showStatus("This browser cannot show the walk, because it lacks WebGL 2.");
+    element("walk-controls").hidden = true;
     return;
   }
+  followLosses();
   prepareDrawing(gl);
   await prepareSources();
+  uploadRays();
   goHome();
   restorePlace();
   const fieldOfView = scales(walk.canvas.clientWidth, walk.canvas.clientHeight);
   walk.wanted = bestViews(walk.order, walk.sources, walk.at, axes(), fieldOfView);
-  await loadSources(() => {
-    walk.ready = true;
-    listen();
-  });
+  listen();
+  await loadSources();
 }
 
 startWalk();

@@ -43,15 +43,26 @@ export function zoomBy(factor) {
   drawWalkSoon();
 }
 
+// Move by the held keys, for this many seconds.
+function moveByKeys(seconds) {
+  for (const key of walk.keys.values()) {
+    if (key in WALKING) moveEye(...WALKING[key].map((value) => 0.6 * seconds * value));
+    else if (key in ZOOMING) zoomBy(ZOOMING[key] ** seconds);
+    else turnEye(...TURNING[key].map((value) => 1.2 * seconds * value));
+  }
+}
+
 // Move in each frame for as long as a key is held.
-export function keepMoving(before) {
-  requestAnimationFrame((now) => {
-    const seconds = clamp((now - before) / 1000, 0, 0.1);
-    for (const key of walk.keys) {
-      if (key in WALKING) moveEye(...WALKING[key].map((value) => 0.6 * seconds * value));
-      else if (key in ZOOMING) zoomBy(ZOOMING[key] ** seconds);
-      else turnEye(...TURNING[key].map((value) => 1.2 * seconds * value));
-    }
-    if (walk.keys.size) keepMoving(now);
-  });
+export function keepMoving() {
+  // Two loops at once would move twice as fast.
+  if (walk.isMoving) return;
+  walk.isMoving = true;
+  let before = performance.now();
+  const moveOn = (now) => {
+    moveByKeys(clamp((now - before) / 1000, 0, 0.1));
+    before = now;
+    walk.isMoving = walk.keys.size > 0;
+    if (walk.isMoving) requestAnimationFrame(moveOn);
+  };
+  requestAnimationFrame(moveOn);
 }

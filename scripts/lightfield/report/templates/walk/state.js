@@ -18,9 +18,17 @@ export const walk = {
   pitch: 0,
   mode: 0,
   sources: MOST_SOURCES,
-  showsCameras: true,
-  keys: new Set(),
+  showsCameras: false,
+  // What each held key does, by its place on the keyboard.
+  keys: new Map(),
+  isMoving: false,
   frames: 0,
+  ready: false,
+  order: [],
+  // How often loading has begun, or has ended because the graphics card was lost.
+  loads: 0,
+  // When the last picture was drawn after a motion, in milliseconds.
+  drawnAt: -Infinity,
   stages: [],
   zoom: 1,
   slow: true,
