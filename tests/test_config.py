@@ -110,6 +110,15 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
     assert near.camera == far.camera
 
 
+@pytest.mark.parametrize(
+    ("folder", "path"),
+    [("./data", "data"), ("data/", "data"), ("a//./b", "a/b"), ("../b", "../b"), ("./-x", "./-x")],
+)
+def test_a_folder_has_one_path_however_it_is_written(folder, path):
+    content = {"scenes": "room", "preset": "full", "presets": {"full": {}}, "results": folder}
+    assert config.load_config(content).results == path
+
+
 def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
     path = tmp_path / "nested.yaml"
     path.write_text(

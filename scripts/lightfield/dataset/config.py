@@ -121,6 +121,15 @@ def _switch(value: Any) -> Any:
     return value
 
 
+def _plain_path(folder: str) -> str:
+    """Return a path without ``./`` and without a slash at its end: Snakemake compares texts.
+
+    A path such as ``./-x`` keeps them, because programs would take ``-x`` for a flag.
+    """
+    path = str(Path(folder))
+    return path if re.match(r"[\w./]", path) else folder
+
+
 def _unique(names: list[str]) -> list[str]:
     if not names or len(set(names)) < len(names):
         raise ValueError("must be a list of one or more names, each once")
@@ -173,6 +182,7 @@ Folder = Annotated[
         ),
         max_length=1000,
     ),
+    AfterValidator(_plain_path),
 ]
 # The characters of a path that the rules quote in commands.
 QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
