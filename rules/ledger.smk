@@ -119,6 +119,8 @@ def mark_noted_files():
     DAMAGED.update(finished_work().damage)
     for _, outputs in DAMAGED.values():
         rerun(outputs)
+    for outputs in finished_work().replaced.values():
+        rerun(outputs)
     before_jobs_are_chosen(mark_outdated_files)
 
 

@@ -110,6 +110,27 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
     assert near.camera == far.camera
 
 
+@pytest.mark.parametrize(
+    ("folder", "path"),
+    [("./data", "data"), ("data/", "data"), ("a//./b", "a/b"), ("../b", "../b"), ("./-x", "./-x")],
+)
+def test_a_folder_has_one_path_however_it_is_written(folder, path):
+    content = {"scenes": "room", "preset": "full", "presets": {"full": {}}, "results": folder}
+    assert config.load_config(content).results == path
+
+
+def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
+    path = tmp_path / "nested.yaml"
+    path.write_text(
+        "base: &base {size: 1, samples: 2}\n"
+        "rigs: {far: {camera: &far {<<: *base, size: 3}}}\n"
+        "other: {<<: *far, samples: 4}\n"
+    )
+    content = config.read_yaml(path, "nested")
+    assert content["rigs"]["far"]["camera"] == {"size": 3, "samples": 2}
+    assert content["other"] == {"size": 3, "samples": 4}
+
+
 def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     content = changed("reprojections.same", {"rigs": ["LFSphere"]})
     content["rigs"]["LFSphere"]["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}

@@ -83,6 +83,17 @@ def test_drawn_values_are_equal_on_every_machine():
     ]
 
 
+@pytest.mark.parametrize("kind", ["uniform", "log_uniform"])
+@pytest.mark.parametrize(
+    "bounds", [[0.1234561, 0.1234564], [0.1, 0.1000004], [0.9999997, 0.9999999]]
+)
+def test_drawn_values_lie_between_their_bounds(kind, bounds):
+    draws = family(seeds="0-19", values={"a.value": {kind: bounds}})
+    low, high = bounds
+    for member in draws.members():
+        assert low <= drawn(draws.values, member)["a.value"] <= high
+
+
 def test_draws_fill_their_ranges():
     draws = family(
         seeds="0-1999",

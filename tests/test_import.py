@@ -2,9 +2,11 @@
 
 import json
 import math
+import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import forks
 import numpy as np
@@ -18,7 +20,9 @@ from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
 from lightfield.dataset.loading import scene_datasets
+from lightfield.dataset.presence import outgrown_records
 from lightfield.dataset.published import lightfields
+from lightfield.dataset.records import ShardRecord
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -159,6 +163,37 @@ def test_a_shard_takes_over_enough_views_to_be_worth_a_start(
     (dataset,) = scene_datasets("theirs")
     # There are 400 views. Small ones are finished before a second process could start.
     assert fewest <= len(dataset.shards) <= most
+
+
+@pytest.mark.parametrize("has_hard_links", [True, False])
+def test_a_view_replaced_by_an_older_file_of_equal_size_is_imported_again(
+    published, tmp_path, monkeypatch, has_hard_links
+):
+    def no_links(*_arguments):
+        raise PermissionError
+
+    monkeypatch.chdir(tmp_path)
+    if not has_hard_links:
+        monkeypatch.setattr("os.link", no_links)
+    old_time = 1_700_000_000
+    for view in (published / "exr").iterdir():
+        os.utime(view, (old_time, old_time))
+    (dataset,) = scene_datasets("theirs")
+    (path,) = dataset.records("render")
+    record = ShardRecord(Path(path), Path(dataset.folder, "exr"))
+    views = sorted((published / "exr").iterdir())
+    for view in views:
+        imported = Path(dataset.folder, "exr", view.name)
+        link_or_copy(view, imported)
+        record.add(imported, view.name)
+    record.write(Path(dataset.folder, "exr", view.name) for view in views)
+    assert outgrown_records(dataset) == []
+    # As rsync does with --archive.
+    new_view = tmp_path / "new.exr"
+    new_view.write_bytes(views[0].read_bytes()[:-1] + b"?")
+    os.utime(new_view, (old_time - 60, old_time - 60))
+    new_view.replace(views[0])
+    assert outgrown_records(dataset) == [path]
 
 
 @pytest.mark.slow

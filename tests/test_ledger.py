@@ -38,3 +38,22 @@ def test_a_touched_file_is_read_once_for_all_jobs_that_read_it(tmp_path, monkeyp
     # The same process notices other bytes too.
     scene.write_bytes(b"another")
     assert {planned.changed_input(output) for output in outputs} == {str(scene)}
+
+
+def test_a_file_that_a_later_job_replaced_is_outdated_and_not_damaged(tmp_path):
+    path = tmp_path / "ledger.txt"
+    view = tmp_path / "view.exr"
+    for name, content in (("0-4.json", b"first"), ("0-2.json", b"second")):
+        record = tmp_path / name
+        record.write_text("{}")
+        view.write_bytes(content)
+        files = {str(file): Stamp.of(file) for file in (record, view)}
+        Ledger(path).note(Job([str(record)], files, {}, {}))
+    planned = Ledger(path)
+    assert planned.damage == {}
+    assert planned.replaced == {str(view): [str(tmp_path / "0-4.json")]}
+    # No run may note the first job's checksum with the times of the second job's file.
+    planned.refresh()
+    assert Ledger(path).replaced == planned.replaced
+    view.write_bytes(b"damage")
+    assert str(view) in Ledger(path).damage

@@ -72,13 +72,18 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
 
 
 def link_or_copy(file: Path, target: Path) -> None:
-    """Make ``target`` a hard link to ``file``, or a copy if the file system has no hard links."""
+    """Make ``target`` a hard link to ``file``, or a copy if the file system has no hard links.
+
+    A copy has the file's time of change, too.
+    """
     with atomic_path(target) as temporary:
         try:
             # Resolve symbolic links, as git-annex has. Linux would link the symbolic link itself.
             os.link(file.resolve(), temporary)
         except OSError:
             shutil.copyfile(file, temporary)
+            status = file.stat()
+            os.utime(temporary, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
 def sha256(path: Path | str) -> str:

@@ -121,6 +121,15 @@ def _switch(value: Any) -> Any:
     return value
 
 
+def _plain_path(folder: str) -> str:
+    """Return a path without ``./`` and without a slash at its end: Snakemake compares texts.
+
+    A path such as ``./-x`` keeps them, because programs would take ``-x`` for a flag.
+    """
+    path = str(Path(folder))
+    return path if re.match(r"[\w./]", path) else folder
+
+
 def _unique(names: list[str]) -> list[str]:
     if not names or len(set(names)) < len(names):
         raise ValueError("must be a list of one or more names, each once")
@@ -173,6 +182,7 @@ Folder = Annotated[
         ),
         max_length=1000,
     ),
+    AfterValidator(_plain_path),
 ]
 # The characters of a path that the rules quote in commands.
 QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
@@ -1348,10 +1358,23 @@ def record_blend(blend: Path, digest: str, lock: Path) -> None:
 class _UniqueKeyLoader(yaml.SafeLoader):
     """Safe YAML in which a key given twice is an error, not a silent overwrite."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._merged_nodes: set[yaml.MappingNode] = set()
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Replace `<<: *other` by the keys of the other mapping. Keys beside it take precedence.
+
+        Afterwards the node has the replaced keys twice. So this checks each node only before that.
+        """
+        if node not in self._merged_nodes:
+            self._merged_nodes.add(node)
+            self._check_keys(node)
+            super().flatten_mapping(node)
+
+    def _check_keys(self, node: yaml.MappingNode) -> None:
         keys: set[Any] = set()
         for key_node, _ in node.value:
-            # `<<: *other` merges a mapping. Keys beside it take precedence.
             if key_node.tag == "tag:yaml.org,2002:merge":
                 continue
             key = self.construct_object(key_node, deep=True)
@@ -1362,7 +1385,6 @@ class _UniqueKeyLoader(yaml.SafeLoader):
                 problem = f"the key {key!r} is given twice"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
             keys.add(key)
-        return super().construct_mapping(node, deep)
 
 
 # YAML 1.1 reads 12:30 as 750, 0123 as 83 and 0b11 as 3. Here they stay texts, so that messages show

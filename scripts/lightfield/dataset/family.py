@@ -74,8 +74,8 @@ class Draw(Settings):
             assert self.log_uniform
             low, high = self.log_uniform
             value = low * (high / low) ** part
-        # The last digits of a power differ between machines.
-        return float(f"{value:.6g}")
+        # The last digits of a power differ between machines. Rounding may leave the bounds.
+        return min(max(low, float(f"{value:.6g}")), high)
 
 
 class Member(Settings):

@@ -90,10 +90,14 @@ class Ledger:
         self._inputs: dict[str, dict[str, Stamp]] = {}
         # Jobs with a file whose size or times differ from its stamp.
         self._suspects: list[Job] = []
+        # The latest stamp of each file, by any job. Shards with other bounds make the same views.
+        self._latest: dict[str, Stamp] = {}
         line_count = 0
         obsolete_count = 0
         for job in jobs(path):
             line_count += 1
+            for name, stamp in job.files.items():
+                self._latest.setdefault(name, stamp)
             if all(name in self._inputs for name in job.outputs):
                 obsolete_count += 1
                 continue
@@ -129,23 +133,38 @@ class Ledger:
         """For each damaged path: what is wrong with it, and the outputs of the job that made it.
 
         A file with other times is compared by its SHA-256. If a job's outputs are all missing, they
-        do not count, because Snakemake detects them.
+        do not count, because Snakemake detects them. A file that a later job replaced is not
+        damaged: see `replaced`.
         """
         damage = {}
         for job in self._suspects:
             has_output = any(map(os.path.lexists, job.outputs))
             for name, stamp in job.files.items():
                 is_left_to_snakemake = name in job.outputs and not has_output
-                if is_left_to_snakemake or stamp.is_current(name):
+                if is_left_to_snakemake or stamp.is_current(name) or name in self.replaced:
                     continue
                 if problem := _problem(name, stamp):
                     damage[name] = (problem, job.outputs)
         return damage
 
+    @cached_property
+    def replaced(self) -> dict[str, list[str]]:
+        """For each file that a later job replaced: the outputs of an earlier job that lists it.
+
+        These outputs are outdated, but the file is as the later job wrote it.
+        """
+        replaced = {}
+        for job in self._suspects:
+            for name, stamp in job.files.items():
+                latest = self._latest[name]
+                if latest.sha256 != stamp.sha256 and _problem(name, latest) is None:
+                    replaced[name] = job.outputs
+        return replaced
+
     def refresh(self) -> None:
         """Note the present times of files that have new times, but the same content."""
         for job in self._suspects:
-            if not self.damage.keys() & job.files.keys():
+            if not (self.damage.keys() | self.replaced.keys()) & job.files.keys():
                 files = {
                     name: Stamp.of(name, stamp.sha256)
                     for name, stamp in job.files.items()

@@ -12,6 +12,9 @@ from lightfield.dataset import config, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.view_store import ViewStore
 
+# Some file systems keep times to two seconds.
+TIME_PRECISION_NS = 2 * 10**9
+
 
 def missing_views(dataset: Dataset) -> int:
     """Return how many views do not exist yet."""
@@ -40,9 +43,10 @@ def outgrown_records(dataset: Dataset) -> list[str]:
 
 
 def _is_outgrown(dataset: Dataset, record: Path) -> bool:
-    """Return whether a source file is newer than the record, or has another size.
+    """Return whether a source file is newer than the record, or not the one that was imported.
 
-    A source file that no longer exists does not count, because the import has its copy.
+    The imported file has the size and time of its source, but a source may be replaced by an older
+    file. A source file that no longer exists does not count, because the import has its copy.
     """
     sizes = shard_files.recorded_sizes(record, dataset.folder)
     if not sizes:
@@ -50,7 +54,12 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
     import_time = record.stat().st_mtime_ns
     for name, size in sizes.items():
         source = size_and_time(Path(str(dataset.imported), name))
-        if source and (source[0] != size or source[1] > import_time):
+        imported = size_and_time(Path(dataset.folder, name))
+        if source is None or imported is None:
+            continue
+        source_size, source_time = source
+        is_other_file = abs(source_time - imported[1]) > TIME_PRECISION_NS
+        if source_size != size or source_time > import_time or is_other_file:
             return True
     return False
 
