@@ -469,6 +469,13 @@ def test_the_filter_of_colour_does_not_change_depth_at_the_edge_of_the_image(fil
     assert np.abs(resampled / expected - 1).max() < 1e-5
 
 
+@pytest.mark.parametrize("filter_name", sorted(FILTERS))
+def test_an_image_of_which_the_source_sees_nothing_is_empty(filter_name):
+    behind = lens_map.rotation_matrix(180, 0, 0)
+    made = lens_map.compute(narrow_lens(16), narrow_lens(8), behind, filter_name)
+    assert np.isnan(apply(as_source(np.full((16, 16), 0.5)), made)).all()
+
+
 @pytest.mark.parametrize("value", [3e38, -3e38, 1.7e38])
 def test_nearest_keeps_the_largest_hashes_of_a_cryptomatte(value):
     # Their sum is beyond the range of float32.
