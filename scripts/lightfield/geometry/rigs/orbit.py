@@ -46,8 +46,8 @@ class Orbit(CountedRig):
     def unit_poses(self) -> UnitPoses:
         places = self.directions() / 2
         # In proportion to the longest side, so that a sphere's are exactly those of the unit box.
-        sides = self.sides / (self.sides.max() or 1.0)
-        from_middle = places * sides
+        longest = max(self.sides.tolist())
+        from_middle = places * (self.sides / (longest or 1.0))
         at_middle = ~from_middle.any(axis=-1)
         # A camera in the middle, of a rig without extent, looks as it would in the unit box.
         from_middle[at_middle] = places[at_middle]
