@@ -14,7 +14,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.geometry.flow import flow
+from lightfield.geometry.flow import flow, in_frame
 from lightfield.imaging import images
 from lightfield.validation.validate import validate
 
@@ -74,6 +74,21 @@ def test_flow_leads_to_the_same_point_unless_it_is_hidden(name):
     assert error.max() < 1e-6
     wall = seen & (np.linalg.norm(points, axis=-1) > RADIUS - 0.01)
     assert np.ptp(colour_of(points[wall])) > 50
+
+
+@pytest.mark.parametrize("longitude", [[-180, 180], [-60, 60]])
+def test_rounding_does_not_lead_out_of_a_panorama(longitude):
+    lens = lenses.from_camera(
+        {"lens": "equirectangular", "longitude": longitude, "resolution": [8, 4]}
+    )
+    motion = np.zeros((2, 4, 8), np.float32)
+    # To the very edges, but for rounding.
+    motion[0, :, 0] = np.nextafter(np.float32(-0.5), np.float32(-1))
+    motion[0, :, -1] = np.nextafter(np.float32(0.5), np.float32(1))
+    assert in_frame(lens, motion).all()
+    motion[0, :, -1] = 1
+    leads_around = longitude == [-180, 180]
+    assert in_frame(lens, motion)[:, -1].all() == leads_around
 
 
 def test_a_neighbour_is_the_nearest_view_elsewhere_with_the_most_similar_direction():

@@ -488,6 +488,34 @@ def test_a_cube_map_of_a_narrow_lens_has_the_front_face_alone(dataset, run):
         run(*cube, "--single", str(dataset / "out/view_0000f_f.png"), configs=False, source=False)
 
 
+@pytest.mark.parametrize(
+    ("lens", "faces"),
+    [
+        (("--i-rectilinear", "18,36"), "f"),  # 90 degrees
+        (("--i-rectilinear", "17.9,36"), "flrud"),  # a little more
+        (("--i-equirectangular=-45deg,45deg,-30deg,30deg",), "f"),
+        (("--i-equirectangular=-46deg,45deg,-30deg,30deg",), "fl"),
+        (("--i-equidistant", "180deg"), "flrud"),
+    ],
+)
+def test_a_cube_map_has_only_faces_that_the_image_shows(dataset, run, lens, faces):
+    size = ["--no-configs", f"{SIZE},{SIZE}"]
+    run(*size, *lens, "--cubemap", "8", "--png", "--filter-prefix", "view_0000f", configs=False)
+    assert names(dataset / "out") == sorted(f"view_0000f_{face}.png" for face in faces)
+
+
+def test_each_face_of_a_cube_map_has_a_file_for_its_lens_map(dataset, run, run_program):
+    # The workflow expects all six, and cannot tell which faces a fisheye sees.
+    flags = ["--no-configs", f"{SIZE},{SIZE}", "--i-equidistant", "180deg", "--cubemap", "8"]
+    maps = dataset / "maps"
+    maps.mkdir()
+    run_program("lens_map.py", maps / "lens.npy", *flags)
+    assert names(maps) == sorted(f"lens_{face}.npy" for face in CUBE_FACES)
+    use = ["--lens-map", str(maps / "lens.npy"), "--png", "--filter-prefix", "view_0000f"]
+    run(*flags, *use, configs=False)
+    assert names(dataset / "out") == sorted(f"view_0000f_{face}.png" for face in "flrud")
+
+
 def test_a_warning_is_printed_once(dataset, run, capsys):
     run("--cubemap", "256", "--png")
     assert capsys.readouterr().err.count("warning: upsampling") == 1

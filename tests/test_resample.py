@@ -456,6 +456,35 @@ def test_depth_is_taken_at_the_pixel_centre_for_any_samples():
     assert np.allclose(apply_depth(depth, single), apply_depth(depth, many), rtol=1e-6)
 
 
+@pytest.mark.parametrize("filter_name", sorted(FILTERS))
+def test_the_filter_of_colour_does_not_change_depth_at_the_edge_of_the_image(filter_name):
+    # The map reads only a part of the source. The target's border lies near the part's own border.
+    source, target = narrow_lens(200), narrow_lens(61, focal_length=70)
+    rotation = lens_map.rotation_matrix(11, 7, 3)
+    normal = np.array([0.5, 0.3, -1.0])
+    made = lens_map.compute(source, target, rotation, filter_name)
+    distance = plane_distance(rays_of(source), normal, 3.0).astype("f4")
+    resampled = apply_depth(distance, made, False, False)
+    expected = plane_distance(rays_of(target) @ rotation.T, normal, 3.0)
+    assert np.abs(resampled / expected - 1).max() < 1e-5
+
+
+@pytest.mark.parametrize("filter_name", sorted(FILTERS))
+def test_an_image_of_which_the_source_sees_nothing_is_empty(filter_name):
+    behind = lens_map.rotation_matrix(180, 0, 0)
+    made = lens_map.compute(narrow_lens(16), narrow_lens(8), behind, filter_name)
+    assert np.isnan(apply(as_source(np.full((16, 16), 0.5)), made)).all()
+
+
+@pytest.mark.parametrize("value", [3e38, -3e38, 1.7e38])
+def test_nearest_keeps_the_largest_hashes_of_a_cryptomatte(value):
+    # Their sum is beyond the range of float32.
+    source, target = narrow_lens(8), narrow_lens(4)
+    made = lens_map.compute(source, target, IDENTITY, "nearest")
+    pixels = np.full((8, 8, 4), value, np.float32)
+    assert np.array_equal(apply(pixels, made), np.full((4, 4, 4), value, np.float32))
+
+
 def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
     # The rim cuts pixels of the source in two.
     fisheye = Equidistant(width=64, height=64, fov=2.5)

@@ -599,6 +599,25 @@ def test_orbits_look_at_the_middle_from_the_given_places(name):
     assert len(thinner.poses()) == thinner.view_count == 7
 
 
+@pytest.mark.parametrize("name", ORBITS)
+@pytest.mark.parametrize("rotation", [[0, 0, 0], [20, 30, 40]])
+def test_orbits_of_an_ellipsoid_look_at_the_middle(name, rotation):
+    center = np.array([1, -2, 0.5])
+    shape = {"size": [4, 6, 1], "center": center.tolist(), "rotation": rotation}
+    poses = rigs.from_settings(ORBITS[name] | shape).poses()
+    matrices = np.array([pose.matrix() for pose in poses])
+    ahead = center - matrices[:, :3, 3]
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    np.testing.assert_allclose(-matrices[:, :3, 2], ahead, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_an_orbit_of_no_size_turns_on_the_spot(name):
+    ball, point = (rigs.from_settings(ORBITS[name] | {"size": size}).poses() for size in (3, 0))
+    assert [pose.rotation for pose in point] == [pose.rotation for pose in ball]
+    assert {pose.position for pose in point} == {(0, 0, 0)}
+
+
 def test_orbits_begin_in_front_of_the_object_and_turn_like_a_cylinder():
     ring = rigs.from_settings({"type": "ring", "count": 4, "size": 2}).poses()
     expected = [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]

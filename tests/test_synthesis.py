@@ -2,9 +2,11 @@
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -537,6 +539,22 @@ def test_mistakes_are_one_line(dataset, tmp_path, run_program, arguments, proble
     assert result.returncode
     assert problem in result.stderr.splitlines()[-1]
     assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
+def test_a_video_says_which_matrix_turns_it_back_into_its_colours(tmp_path):
+    # Without the matrix in the file, players choose one by the size of the picture.
+    path = tmp_path / "walk.mp4"
+    with video(path, (1280, 720), 25) as add:
+        add(np.full((720, 1280, 3), (200, 40, 30), np.uint8))
+    described = subprocess.run(["ffmpeg", "-i", path], capture_output=True, check=False).stderr
+    matrix = re.search(rb"yuv420p\(tv, (\w+)", described)[1].decode()
+    command = ["ffmpeg", "-v", "error", "-i", path, "-vf", f"scale=in_color_matrix={matrix}"]
+    command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    shown = np.frombuffer(subprocess.check_output(command), np.uint8).reshape(-1, 3)
+    assert np.abs(shown.astype(int) - (200, 40, 30)).max() <= 3
+    _, read_by_opencv = cv2.VideoCapture(str(path)).read()
+    assert np.abs(read_by_opencv[..., ::-1].astype(int) - (200, 40, 30)).max() <= 3
 
 
 def test_a_video_needs_ffmpeg(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from skimage.color import xyz2rgb
 
+from lightfield.imaging.primaries import PRIMARIES, from_rec_709, to_rec_709
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, to_16_bit, tone_map
 
 
@@ -19,6 +20,13 @@ def test_exposure_counts_in_stops_and_a_maximum_of_one_changes_nothing():
     assert np.allclose(tone_map(values, -1.0, 1.0), values / 2, rtol=1e-6)
     assert np.allclose(tone_map(values, 3.0, 1.0), values * 8, rtol=1e-6)
     assert tone_map(values, 0.0, 1.0) is values
+
+
+def test_exposure_keeps_colours_outside_rec_709():
+    # The green of ACEScg. Without its negative part, it would become another colour.
+    green = to_rec_709(np.array([[0.0, 1.0, 0.0]], np.float32), PRIMARIES["acescg"])
+    brighter = from_rec_709(tone_map(green, 1.0, 1.0), "acescg")
+    assert np.allclose(brighter, [[0, 2, 0]], atol=1e-5)
 
 
 def test_no_negative_value_passes_the_pole_of_the_curve():

@@ -149,10 +149,11 @@ def shorter(lens: Lens, across: Array) -> Array:
 
 def in_frame(lens: Lens, motion: Array) -> Array:
     """Return where (h, w) a flow (2, h, w) leads into the frame, up to rounding."""
+    rounding = 0.01
     y, x = np.indices(motion.shape[1:]) + 0.5 + motion[::-1]
     if isinstance(lens, Equirectangular):
-        x %= lens.turn
-    rounding = 0.01
+        # Rounding at the left edge must not lead around a part of a panorama.
+        x = (x + rounding) % lens.turn - rounding
     sides = ((x, lens.width), (y, lens.height))
-    inside = [(-rounding < at) & (at < side + rounding) for at, side in sides]
+    inside = [(-rounding <= at) & (at < side + rounding) for at, side in sides]
     return np.asarray(inside[0] & inside[1])

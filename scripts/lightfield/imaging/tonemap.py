@@ -13,7 +13,8 @@ def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
     """Return linear ``color`` brightened by ``exposure`` stops, then compressed by Reinhard.
 
     v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, from 1e-9 to 1e9. The value m becomes 1, and
-    m = 1 changes nothing. NaN stays NaN. Source: Reinhard et al. 2002, equation 4, applied to each
+    m = 1 changes nothing. Any other m makes values below 0, of colours outside Rec. 709, 0. NaN
+    stays NaN. Source: Reinhard et al. 2002, equation 4, applied to each
     channel as in SILVR's tool.
     """
     if exposure == 0 and reinhard == 1:
@@ -28,13 +29,14 @@ def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
 @kernel
 def _tone_map(values: Array, gain: np.float32, inverse_square: np.float32, out: Array) -> None:
     one = np.float32(1)
+    zero = np.float32(0)
     huge = np.float32(1e18)
     for i in range(values.size):
-        v = values[i]
-        # At −1 the curve has a pole. No light is negative, so clip it, but keep NaN.
-        if v == v:
-            v = max(v * gain, np.float32(0))
-        if v > huge:
+        v = values[i] * gain
+        if v < 0:
+            # The curve has a pole at −1, unless it is a line.
+            out[i] = v if inverse_square == one else zero
+        elif v > huge:
             # v / (1 + v) is 1 here, and v² may be infinite.
             out[i] = one + v * inverse_square
         else:

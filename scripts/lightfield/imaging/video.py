@@ -9,6 +9,13 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.imaging.pictures import Array
 
+# H.264 codes 2 × 2 pixels at once.
+_EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
+# The matrix from R, G, B. Programs that ignore what the file says, as OpenCV does, expect BT.601's.
+_MATRIX = "scale=out_color_matrix=smpte170m:out_range=limited,format=yuv420p"
+# What the file says. Without it, players take the matrix of a large picture for that of BT.709.
+_TAGS = "setparams=colorspace=smpte170m:range=limited:color_primaries=bt709:color_trc=iec61966-2-1"
+
 
 @contextmanager
 def video(
@@ -27,12 +34,11 @@ def video(
     """
     command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
     command += ["-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
-    # H.264 codes 2 × 2 pixels at once.
-    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264"]
+    command += ["-vf", f"{_EVEN},{_MATRIX},{_TAGS}", "-c:v", "libx264"]
     command += ["-crf", str(rate_factor)]
     if is_reproducible:
         command += ["-threads", "1", "-bitexact"]
-    command += ["-pix_fmt", "yuv420p", "-f", "mp4"]
+    command += ["-f", "mp4"]
     with atomic_path(path) as temporary:
         try:
             ffmpeg = subprocess.Popen(

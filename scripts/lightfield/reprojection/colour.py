@@ -93,7 +93,8 @@ def _st_warp(source: Array, lens_map: LensMap) -> Array:
     # A fifth channel counts the weights that fell on valid pixels.
     channels = np.dstack([np.where(valid[..., None], source, 0), valid]).astype(np.float32)
     scale = np.array([source.shape[1], source.shape[0]], np.float32)
-    st = np.where((lens_map.flags == kernels.NOTHING)[..., None], -1, lens_map.coordinates / scale)
+    has_nothing = (lens_map.flags == kernels.NOTHING)[..., None]
+    st = np.where(has_nothing, -1, lens_map.coordinates / scale)
     warped = _image_buffer(np.zeros((*st.shape[:2], 5), np.float32))
     coordinates = _image_buffer(st.astype(np.float32))
     has_warped = oiio.ImageBufAlgo.st_warp(
@@ -102,7 +103,8 @@ def _st_warp(source: Array, lens_map: LensMap) -> Array:
     if not has_warped:
         raise UserError(f"filter: st_warp failed: {warped.geterror()}")
     samples = lens_map.settings["samples"]
-    pixels = np.asarray(warped.get_pixels(oiio.FLOAT))
+    # In a window of few pixels, the filter reaches from −1 into the window.
+    pixels = np.where(has_nothing, 0, warped.get_pixels(oiio.FLOAT))
     blocks = pixels.reshape(height, samples, width, samples, 5).mean(axis=(1, 3))
     weight = blocks[..., 4:]
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -61,13 +61,26 @@ def _targets(settings: ReprojectionSettings, source: Lens) -> list[Target]:
 
 
 def _is_seen(target: Target, source: Lens) -> bool:
-    """Return whether the source sees any part of a target.
+    """Return whether the source's image shows any part of a target.
 
-    A fisheye of 180°, for example, sees nothing of the face behind it.
+    A fisheye of 180°, for example, shows nothing of the face behind it.
     """
-    rays = target.lens.resized(64, 64).pixel_rays() @ target.rotation.T
-    if np.isfinite(source.pixels(rays)).any():
-        return True
-    # The whole image of a narrow lens may lie between these rays.
-    pixels = target.lens.pixels(source.fitted(64).pixel_rays() @ target.rotation)
-    return bool(((pixels >= 0) & (pixels <= target.lens.width)).all(axis=-1).any())
+    to_source = _rays_across(target.lens) @ target.rotation.T
+    # The whole image of a narrow lens may lie between these rays, so test the other way, too.
+    to_target = _rays_across(source) @ target.rotation
+    return _shows_any(source, to_source) or _shows_any(target.lens, to_target)
+
+
+def _rays_across(lens: Lens) -> Array:
+    """Return rays (n, n, 3) of places across an image, almost from edge to edge."""
+    # Neighbouring faces share their edges, which show nothing of the other face.
+    places = np.linspace(1e-6, 1 - 1e-6, 65)
+    return lens.rays(lens.width * places[None, :], lens.height * places[:, None])
+
+
+def _shows_any(lens: Lens, rays: Array) -> bool:
+    """Return whether any of the rays (..., 3) lies in the lens's frame."""
+    pixels = lens.pixels(rays)
+    # Comparisons with NaN are false.
+    inside = (pixels >= 0) & (pixels <= [lens.width, lens.height])
+    return bool(inside.all(axis=-1).any())

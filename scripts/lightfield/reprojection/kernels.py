@@ -207,9 +207,9 @@ def nearest(
                 row = min(int(coordinates[i, j, 1]), height - 1)
                 column = min(int(coordinates[i, j, 0]), width - 1)
                 p = source[row, column]
-                if valid[row, column] == valid[row, column] and np.isfinite(
-                    p[0] + p[1] + p[2] + p[3]
-                ):
+                # In float64, because the sum of a Cryptomatte's hashes may exceed float32.
+                total = np.float64(p[0]) + p[1] + p[2] + p[3]
+                if valid[row, column] == valid[row, column] and np.isfinite(total):
                     out[i, j] = p
 
 

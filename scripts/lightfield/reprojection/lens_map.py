@@ -221,7 +221,7 @@ def _measure_pixels(
             counts[rows],
         )
         largest_count = max(largest_count, count)
-        areas.append(bounds(points[rows], reach + 1, footprints[rows], counts[rows]))
+        areas.append(bounds(points[rows], _margin(reach), footprints[rows], counts[rows]))
     if largest_count == 1:
         footprints, counts = footprints[:0], counts[:0]
     return points, target_cos, magnification, footprints, counts, areas
@@ -247,7 +247,7 @@ def _source_part(source: Lens, areas: list[Any], fold: Fold, reach: int) -> _Sou
     For a cube map it is the whole strip, with borders as wide as the filter reaches.
     """
     if isinstance(source, CubeMap):
-        border = _border(reach + max(area[4] for area in areas))
+        border = _margin(reach + max(area[4] for area in areas))
         return _SourcePart(
             window=(0, source.height, 0, source.width),
             corner=(0, 0),
@@ -474,15 +474,15 @@ def _measure_samples(
         pixels = source.pixels(target.rays(x[None, :], y[:, None]) @ rotation.T)
         inside = (pixels >= 0) & (pixels <= [source.width, source.height])
         if isinstance(source, CubeMap):
-            pixels = _on_strip(pixels, source, _border(reach))
+            pixels = _on_strip(pixels, source, _margin(reach))
         fine[rows] = np.where(inside.all(axis=-1, keepdims=True), pixels, np.nan)
-        areas.append(bounds(fine[rows], reach + 1, no_footprints, no_counts))
+        areas.append(bounds(fine[rows], _margin(reach), no_footprints, no_counts))
     return fine, areas
 
 
-def _border(reach: int) -> int:
-    """Return the width of the borders of faces in pixels."""
-    # Depth reads two pixels on each side of a ray's own.
+def _margin(reach: int) -> int:
+    """Return how many pixels are read at most on each side of a sample's own, or of its face."""
+    # Depth reads two pixels on each side of a ray's own, whatever the filter.
     return max(reach + 1, 2)
 
 

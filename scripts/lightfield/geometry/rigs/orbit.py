@@ -23,7 +23,10 @@ Elevations = Annotated[tuple[Elevation, Elevation], as_list(2), AfterValidator(_
 
 
 class Orbit(CountedRig):
-    """``size`` is the sphere's diameter."""
+    """``size`` is the sphere's diameter, or an ellipsoid's along x, y and z.
+
+    Cameras of an ellipsoid look at its middle, too.
+    """
 
     shape = "SPHERE"
     is_round = True
@@ -42,7 +45,14 @@ class Orbit(CountedRig):
 
     def unit_poses(self) -> UnitPoses:
         places = self.directions() / 2
-        return UnitPoses.of_sides(("", places, matrix_to_euler(looking_at(places, np.zeros(3)))))
+        # In proportion to the longest side, so that a sphere's are exactly those of the unit box.
+        longest = max(self.sides.tolist())
+        from_middle = places * (self.sides / (longest or 1.0))
+        at_middle = ~from_middle.any(axis=-1)
+        # A camera in the middle, of a rig without extent, looks as it would in the unit box.
+        from_middle[at_middle] = places[at_middle]
+        turns = matrix_to_euler(looking_at(from_middle, np.zeros(3)))
+        return UnitPoses.of_sides(("", places, turns))
 
     def unit_outline(self) -> list[Floats]:
         return ball_outline()
