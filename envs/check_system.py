@@ -1,8 +1,8 @@
 """Install the system packages that the environment needs, as root on Debian or Ubuntu.
 
 Elsewhere, and without root, name the missing packages. They are the libraries that bpy links to,
-Python's module for environments, and for the tests a browser and rsync. This uses only the standard
-library, because it runs before anything is installed.
+Python's module for environments, and for the tests a browser, ffmpeg and rsync. This uses only the
+standard library, because it runs before anything is installed.
 """
 
 import argparse
@@ -56,7 +56,7 @@ def missing(tests: bool) -> list[str]:
     if not importlib.util.find_spec("ensurepip"):
         packages.append("python{}.{}-venv".format(*sys.version_info))
     if tests:
-        packages += [name for name in ("chromium", "rsync") if not shutil.which(name)]
+        packages += [name for name in ("chromium", "ffmpeg", "rsync") if not shutil.which(name)]
     return packages
 
 

@@ -136,7 +136,7 @@ def test_root_installs_what_is_missing(check_system):
     check_system(0)
     assert check_system.log.read_text().splitlines() == [
         "--quiet=2 update",
-        "--quiet=2 install --yes chromium rsync",
+        "--quiet=2 install --yes chromium ffmpeg rsync",
     ]
     # A second check installs nothing.
     check_system(0)
@@ -144,6 +144,6 @@ def test_root_installs_what_is_missing(check_system):
 
 
 def test_other_users_are_told_the_command_that_installs_it(check_system):
-    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium rsync$"):
+    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium ffmpeg rsync$"):
         check_system(1000)
     assert not check_system.log.exists()

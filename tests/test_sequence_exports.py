@@ -128,10 +128,6 @@ def test_dnerf_starts_from_points_of_the_first_frame(sequence, tmp_path):
 
 
 def test_neural_3d_video_has_a_video_and_a_pose_for_each_camera(sequence, tmp_path):
-    if shutil.which("ffmpeg") is None:
-        settings = settings_of("neural_3d_video")(sources=["perspective"])
-        assert "ffmpeg" in settings.refusal(lenses.from_camera(FLAT), True)
-        return
     folder = exported(sequence / "split", "neural_3d_video", tmp_path / "first", points=300)
     rows = np.load(folder / "poses_bounds.npy")
     videos = sorted(folder.glob("cam*.mp4"))
