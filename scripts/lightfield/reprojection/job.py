@@ -30,7 +30,7 @@ from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.sensor import parameters_of
 
 # The version of the files, which every key has. Raise it if equal settings give other files.
-VERSION = 3
+VERSION = 4
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
