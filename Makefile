@@ -10,6 +10,9 @@ CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 PIP = .venv/bin/pip -qq --disable-pip-version-check
+# Compiles an environment's packages on all cores. pip would take one. Some packages bring files that
+# are no valid Python, so errors do not count.
+COMPILE = bin/python -m compileall -qq -j 0
 # The version of the environment's Python, as in the locks' names, and the other supported version.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
@@ -73,11 +76,13 @@ soak: .venv/complete
 	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
 	"$$python" envs/check_system.py; \
 	"$$python" -m venv --clear .venv
-	@$(PIP) install --require-hashes -r envs/requirements-$(VERSION).txt
+	@$(PIP) install --no-compile --require-hashes -r envs/requirements-$(VERSION).txt
+	@.venv/$(COMPILE) .venv/lib || true
 	@touch $@
 
 .venv/complete-for-tests: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
-	@$(PIP) install --require-hashes -r envs/requirements-test-$(VERSION).txt
+	@$(PIP) install --no-compile --require-hashes -r envs/requirements-test-$(VERSION).txt
+	@.venv/$(COMPILE) .venv/lib || true
 	@touch $@
 
 .venv-other/complete: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
@@ -85,8 +90,9 @@ soak: .venv/complete
 	echo "setting up .venv-other with $$python: some minutes, mostly to download 400 MB"; \
 	"$$python" envs/check_system.py; \
 	"$$python" -m venv --clear .venv-other
-	@.venv-other/bin/pip -qq --disable-pip-version-check install --require-hashes \
+	@.venv-other/bin/pip -qq --disable-pip-version-check install --no-compile --require-hashes \
 		-r envs/requirements-test-$(OTHER).txt
+	@.venv-other/$(COMPILE) .venv-other/lib || true
 	@touch $@
 
 # For machines without a common folder.
