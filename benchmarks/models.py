@@ -191,8 +191,26 @@ def pipes(scene: Scene, random: Random) -> list[Part]:
 
 
 KINDS: tuple[Callable[[Scene, Random], list[Part]], ...] = (
-    *(vase, bowl, column, table, chair, shelf, tower, tree, bush, grass),
-    *(letters, arch, well, knot, spring, gear, star, rock, picture, pipes),
+    vase,
+    bowl,
+    column,
+    table,
+    chair,
+    shelf,
+    tower,
+    tree,
+    bush,
+    grass,
+    letters,
+    arch,
+    well,
+    knot,
+    spring,
+    gear,
+    star,
+    rock,
+    picture,
+    pipes,
 )
 
 

@@ -69,8 +69,18 @@ def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[st
     LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(lightfield)
     run(
         "render_shard.py",
-        *("--blend", blend, "--lightfield", lightfield, "--output", folder / str(samples)),
-        *("--journal", journal, "--device", "cpu", "--threads", "1"),
+        "--blend",
+        blend,
+        "--lightfield",
+        lightfield,
+        "--output",
+        folder / str(samples),
+        "--journal",
+        journal,
+        "--device",
+        "cpu",
+        "--threads",
+        "1",
     )
     lines = [json.loads(line) for line in journal.read_text().splitlines()]
     # The first view pays for the scene's acceleration structures.

@@ -108,7 +108,14 @@ def unreadable(path: Path, rng: random.Random) -> None:
 
 
 KINDS: list[Callable[[Path, random.Random], None]] = [
-    *(flip, truncate, empty, delete, replace, swap, folder, unreadable)
+    flip,
+    truncate,
+    empty,
+    delete,
+    replace,
+    swap,
+    folder,
+    unreadable,
 ]
 
 

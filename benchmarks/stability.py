@@ -340,7 +340,8 @@ class Worst:
     def add(self, error: mpf, bound: mpf) -> None:
         self.vague |= bool(bound > VAGUE)
         if self.bound == 0 or error * self.bound > self.error * bound:
-            self.error, self.bound = error, bound
+            self.error = error
+            self.bound = bound
 
     def compare(
         self,

@@ -31,11 +31,25 @@ from pathlib import Path
 PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
 LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
-    *("snakemake.report", "snakemake.report.html_reporter", "smart_open"),
+    "snakemake.report",
+    "snakemake.report.html_reporter",
+    "smart_open",
     # What the programs import.
-    *("numba", "OpenEXR", "OpenImageIO", "PIL.Image", "pydantic", "psutil", "yaml"),
-    *("scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "skimage.metrics"),
-    *("matplotlib.pyplot", "matplotlib.style", "matplotlib.backends.backend_svg"),
+    "numba",
+    "OpenEXR",
+    "OpenImageIO",
+    "PIL.Image",
+    "pydantic",
+    "psutil",
+    "yaml",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.spatial",
+    "scipy.stats",
+    "skimage.metrics",
+    "matplotlib.pyplot",
+    "matplotlib.style",
+    "matplotlib.backends.backend_svg",
 )
 # What Blender imports. Not every version needs, and brings, all of it.
 BLENDER_LIBRARIES = ("cattrs.preconf.json", "requests")

@@ -30,8 +30,13 @@ LENSES = {
     "panorama": {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]},
 }
 RENDER = {
-    **{"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 4},
-    **{"depth_precision": "float", "passes": list(PASSES)},
+    "samples": 4,
+    "adaptive_threshold": 0,
+    "denoise": False,
+    "seed": 0,
+    "max_bounces": 4,
+    "depth_precision": "float",
+    "passes": list(PASSES),
 }
 
 

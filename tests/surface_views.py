@@ -22,11 +22,21 @@ LENSES = {
     "panorama": {"lens": "equirectangular", "resolution": [4 * SIZE, 2 * SIZE]},
 }
 SURFACES = [
-    *("base_colour", "roughness", "metallic", "transmission", "surface_emission", "surface_mask")
+    "base_colour",
+    "roughness",
+    "metallic",
+    "transmission",
+    "surface_emission",
+    "surface_mask",
 ]
 RENDER = {
-    **{"samples": 16, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 2},
-    **{"depth_precision": "float", "passes": ["object", *SURFACES]},
+    "samples": 16,
+    "adaptive_threshold": 0,
+    "denoise": False,
+    "seed": 0,
+    "max_bounces": 2,
+    "depth_precision": "float",
+    "passes": ["object", *SURFACES],
 }
 # What every exact cube has: as the passes give it.
 KNOWN = {

@@ -60,9 +60,17 @@ TAKEN = {
 
 def build(folder, *arguments, accept="accept_blend=false"):
     command_line = [
-        *("--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "1"),
+        "--snakefile",
+        ROOT / "Snakefile",
+        "--directory",
+        folder,
+        "--cores",
+        "1",
         *arguments,
-        *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
+        "--config",
+        "preset=full",
+        f"scenes=[{','.join(SCENES)}]",
+        accept,
     ]
     return forks.run_snakemake(command_line, "/")
 

@@ -57,8 +57,18 @@ def calibrated(tmp_path_factory, run_program, room_probes):
         result = run_program(
             "calibrate.py",
             *room_probes(target_error=target, **limits),
-            *("--probes", "4", "--size", "24", "--device", "cpu", "--cache", folder / "cache"),
-            *("--output", folder / "record.json", "--seconds", folder / "seconds.json"),
+            "--probes",
+            "4",
+            "--size",
+            "24",
+            "--device",
+            "cpu",
+            "--cache",
+            folder / "cache",
+            "--output",
+            folder / "record.json",
+            "--seconds",
+            folder / "seconds.json",
             *more,
         )
         return folder, result

@@ -105,10 +105,20 @@ def dataset(tmp_path, run_program):
         (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
             "costs.py",
-            *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
-            *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
-            *("--settings", tmp_path / "settings.json"),
-            *("--output", tmp_path / "costs.json"),
+            "--dataset",
+            folder,
+            "--journals",
+            journals,
+            "--benchmarks",
+            work / "rig",
+            "--scene-benchmarks",
+            work / "scene",
+            "--blend",
+            work / "scene.blend",
+            "--settings",
+            tmp_path / "settings.json",
+            "--output",
+            tmp_path / "costs.json",
             *arguments,
         )
         return json.loads((tmp_path / "costs.json").read_text())

@@ -126,7 +126,8 @@ def test_one_plain_run_mends_every_kind_of_file(smoke, tmp_path, monkeypatch):
     # Views with intact files are not rendered again, although their scene was damaged.
     again = (rendered(damaged.root) - before).items()
     assert {key[1]: n for key, n in again if key[0] == damaged.root / journals} == {
-        **{"view_b0000f": 1, "view_f0000f": 1}
+        "view_b0000f": 1,
+        "view_f0000f": 1,
     }
 
 

@@ -67,10 +67,17 @@ def reproject(tmp_path, tmp_path_factory, run_program):
         settings = tmp_path_factory.mktemp("settings") / f"{name}.json"
         write_json(settings, content.settings.as_json())
         run_program(
-            *("reproject.py", "--settings", settings),
-            *("--input-cfg", tmp_path / "lightfield.json"),
-            *("--input-dir", tmp_path / "exr", "--output-dir", folder),
-            *("--output-cfg", folder / "lightfield.json"),
+            "reproject.py",
+            "--settings",
+            settings,
+            "--input-cfg",
+            tmp_path / "lightfield.json",
+            "--input-dir",
+            tmp_path / "exr",
+            "--output-dir",
+            folder,
+            "--output-cfg",
+            folder / "lightfield.json",
         )
         return folder
 

@@ -144,6 +144,8 @@ def test_root_installs_what_is_missing(check_system):
 
 
 def test_other_users_are_told_the_command_that_installs_it(check_system):
-    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium ffmpeg rsync$"):
+    with pytest.raises(
+        SystemExit, match=r"^error: .*: sudo apt-get install chromium ffmpeg rsync$"
+    ):
         check_system(1000)
     assert not check_system.log.exists()

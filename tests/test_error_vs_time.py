@@ -42,10 +42,26 @@ def measured(tmp_path_factory, run_program, room):
     def run():
         return run_program(
             "error_vs_time.py",
-            *("--blend", room, "--inventory", folder / "inventory.json", "--device", "cpu"),
-            *("--lightfield", folder / "lightfield.json", "--cache", folder / "cache"),
-            *("--probes", "1", "--size", "32", "--octaves", "4", "--reference", "256"),
-            *("--output", folder / "room"),
+            "--blend",
+            room,
+            "--inventory",
+            folder / "inventory.json",
+            "--device",
+            "cpu",
+            "--lightfield",
+            folder / "lightfield.json",
+            "--cache",
+            folder / "cache",
+            "--probes",
+            "1",
+            "--size",
+            "32",
+            "--octaves",
+            "4",
+            "--reference",
+            "256",
+            "--output",
+            folder / "room",
         )
 
     run.folder = folder
@@ -339,8 +355,16 @@ def test_a_target_error_without_calibration_is_refused(measured, run_program, ro
     lightfield({"target_error": 0.01}).write(path)
     result = run_program(
         "error_vs_time.py",
-        *("--blend", room, "--inventory", measured.folder / "inventory.json"),
-        *("--lightfield", path, "--cache", "none", "--output", measured.folder / "none"),
+        "--blend",
+        room,
+        "--inventory",
+        measured.folder / "inventory.json",
+        "--lightfield",
+        path,
+        "--cache",
+        "none",
+        "--output",
+        measured.folder / "none",
         check=False,
     )
     assert result.returncode == 1

@@ -478,9 +478,7 @@ def test_a_rig_that_tests_another_dataset_is_placed_like_it(dataset: Dataset) ->
 
 def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
     dataset.write(FISHEYE)
-    transforms = dataset.export(
-        "--aabb-scale", 16, "--render-aabb", *[0.1, 0.2, 0.3, 0.7, 0.8, 0.9]
-    )
+    transforms = dataset.export("--aabb-scale", 16, "--render-aabb", 0.1, 0.2, 0.3, 0.7, 0.8, 0.9)
     assert transforms["aabb_scale"] == 16
     assert transforms["render_aabb"] == [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
 

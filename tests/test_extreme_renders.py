@@ -108,8 +108,12 @@ def checked(folder, run_program, blend, **rig):
     content.write(folder / "lightfield.json")
     return run_program(
         "check_cameras.py",
-        *("--blend", blend, "--lightfield", folder / "lightfield.json"),
-        *("--output", folder / "cameras.json"),
+        "--blend",
+        blend,
+        "--lightfield",
+        folder / "lightfield.json",
+        "--output",
+        folder / "cameras.json",
         check=False,
     )
 

@@ -72,13 +72,26 @@ rigs:
 family: {seeds: 0-1}
 """
 TARGETS = [
-    *("all", "smoke", "package", "rig_tables", "plan", "status"),
-    *("error_vs_time", "reprojection_benchmark", "stability", "extremes", "render_overhead"),
-    *("advise", "gpu_check", "synthesis", "learn", "verify"),
+    "all",
+    "smoke",
+    "package",
+    "rig_tables",
+    "plan",
+    "status",
+    "error_vs_time",
+    "reprojection_benchmark",
+    "stability",
+    "extremes",
+    "render_overhead",
+    "advise",
+    "gpu_check",
+    "synthesis",
+    "learn",
+    "verify",
 ]
 CHOSEN = ["--config", "scenes=[brought,imported,modelled,many]", "rigs=all", "preset=full"]
 RULES = [
-    *("fetch_brought",),
+    "fetch_brought",
     *(
         rule
         for file in sorted((ROOT / "rules").glob("*.smk"))
@@ -183,8 +196,15 @@ class Failing:
             (self.folder / file).unlink()
         run = self.run(
             # A page would update the filled-in files of its dataset, because they are damaged.
-            *("--allowed-rules", *rules, "--rerun-triggers", "mtime", *options),
-            *(*CHOSEN, *config, "--force", *targets),
+            "--allowed-rules",
+            *rules,
+            "--rerun-triggers",
+            "mtime",
+            *options,
+            *CHOSEN,
+            *config,
+            "--force",
+            *targets,
             work=work,
         )
         assert run.returncode != 0, run.stdout
@@ -239,8 +259,16 @@ def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
     options = [
-        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
-        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+        "--executor",
+        "cluster-generic",
+        "--jobs",
+        "1",
+        "--cluster-generic-status-cmd",
+        "echo",
+        "--cluster-generic-submit-cmd",
+        "bash submit.sh",
+        "--seconds-between-status-checks",
+        "1",
         *groups,
     ]
     terminal = failing.fail("render", options=options)
@@ -260,9 +288,16 @@ def test_the_batch_systems_log_is_named_for_a_job_that_never_began(failing, grou
     earlier.write_text("error: of an earlier run\n")
     os.utime(earlier, (WHEN, WHEN))
     options = [
-        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
-        *("--cluster-generic-submit-cmd", "bash submit.sh {name}"),
-        *("--seconds-between-status-checks", "1"),
+        "--executor",
+        "cluster-generic",
+        "--jobs",
+        "1",
+        "--cluster-generic-status-cmd",
+        "echo",
+        "--cluster-generic-submit-cmd",
+        "bash submit.sh {name}",
+        "--seconds-between-status-checks",
+        "1",
         *groups,
     ]
     terminal = failing.fail("render", options=options)
@@ -298,8 +333,13 @@ def test_the_end_says_why_slurm_refuses_a_job(
     terminal = failing.fail(
         "render",
         options=[
-            *("--executor", "slurm", "--jobs=1", *resources, *groups),
-            *("--slurm-init-seconds-before-status-checks", "1"),
+            "--executor",
+            "slurm",
+            "--jobs=1",
+            *resources,
+            *groups,
+            "--slurm-init-seconds-before-status-checks",
+            "1",
         ],
     )
     # The account is checked before a job exists. Older plugins break the line.
@@ -425,8 +465,16 @@ def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing)
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
     options = [
-        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
-        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+        "--executor",
+        "cluster-generic",
+        "--jobs",
+        "1",
+        "--cluster-generic-status-cmd",
+        "echo",
+        "--cluster-generic-submit-cmd",
+        "bash submit.sh",
+        "--seconds-between-status-checks",
+        "1",
     ]
     try:
         terminal = failing.fail("render", options=options, config=["device=metal"])

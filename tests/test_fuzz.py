@@ -55,15 +55,60 @@ TIMES = itertools.count(10**18, 10**6)
 COUNTS = [pytest.param(40, id="few"), pytest.param(600, id="many", marks=pytest.mark.slow)]
 
 HOSTILE = [
-    *(None, True, False, 0, -1, 1, 2**31, 10**30, -(10**400), 0.5, -0.0, 1e308, 5e-324),
-    *(float("nan"), float("inf"), -float("inf")),
-    *("", "a", "0", "nan", "\0", "../..", "/dev/zero", "x" * 5000, "ä\ud800", "f:/\\"),
-    *([], {}, [[]], [None], {"": None}, [0] * 1000, [[0] * 4] * 4, {"a": {"a": {"a": 1}}}),
+    None,
+    True,
+    False,
+    0,
+    -1,
+    1,
+    2**31,
+    10**30,
+    -(10**400),
+    0.5,
+    -0.0,
+    1e308,
+    5e-324,
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+    "",
+    "a",
+    "0",
+    "nan",
+    "\0",
+    "../..",
+    "/dev/zero",
+    "x" * 5000,
+    "ä\ud800",
+    "f:/\\",
+    [],
+    {},
+    [[]],
+    [None],
+    {"": None},
+    [0] * 1000,
+    [[0] * 4] * 4,
+    {"a": {"a": {"a": 1}}},
 ]
 
 WORDS = [
-    *(b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"9" * 5000, b"1" * 20, b"18446744073709551615"),
-    *(b"x", b'"', b"\0", b"\n", b"\xff", b"\xed\xa0\x80", b"[" * 5000, b"a b c d e f g h i j"),
+    b"",
+    b"0",
+    b"-1",
+    b"1e400",
+    b"nan",
+    b"inf",
+    b"9" * 5000,
+    b"1" * 20,
+    b"18446744073709551615",
+    b"x",
+    b'"',
+    b"\0",
+    b"\n",
+    b"\xff",
+    b"\xed\xa0\x80",
+    b"[" * 5000,
+    b"a b c d e f g h i j",
 ]
 
 
@@ -268,10 +313,20 @@ def transforms(_):
     options |= {"aabb_scale": 1, "render_aabb": None}
     fisheye = {f"ftheta_p{power}": 0.1 for power in range(5)}
     return {
-        **{"w": 16, "h": 16, "fl_x": 10.0, "fl_y": 10.0, "cx": 8.0, "cy": 8.0},
+        "w": 16,
+        "h": 16,
+        "fl_x": 10.0,
+        "fl_y": 10.0,
+        "cx": 8.0,
+        "cy": 8.0,
         **fisheye,
-        **{"scale": 1.0, "offset": [0.5, 0.5, 0.5], "aabb_scale": 1, "render_aabb": None},
-        **{"frames": [frame], "options": options, "integer_depth_scale": 0.001},
+        "scale": 1.0,
+        "offset": [0.5, 0.5, 0.5],
+        "aabb_scale": 1,
+        "render_aabb": None,
+        "frames": [frame],
+        "options": options,
+        "integer_depth_scale": 0.001,
     }
 
 
@@ -321,8 +376,12 @@ def read_calibration(path, dataset):
 
 def probe(_):
     return {
-        **{"views": 2, "view_seconds": [1.0, 2.0], "view_bytes": [10, 12], "samples": 64},
-        **{"resolution": [16, 16], "device": "CPU"},
+        "views": 2,
+        "view_seconds": [1.0, 2.0],
+        "view_bytes": [10, 12],
+        "samples": 64,
+        "resolution": [16, 16],
+        "device": "CPU",
     }
 
 

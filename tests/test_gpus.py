@@ -147,8 +147,16 @@ def test_a_gpu_without_memory_is_reported_with_advice(message, room, run_program
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=1, render=sampling)
     lightfield.write(tmp_path / "lightfield.json")
     result = run_program(
-        *(Path(__file__).with_name("full_gpu.py"), message, "--blend", room, "--device", "cuda"),
-        *("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr"),
+        Path(__file__).with_name("full_gpu.py"),
+        message,
+        "--blend",
+        room,
+        "--device",
+        "cuda",
+        "--lightfield",
+        tmp_path / "lightfield.json",
+        "--output",
+        tmp_path / "exr",
         check=False,
     )
     assert result.returncode == 1

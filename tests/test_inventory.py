@@ -15,7 +15,10 @@ from lightfield.dataset.view_store import VARIABLE
 from lightfield.rendering import pruning
 
 NOTHING = {
-    **{"hidden": [], "animated": [], "simulated": [], "uses_visibility": []},
+    "hidden": [],
+    "animated": [],
+    "simulated": [],
+    "uses_visibility": [],
     "motion_blur": False,
 }
 

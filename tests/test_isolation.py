@@ -108,8 +108,14 @@ def other_libraries(folder):
 
 
 HOSTILE = [
-    *(startup_script, sitecustomize, shadowed_numpy, other_colours, files_at_home),
-    *(colours_of_a_system, other_instructions, other_libraries),
+    startup_script,
+    sitecustomize,
+    shadowed_numpy,
+    other_colours,
+    files_at_home,
+    colours_of_a_system,
+    other_instructions,
+    other_libraries,
 ]
 
 
@@ -128,8 +134,16 @@ def render(tmp_path_factory):
         output = folder / name
         result = subprocess.run(
             [
-                *(sys.executable, SCRIPTS / "render_shard.py", "--blend", blend),
-                *("--lightfield", content, "--output", output, "--device", "cpu"),
+                sys.executable,
+                SCRIPTS / "render_shard.py",
+                "--blend",
+                blend,
+                "--lightfield",
+                content,
+                "--output",
+                output,
+                "--device",
+                "cpu",
             ],
             env=os.environ | {name: str(value) for name, value in variables.items()},
             capture_output=True,
@@ -164,9 +178,19 @@ def reproject(tmp_path, run_program):
         output = tmp_path / name
         result = subprocess.run(
             [
-                *(sys.executable, SCRIPTS / "reproject.py", "--rectilinear", "18,36", "--exr"),
-                *("--input-dir", tmp_path / "exr", "--input-cfg", tmp_path / "lightfield.json"),
-                *("--output-dir", output, "--output-cfg", output / "lightfield.json"),
+                sys.executable,
+                SCRIPTS / "reproject.py",
+                "--rectilinear",
+                "18,36",
+                "--exr",
+                "--input-dir",
+                tmp_path / "exr",
+                "--input-cfg",
+                tmp_path / "lightfield.json",
+                "--output-dir",
+                output,
+                "--output-cfg",
+                output / "lightfield.json",
             ],
             env=os.environ | variables,
             capture_output=True,
@@ -238,15 +262,29 @@ def test_a_program_is_isolated_before_it_imports_any_other_package(program):
 
 def test_needed_environment_variables_are_kept():
     needed = {
-        **{"HOME": "/home/me", "PATH": "/usr/bin", "TMPDIR": "/scratch", "LANG": "C.UTF-8"},
-        **{"CUDA_VISIBLE_DEVICES": "1", "SLURM_JOB_ID": "7", "AWS_ACCESS_KEY_ID": "key"},
-        **{"PYTHONUNBUFFERED": "1", "NUMBA_CACHE_DIR": "/scratch", "OMP_NUM_THREADS": "4"},
-        **{"LD_LIBRARY_PATH": "/usr/local/nvidia/lib64", "https_proxy": "http://proxy"},
+        "HOME": "/home/me",
+        "PATH": "/usr/bin",
+        "TMPDIR": "/scratch",
+        "LANG": "C.UTF-8",
+        "CUDA_VISIBLE_DEVICES": "1",
+        "SLURM_JOB_ID": "7",
+        "AWS_ACCESS_KEY_ID": "key",
+        "PYTHONUNBUFFERED": "1",
+        "NUMBA_CACHE_DIR": "/scratch",
+        "OMP_NUM_THREADS": "4",
+        "LD_LIBRARY_PATH": "/usr/local/nvidia/lib64",
+        "https_proxy": "http://proxy",
     }
     changing = {
-        **{"PYTHONPATH": "/a", "PYTHONSTARTUP": "/a", "LD_PRELOAD": "a.so", "OCIO": "/a"},
-        **{"BLENDER_USER_SCRIPTS": "/a", "NUMBA_DISABLE_JIT": "1", "CYCLES_CPU_NO_AVX2": "1"},
-        **{"NPY_DISABLE_CPU_FEATURES": "AVX2", "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA"},
+        "PYTHONPATH": "/a",
+        "PYTHONSTARTUP": "/a",
+        "LD_PRELOAD": "a.so",
+        "OCIO": "/a",
+        "BLENDER_USER_SCRIPTS": "/a",
+        "NUMBA_DISABLE_JIT": "1",
+        "CYCLES_CPU_NO_AVX2": "1",
+        "NPY_DISABLE_CPU_FEATURES": "AVX2",
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA",
     }
     left = cleaned(needed | changing)
     assert left.items() >= needed.items()

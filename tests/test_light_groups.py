@@ -57,7 +57,13 @@ def test_groups_add_up_to_the_colour(name, made):
 
 def test_each_emitter_has_a_group_of_its_own(made):
     assert json.loads((made / "emitters.json").read_text()) == [
-        *("World", "bulb", "bulb [library.blend]", "fire", "lamp 1", "lamp.1", "two colours")
+        "World",
+        "bulb",
+        "bulb [library.blend]",
+        "fire",
+        "lamp 1",
+        "lamp.1",
+        "two colours",
     ]
     names = ["World", "bulb", "bulb_library_blend", "fire", "lamp_1", "lamp_1_2", "two_colours"]
     assert group_names(made / "perspective") == [f"Combined_{name}" for name in names]
@@ -197,10 +203,17 @@ def develop(tmp_path, tmp_path_factory, run_program):
         path = tmp_path_factory.mktemp("settings") / f"{name}.json"
         write_json(path, reprojection.settings.as_json())
         return run_program(
-            *("reproject.py", "--settings", path),
-            *("--input-cfg", tmp_path / "rig/lightfield.json"),
-            *("--input-dir", tmp_path / "rig/exr", "--output-dir", tmp_path / "rig" / name),
-            *("--output-cfg", tmp_path / "rig" / name / "lightfield.json"),
+            "reproject.py",
+            "--settings",
+            path,
+            "--input-cfg",
+            tmp_path / "rig/lightfield.json",
+            "--input-dir",
+            tmp_path / "rig/exr",
+            "--output-dir",
+            tmp_path / "rig" / name,
+            "--output-cfg",
+            tmp_path / "rig" / name / "lightfield.json",
             check=check,
         )
 
@@ -232,8 +245,10 @@ def test_one_light_at_a_time_makes_an_image_for_each_group(develop, tmp_path):
     develop("olat", "each")
     names = [path.name for path in sorted((folder / "olat").glob("*.exr"))]
     assert names == [
-        *("view_0000f_lamp.exr", "view_0000f_sky.exr"),
-        *("view_0001f_lamp.exr", "view_0001f_sky.exr"),
+        "view_0000f_lamp.exr",
+        "view_0000f_sky.exr",
+        "view_0001f_lamp.exr",
+        "view_0001f_sky.exr",
     ]
     seen = np.isfinite(lenses.from_camera(CAMERA).pixel_rays())
     for view in ("view_0000f", "view_0001f"):
@@ -279,9 +294,17 @@ def test_reprojected_groups_add_up_with_every_filter(
     path = tmp_path_factory.mktemp("settings") / "flat.json"
     write_json(path, content.reprojections["flat"].settings.as_json())
     run_program(
-        *("reproject.py", "--settings", path, "--input-cfg", folder / "lightfield.json"),
-        *("--input-dir", folder / "exr", "--output-dir", folder / "flat"),
-        *("--output-cfg", folder / "flat/lightfield.json"),
+        "reproject.py",
+        "--settings",
+        path,
+        "--input-cfg",
+        folder / "lightfield.json",
+        "--input-dir",
+        folder / "exr",
+        "--output-dir",
+        folder / "flat",
+        "--output-cfg",
+        folder / "flat/lightfield.json",
     )
     for view in ("view_0000f", "view_0001f"):
         seen = colour(folder, "flat", view)

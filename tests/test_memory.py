@@ -102,7 +102,9 @@ def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):
     message = rf"a\.blend: a view of 1000 × 1000 pixels takes {needed / 1e9:.1f} GB of memory"
     with pytest.raises(UserError, match=message):
         shard.render(
-            *(lightfield.changed(render={"denoise": True, "seed": 0}), ":", tmp_path / "exr"),
+            lightfield.changed(render={"denoise": True, "seed": 0}),
+            ":",
+            tmp_path / "exr",
             blend=tmp_path / "a.blend",
             inventory=inventory,
             device="cpu",

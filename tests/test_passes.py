@@ -311,10 +311,24 @@ def test_a_view_without_one_of_its_files_is_rendered_again(made):
 def shard_command(made, folder, views, threads):
     """Return the command that renders the views of the scene with everything, as a job does."""
     return [
-        *(sys.executable, SCRIPTS / "render_shard.py", "--blend", made / "everything.blend"),
-        *("--lightfield", made / "perspective/lightfield.json", "--views", views),
-        *("--device", "cpu", "--threads", str(threads), "--output", folder / "dataset/exr"),
-        *("--record", folder / f"{views}.json", "--journal", folder / f"{views}.jsonl"),
+        sys.executable,
+        SCRIPTS / "render_shard.py",
+        "--blend",
+        made / "everything.blend",
+        "--lightfield",
+        made / "perspective/lightfield.json",
+        "--views",
+        views,
+        "--device",
+        "cpu",
+        "--threads",
+        str(threads),
+        "--output",
+        folder / "dataset/exr",
+        "--record",
+        folder / f"{views}.json",
+        "--journal",
+        folder / f"{views}.jsonl",
     ]
 
 
@@ -404,10 +418,21 @@ def test_reprojected_passes_keep_their_meaning(made, tmp_path, run_program):
     settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
     write_json(tmp_path / "flat.json", settings | {"formats": ["exr"], "passes": names})
     run_program(
-        *("reproject.py", "--settings", tmp_path / "flat.json"),
-        *("--input-cfg", source / "lightfield.json", "--input-dir", source / "exr"),
-        *("--output-dir", target, "--output-cfg", target / "lightfield.json"),
-        *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
+        "reproject.py",
+        "--settings",
+        tmp_path / "flat.json",
+        "--input-cfg",
+        source / "lightfield.json",
+        "--input-dir",
+        source / "exr",
+        "--output-dir",
+        target,
+        "--output-cfg",
+        target / "lightfield.json",
+        "--source-record",
+        made / "fisheye.json",
+        "--record",
+        tmp_path / "record.json",
     )
     content = LightField.read(target / "lightfield.json")
     assert [render_pass.name for render_pass in content.passes] == names

@@ -62,8 +62,15 @@ def reproject(tmp_path, run_program):
         reprojection = Reprojection.model_validate(settings)
         write_json(file, reprojection.settings.as_json())
         run_program(
-            *("reproject.py", "--settings", file, "--input-cfg", tmp_path / "lightfield.json"),
-            *("--input-dir", tmp_path / "exr", "--output-dir", tmp_path / name),
+            "reproject.py",
+            "--settings",
+            file,
+            "--input-cfg",
+            tmp_path / "lightfield.json",
+            "--input-dir",
+            tmp_path / "exr",
+            "--output-dir",
+            tmp_path / name,
         )
         return tmp_path / name / f"view_0000f.{reprojection.format}"
 

@@ -39,9 +39,18 @@ def planned(tmp_path_factory):
         folder = tmp_path_factory.mktemp("planned")
         results = folder / "results"
         arguments = [
-            *("--dry-run", "--logger", "jobs", "--profile", f"profiles/{profile}"),
-            *("--config", f"results={results}", f"work={folder / 'work'}", f"device={device}"),
-            *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
+            "--dry-run",
+            "--logger",
+            "jobs",
+            "--profile",
+            f"profiles/{profile}",
+            "--config",
+            f"results={results}",
+            f"work={folder / 'work'}",
+            f"device={device}",
+            "--",
+            "smoke",
+            f"{results}/smoke/smoke_LFCuboid_1x1x1.tar",
         ]
         # Snakemake finds the logger plugin here.
         run = forks.run_snakemake(arguments, ROOT, {"PYTHONPATH": str(Path(__file__).parent)})

@@ -120,8 +120,21 @@ def shard(tmp_path, run_program, room):
     def render(*extra, **options):
         return run_program(
             "render_shard.py",
-            *("--blend", room, "--lightfield", file, "--output", views, "--device", "cpu"),
-            *("--threads", "1", "--journal", journal, "--record", record, *extra),
+            "--blend",
+            room,
+            "--lightfield",
+            file,
+            "--output",
+            views,
+            "--device",
+            "cpu",
+            "--threads",
+            "1",
+            "--journal",
+            journal,
+            "--record",
+            record,
+            *extra,
             **options,
         )
 

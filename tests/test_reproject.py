@@ -358,8 +358,16 @@ def test_a_saved_lens_map_gives_the_same_bytes(dataset, run, run_program):
 def test_prefix_suffix_and_no_configs(dataset, run):
     write_png(dataset / "exr" / "other.png", np.zeros((SIZE, SIZE, 3), np.uint8))
     run(
-        *("--no-configs", f"{SIZE},{SIZE}", "--i-equidistant", str(math.pi)),
-        *(*PERSPECTIVE, "--png", "--filter-prefix", "view", "--filter-suffix", "2f.exr"),
+        "--no-configs",
+        f"{SIZE},{SIZE}",
+        "--i-equidistant",
+        str(math.pi),
+        *PERSPECTIVE,
+        "--png",
+        "--filter-prefix",
+        "view",
+        "--filter-suffix",
+        "2f.exr",
         configs=False,
     )
     assert names(dataset / "out") == ["view_0002f.png"]
@@ -547,9 +555,17 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
     config["frames"] = config["frames"][:1]
     (dataset / "lightfield.json").write_text(json.dumps(config))
     sys.argv[1:] = [
-        *("--rectilinear", "40,36", "--output-resolution", "21,21", "--exr"),
-        *("--input-dir", str(out / "exr"), "--input-cfg", str(dataset / "lightfield.json")),
-        *("--output-dir", str(dataset / "back")),
+        "--rectilinear",
+        "40,36",
+        "--output-resolution",
+        "21,21",
+        "--exr",
+        "--input-dir",
+        str(out / "exr"),
+        "--input-cfg",
+        str(dataset / "lightfield.json"),
+        "--output-dir",
+        str(dataset / "back"),
     ]
     reproject.main()
     back = read_image(dataset / "back" / "view_0000f.exr").channels

@@ -164,7 +164,9 @@ def test_colmap_frames_have_the_same_names_and_the_points_of_their_frames(sequen
     options = {"points": 400, "format": "text"}
     folder = exported(sequence / "split", "colmap_frames", tmp_path, **options)
     assert sorted(path.name for path in folder.glob("colmap_*")) == [
-        *("colmap_0", "colmap_1", "colmap_2")
+        "colmap_0",
+        "colmap_1",
+        "colmap_2",
     ]
     names = set()
     for place, number in enumerate(FRAMES):

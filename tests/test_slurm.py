@@ -21,10 +21,17 @@ SHARDS = ("0-3", "3-6")
 INPUTS = ("cameras.json", "perspective/lens_map.npy", "panorama/lightfield.json")
 CONFIG = ["--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"]
 WORDS = [
-    *("--profile", "profiles/slurm", "--cores", "2", "--retries", "4"),
-    *("--slurm-init-seconds-before-status-checks", "2"),
+    "--profile",
+    "profiles/slurm",
+    "--cores",
+    "2",
+    "--retries",
+    "4",
+    "--slurm-init-seconds-before-status-checks",
+    "2",
     # The panorama gets too little memory at first.
-    *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
+    "--set-resources",
+    "render_panorama:mem_mb=100 if attempt == 1 else 4000",
     *CONFIG,
     "--",
     # A job that renders a shard also reprojects it.
@@ -126,7 +133,10 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path):
         with log.open("wb") as terminal:
             run = start_snakemake(
                 folder,
-                *("--profile", "profiles/slurm", "--slurm-init-seconds-before-status-checks", "2"),
+                "--profile",
+                "profiles/slurm",
+                "--slurm-init-seconds-before-status-checks",
+                "2",
                 *OF_ROOMS,
                 env=node.environment,
                 stdout=terminal,

@@ -14,9 +14,23 @@ from lightfield.imaging import images
 
 # Each takes a noticeable part of a second to import.
 HEAVY = {
-    *("numpy", "scipy", "skimage", "numba", "llvmlite", "matplotlib", "pydantic", "yaml"),
+    "numpy",
+    "scipy",
+    "skimage",
+    "numba",
+    "llvmlite",
+    "matplotlib",
+    "pydantic",
+    "yaml",
     "trimesh",
-    *("OpenEXR", "OpenImageIO", "bpy", "PIL", "cv2", "jinja2", "upath", "pycolmap"),
+    "OpenEXR",
+    "OpenImageIO",
+    "bpy",
+    "PIL",
+    "cv2",
+    "jinja2",
+    "upath",
+    "pycolmap",
 }
 # The flags of these programs follow from the lenses, which are classes on numpy and pydantic.
 OF_LENSES = {"numpy", "pydantic"}

@@ -19,8 +19,14 @@ from lightfield.validation.integrity import Integrity
 
 PANORAMAS = "smoke/LFLattice_2panos"
 WORDS = (
-    *("--config", "scenes=smoke", "rigs=LFLattice_2panos", "preset=full"),
-    *("--groups", "render=shard", "reproject=shard", "--"),
+    "--config",
+    "scenes=smoke",
+    "rigs=LFLattice_2panos",
+    "preset=full",
+    "--groups",
+    "render=shard",
+    "reproject=shard",
+    "--",
     f"results/{PANORAMAS}/validation.json",
 )
 
@@ -157,9 +163,14 @@ bpy.ops.wm.obj_export(filepath=sys.argv[1])
 """
 PUBLISHED = "results/modelled/published/modelled_LFPair"
 BROUGHT_WORDS = (
-    *("--config", "scenes=[brought,theirs,modelled]", "rigs=all", "preset=full", "--"),
+    "--config",
+    "scenes=[brought,theirs,modelled]",
+    "rigs=all",
+    "preset=full",
+    "--",
     *(f"results/{name}/LFPlane/validation.json" for name in ("brought", "theirs")),
-    *("results/modelled/modelled_LFPair.tar", f"{PUBLISHED}/croissant.json"),
+    "results/modelled/modelled_LFPair.tar",
+    f"{PUBLISHED}/croissant.json",
 )
 
 

@@ -100,7 +100,9 @@ def test_only_deleted_and_damaged_views_are_rendered_again(smoke, tmp_path):
     succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == [
-        *("view_b0000f", "view_d0000f", "view_u0000f")
+        "view_b0000f",
+        "view_d0000f",
+        "view_u0000f",
     ]
     assert_same_bytes(smoke, folder)
     # Both runs count, and repeated renders are reported.
@@ -255,7 +257,14 @@ def test_a_dry_run_ends_with_the_phases_and_their_sum(smoke):
     lines = table.splitlines()
     rows = [line.split() for line in lines[1 : lines.index("")]]
     assert [row[0] for row in rows] == [
-        *("scene", "cameras", "views", "reprojections", "exports", "validation", "report", "all")
+        "scene",
+        "cameras",
+        "views",
+        "reprojections",
+        "exports",
+        "validation",
+        "report",
+        "all",
     ]
     jobs = [int(row[1]) for row in rows]
     assert jobs[-1] == sum(jobs[:-1])

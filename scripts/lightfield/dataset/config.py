@@ -87,7 +87,13 @@ SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
 # The same for a reprojection's folder.
 REPROJECTION_NEIGHBOURS = {
-    *("exr", "exports", MESH, "panorama", "render", "report", FLOW.name),
+    "exr",
+    "exports",
+    MESH,
+    "panorama",
+    "render",
+    "report",
+    FLOW.name,
     *PASSES,
 }
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.

@@ -78,8 +78,15 @@ class Creator(Settings):
 
 # The licence may be that of the scene.
 REQUIRED = (
-    *("creators", "url", "publisher", "date", "limitations", "biases", "personal_information"),
-    *("use_cases", "social_impact"),
+    "creators",
+    "url",
+    "publisher",
+    "date",
+    "limitations",
+    "biases",
+    "personal_information",
+    "use_cases",
+    "social_impact",
 )
 
 

@@ -167,11 +167,20 @@ class Stages:
         flags.add_reproject_flags(parser)
         arguments = parser.parse_args(
             [
-                *("--input-dir", f"{dataset.folder}/exr", "--output-dir", str(folder)),
-                *("--input-cfg", f"{dataset.folder}/lightfield.json"),
-                *("--output-cfg", f"{folder}/lightfield.json"),
-                *("--source-record", source_record, "--record", record),
-                *("--views", f"0:{dataset.view_count}"),
+                "--input-dir",
+                f"{dataset.folder}/exr",
+                "--output-dir",
+                str(folder),
+                "--input-cfg",
+                f"{dataset.folder}/lightfield.json",
+                "--output-cfg",
+                f"{folder}/lightfield.json",
+                "--source-record",
+                source_record,
+                "--record",
+                record,
+                "--views",
+                f"0:{dataset.view_count}",
             ]
         )
         lightfield = LightField.read(arguments.input_cfg)

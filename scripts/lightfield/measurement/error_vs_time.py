@@ -64,8 +64,18 @@ COMPARED = (
 
 # The figures of a point that have a column in its table.
 FIGURES = (
-    *("samples", "seconds", "relative_mse", "relative_mse_whole", "bias", "variance"),
-    *("mse_seconds", "relative_mse_unexposed", "mrse", "psnr", "ssim", "flip"),
+    "samples",
+    "seconds",
+    "relative_mse",
+    "relative_mse_whole",
+    "bias",
+    "variance",
+    "mse_seconds",
+    "relative_mse_unexposed",
+    "mrse",
+    "psnr",
+    "ssim",
+    "flip",
 )
 
 # The keys of a point that name its method. All others are figures.

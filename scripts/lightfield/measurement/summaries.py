@@ -8,8 +8,15 @@ import numpy as np
 # The tables of synthesised views: the columns that name a row, and those that are averaged.
 COLUMNS = ("truth", "variant", "value")
 MEANS = (
-    *("psnr", "psnr_black", "ws_psnr", "iv_psnr", "ssim", "flip", "flip_black"),
-    *("holes", "source_bytes"),
+    "psnr",
+    "psnr_black",
+    "ws_psnr",
+    "iv_psnr",
+    "ssim",
+    "flip",
+    "flip_black",
+    "holes",
+    "source_bytes",
 )
 # The places of views, and how far each reaches: 0 is the middle of the cameras, 1 is the edge of
 # their interpolation volume.

@@ -27,9 +27,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     # Without this, an armature brings a mesh for the shape of its bones.
     "gltf": {"disable_bone_shape": True},
     "usd": {
-        **{"import_cameras": False, "import_lights": False, "create_world_material": False},
+        "import_cameras": False,
+        "import_lights": False,
+        "create_world_material": False,
         # A point instancer is imported all the same.
-        **{"import_curves": False, "import_points": False},
+        "import_curves": False,
+        "import_points": False,
     },
 }
 # How an importer turns each axis that may point up.
@@ -184,7 +187,8 @@ def _remove_cameras_and_lamps() -> None:
             empty = bpy.data.objects.new(obj.name, None)
             bpy.context.scene.collection.objects.link(empty)
             obj.user_remap(empty)
-            empty.parent, empty.matrix_local = obj.parent, obj.matrix_local
+            empty.parent = obj.parent
+            empty.matrix_local = obj.matrix_local
         bpy.data.objects.remove(obj)
 
 

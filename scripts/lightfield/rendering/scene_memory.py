@@ -40,9 +40,20 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
         # The .blend's files are in their places: fetch nothing from a view store.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
         command: list[Any] = [
-            *("--blend", blend, "--lightfield", folder / "lightfield.json"),
-            *("--inventory", folder / "inventory.json", "--journal", folder / "journal.jsonl"),
-            *("--output", folder / "exr", "--device", "cpu", "--threads", "1"),
+            "--blend",
+            blend,
+            "--lightfield",
+            folder / "lightfield.json",
+            "--inventory",
+            folder / "inventory.json",
+            "--journal",
+            folder / "journal.jsonl",
+            "--output",
+            folder / "exr",
+            "--device",
+            "cpu",
+            "--threads",
+            "1",
         ]
         result = subprocess.run(
             [sys.executable, PROGRAM, *command],

@@ -15,8 +15,18 @@ from lightfield.report.published import Published
 
 # Licences that Hugging Face knows by their names. They are the short names in small letters.
 HUGGING_FACE_LICENCES = {
-    *("apache-2.0", "mit", "cc0-1.0", "cc-by-3.0", "cc-by-4.0", "cc-by-sa-3.0", "cc-by-sa-4.0"),
-    *("cc-by-nc-3.0", "cc-by-nc-4.0", "cc-by-nd-4.0", "cc-by-nc-nd-4.0", "cc-by-nc-sa-4.0"),
+    "apache-2.0",
+    "mit",
+    "cc0-1.0",
+    "cc-by-3.0",
+    "cc-by-4.0",
+    "cc-by-sa-3.0",
+    "cc-by-sa-4.0",
+    "cc-by-nc-3.0",
+    "cc-by-nc-4.0",
+    "cc-by-nd-4.0",
+    "cc-by-nc-nd-4.0",
+    "cc-by-nc-sa-4.0",
 }
 # The largest number of views of each of Hugging Face's classes of size.
 SIZES = (

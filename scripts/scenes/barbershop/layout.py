@@ -55,8 +55,16 @@ PIECES: Mapping[str, Piece] = {
     ),
     "desk": Piece(
         (
-            *("back_cupboard", "radio", "towel_steamer", "reception_desk", "till"),
-            *("desk_bell", "telephone", "card_box", "desk_things", "stool"),
+            "back_cupboard",
+            "radio",
+            "towel_steamer",
+            "reception_desk",
+            "till",
+            "desk_bell",
+            "telephone",
+            "card_box",
+            "desk_things",
+            "stool",
         ),
         "back",
         1.68,

@@ -86,7 +86,8 @@ def figure(scene: Scene) -> Shape:
     remesh.mode = "VOXEL"
     remesh.voxel_size = 0.011 / scene.detail**0.5
     smooth = body.modifiers.new("Smooth", "SMOOTH")
-    smooth.factor, smooth.iterations = 0.5, 4
+    smooth.factor = 0.5
+    smooth.iterations = 4
     melted = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     skin = shapes.mesh_shape(melted.data)
     bpy.data.batch_remove([body, body.data])

@@ -12,7 +12,15 @@ from scenes.rooms.materials import palette
 from scenes.rooms.place import drawn
 
 ELEMENTS = (
-    *(lamps.daylight, lamps.ceiling_lamps, shell.floor, shell.ceiling, shell.walls),
-    *(shell.skirting, shell.windows, shell.door, furniture.furniture, furniture.pictures),
+    lamps.daylight,
+    lamps.ceiling_lamps,
+    shell.floor,
+    shell.ceiling,
+    shell.walls,
+    shell.skirting,
+    shell.windows,
+    shell.door,
+    furniture.furniture,
+    furniture.pictures,
 )
 build = partial(fill, palette, ELEMENTS, drawn=drawn, original=drawn(0))

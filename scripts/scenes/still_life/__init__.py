@@ -13,8 +13,19 @@ from scenes.still_life.materials import palette
 from scenes.still_life.plan import ORIGINAL, drawn
 
 ELEMENTS = (
-    *(board.lamps, board.board, board.cloth, board.pearls, vessels.kettle, vessels.carafe),
-    *(vessels.wineglass, vessels.candle, vessels.bowl, vessels.knife),
-    *(fruit.pears, fruit.grapes, fruit.lemons, chick.chick),
+    board.lamps,
+    board.board,
+    board.cloth,
+    board.pearls,
+    vessels.kettle,
+    vessels.carafe,
+    vessels.wineglass,
+    vessels.candle,
+    vessels.bowl,
+    vessels.knife,
+    fruit.pears,
+    fruit.grapes,
+    fruit.lemons,
+    chick.chick,
 )
 build = partial(fill, palette, ELEMENTS, drawn=drawn, original=ORIGINAL)
