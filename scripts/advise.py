@@ -14,7 +14,10 @@ from lightfield.core.files import read_keys, write_text
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "measured", nargs="*", type=Path, help="JSON of a scene, with the scene's name"
+        "measured",
+        nargs="*",
+        type=Path,
+        help="JSON files that scripts/try_changes.py wrote, each named like its scene",
     )
     paths = parser.parse_args().measured
 

@@ -24,7 +24,7 @@ def main() -> None:
         "--device",
         default="auto",
         choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
-        help="device of Cycles (default: auto)",
+        help="device on which Cycles renders (default: auto)",
     )
     parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
     parser.add_argument(

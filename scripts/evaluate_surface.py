@@ -29,19 +29,27 @@ def main() -> None:
         "--protocol",
         choices=list(PROTOCOLS),
         required=True,
-        help="the benchmark whose definition counts",
+        help="benchmark whose definition of the metrics is used",
     )
-    add("--spacing", type=above_zero, help="dtu: metres between points (default: 0.0002)")
+    add(
+        "--spacing",
+        type=above_zero,
+        help="for dtu: distance between sampled points, in metres (default: 0.0002)",
+    )
     add(
         "--most-distance",
         type=above_zero,
-        help="dtu: metres from which on a point does not count (default: 0.02)",
+        help="for dtu: distance in metres beyond which a point is ignored (default: 0.02)",
     )
-    add("--points", type=positive, help="nerf_synthetic: points on each surface (default: 2500000)")
+    add(
+        "--points",
+        type=positive,
+        help="for nerf_synthetic: number of points sampled on each surface (default: 2500000)",
+    )
     add(
         "--tau",
         type=above_zero,
-        help="tanks_and_temples: metres below which a point counts as right",
+        help="for tanks_and_temples: distance in metres below which a point counts as correct",
     )
     add("--output", type=Path, help="JSON to write")
     arguments = parser.parse_args()

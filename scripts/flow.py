@@ -16,17 +16,21 @@ from lightfield.core.progress import Progress
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument(
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
+    )
     parser.add_argument(
         "--views",
         metavar="FIRST:END",
         default=":",
-        help="a slice of lightfield.json's frames (default: all of them)",
+        help="which frames of lightfield.json, as a slice from 0, END excluded (default: all)",
     )
     parser.add_argument(
         "--output", required=True, type=Path, metavar="FOLDER", help="folder to write"
     )
-    parser.add_argument("--record", type=Path, help="JSON of the files' sizes and checksums")
+    parser.add_argument(
+        "--record", type=Path, help="JSON to write: the sizes and checksums of the files"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

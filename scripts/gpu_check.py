@@ -20,7 +20,12 @@ def main() -> None:
     trial_flags.add_arguments(parser, "lightfield.json")
     trial_flags.add_calibration(parser)
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
-    parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
+    parser.add_argument(
+        "--output",
+        required=True,
+        type=Path,
+        help="path without suffix of the .json and .md to write",
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

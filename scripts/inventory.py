@@ -12,8 +12,8 @@ from lightfield.core.cli import run
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", help="name of a file in configs/scenes/ that uses this .blend")
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--scene", help="name of the file in configs/scenes/ that uses this .blend")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

@@ -18,11 +18,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument("--name", required=True, help="how it is called: scene/rig")
+    parser.add_argument("--name", required=True, help="name of the dataset, scene/rig")
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
 

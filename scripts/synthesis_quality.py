@@ -18,8 +18,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
-    add("--settings", type=Path, metavar="JSON", help="settings file with the flags' names as keys")
-    add("--output", type=Path, required=True, metavar="STEM", help="stem of the files to write")
+    add(
+        "--settings",
+        type=Path,
+        metavar="JSON",
+        help="settings file, whose keys are the names of the flags",
+    )
+    add(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="STEM",
+        help="path without suffix of the files to write",
+    )
     add_settings_flags(parser)
     arguments = parser.parse_args()
     check_settings(arguments, add_settings_flags)
@@ -77,9 +88,17 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--truth", nargs="+", default=[], help="folders of the held-out datasets")
     flags.add_argument(
-        "--views", type=positive, default=12, help="compared views of each truth (default: 12)"
+        "--truth",
+        nargs="+",
+        default=[],
+        help="folders of the datasets to compare with (default: the dataset's own test views)",
+    )
+    flags.add_argument(
+        "--views",
+        type=positive,
+        default=12,
+        help="number of views to compare of each of these datasets (default: 12)",
     )
 
 

@@ -20,14 +20,19 @@ from lightfield.dataset.view_store import VARIABLE, ViewStore
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("lists", nargs="+", type=Path, help="files that list others")
+    parser.add_argument(
+        "lists", nargs="+", type=Path, help="records of shards, and lists of exports"
+    )
     parser.add_argument("--store", help=f"URL or folder of the store (default: ${VARIABLE})")
-    parser.add_argument("--results", required=True, type=Path, help="folder of all datasets")
-    parser.add_argument("--work", required=True, type=Path, help="folder of their records")
+    parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
+    parser.add_argument(
+        "--work", required=True, type=Path, help="folder of intermediate files, with the records"
+    )
     parser.add_argument(
         "--mend",
         action="store_true",
-        help="remove lists of lost files from the storage, so that the next run makes them again",
+        help="remove lists of lost files from the storage, so that the next run makes these files "
+        "again",
     )
     arguments = parser.parse_args()
     store = ViewStore(arguments.store) if arguments.store else ViewStore.configured()

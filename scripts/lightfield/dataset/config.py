@@ -183,20 +183,28 @@ DenoisePrefilter = Literal["accurate", "fast", "none"]
 
 
 class Preset(Settings):
-    """Upper limits of a scene YAML's values. A key that is left out limits nothing."""
+    """A preset limits the values of scene YAMLs. A key that is left out limits nothing."""
 
     resolution: AtLeastOne | None = Field(
-        None, description="Length of an image's longer side.", json_schema_extra={"unit": "pixels"}
+        None,
+        description="Largest length of an image's longer side. Larger images are made smaller.",
+        json_schema_extra={"unit": "pixels"},
     )
     samples: AtLeastOne | None = Field(
-        None, description="Paths for each pixel.", json_schema_extra={"unit": "paths"}
+        None,
+        description="Largest number of paths for each pixel.",
+        json_schema_extra={"unit": "paths"},
     )
     views: AtLeastOne | None = Field(
-        None, description="Views of a rig.", json_schema_extra={"unit": "views"}
+        None,
+        description="Largest number of views of a rig. Rigs with more are thinned.",
+        json_schema_extra={"unit": "views"},
     )
-    denoise: bool | None = Field(None, description="Denoise even if the scene YAML does not.")
+    denoise: bool | None = Field(
+        None, description="Whether to denoise the views even if the scene YAML does not."
+    )
     denoise_prefilter: DenoisePrefilter | None = Field(
-        None, description="Prefilter of denoised views, unless the scene YAML names one."
+        None, description="Prefilter of the denoiser, unless the scene YAML names one."
     )
 
 
@@ -207,22 +215,23 @@ class Energy(Settings):
         65,
         ge=0,
         le=1e6,
-        description="Power of a machine whose cores all work.",
+        description="Power of the machine when all its cores work.",
         json_schema_extra={"unit": "W"},
     )
     cores: Auto | AtLeastOne = Field(
         "auto",
-        description="Cores of that machine. auto: those of the machine that computes the costs.",
+        description="Number of cores of that machine. auto: as many as the machine that computes "
+        "the costs has.",
         json_schema_extra={"unit": "cores"},
     )
     price_per_kwh: float = Field(
         0.32,
         ge=0,
         le=1e6,
-        description="Price of electricity.",
+        description="Price of electricity, in the currency below.",
         json_schema_extra={"unit": "currency/kWh"},
     )
-    currency: str = Field("EUR", max_length=20, description="Currency of the price.")
+    currency: str = Field("EUR", max_length=20, description="Currency of that price.")
 
 
 _SHARDS_ARE_AUTOMATIC = (
@@ -231,7 +240,7 @@ _SHARDS_ARE_AUTOMATIC = (
 
 
 class Configuration(Settings):
-    """Which scenes to build, how well, and where."""
+    """Which scenes to build, at which quality, and into which folders."""
 
     removed_keys: ClassVar[Mapping[str, str]] = {
         "most_shards": _SHARDS_ARE_AUTOMATIC,
@@ -239,12 +248,13 @@ class Configuration(Settings):
     }
 
     scenes: Names = Field(
-        description="Names of files in configs/scenes/, without .yaml. One name needs no list."
+        description="Scenes to build: names of files in configs/scenes/, without .yaml. A single "
+        "name needs no list."
     )
     rigs: Literal["all"] | Names = Field(
-        "all", description="all, or the names of the rigs to build."
+        "all", description="Rigs to build, by their names in the scene YAMLs. all: every rig."
     )
-    preset: str = Field(description="One of the presets below.")
+    preset: str = Field(description="Name of the preset to apply: one of those in presets.")
     presets: dict[
         Annotated[
             str,
@@ -256,33 +266,41 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ] = Field(min_length=1, description="Upper limits of a scene YAML's values, by name.")
-    results: Folder = Field("results", description="Folder of the datasets.")
+    ] = Field(
+        min_length=1,
+        description="Presets by their names. Each sets upper limits for values of the scene YAMLs.",
+    )
+    results: Folder = Field("results", description="Folder in which the datasets are built.")
     work: Folder = Field(
         "work",
-        description="Folder of intermediate files: scenes, lens maps, records, timings.",
+        description="Folder for intermediate files: scenes, lens maps, records and timings.",
     )
     device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = Field(
-        "auto", description="The device that Cycles renders on."
+        "auto",
+        description="Device on which Cycles renders. auto: a GPU if there is one, else the CPU.",
     )
     views_per_shard: Auto | AtLeastOne = Field(
         "auto",
-        description="How many views one render job makes. With auto, the number follows from the "
-        "expected time of a view, and on a cluster from the jobs that run at once (--jobs). A "
-        "dataset that was begun with auto keeps its jobs.",
+        description="How many views one render job makes. auto: chosen from the expected time of a "
+        "view, and on a cluster also from the number of simultaneous jobs (--jobs). A dataset that "
+        "was begun with auto keeps its jobs.",
         json_schema_extra={"unit": "views"},
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
-        description="Accept each .blend as it is now. This rewrites its lock file beside the scene "
-        "YAML.",
+        description="Accept each .blend file as it is now, even if its SHA-256 has changed. This "
+        "rewrites the lock file beside the scene YAML.",
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,
-        description="Largest size of a package's parts. Without it, a package is one file.",
+        description="Largest size of a package's parts. Without this key, a package is one file.",
         json_schema_extra={"unit": "GB"},
     )
-    energy: Energy = Field(Energy(), description="From what energy and costs are computed.")
+    energy: Energy = Field(
+        Energy(),
+        description="Power and price of electricity, from which the energy and costs of a dataset "
+        "are computed.",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -323,15 +341,21 @@ class Parameters(Settings):
     """The parameters of a builder."""
 
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="Another seed places and shapes things anew."
+        0,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of everything random. Another seed gives other positions and shapes of "
+        "objects.",
     )
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
-        1.0, description="Level of detail of plants and meshes. 1 is full."
+        1.0,
+        description="Level of detail of plants and meshes. 1 is full detail, and less is faster.",
     )
     place: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = Field(
         None,
-        description="Another place has another layout, other materials and another light. "
-        "None is the builder's own layout. The builder `room` has no other.",
+        description="Number of a variant of the scene, with another layout, materials and light. "
+        "Without this key, the scene has the builder's own layout. The builder `room` has no "
+        "other.",
     )
 
 
@@ -343,22 +367,22 @@ class ModelOptions(Settings):
 
     unit: Literal["box", "metres"] = Field(
         "box",
-        description="Of a model. box: its largest side becomes 1 m, and its middle the origin. "
-        "metres: it keeps its size and place.",
+        description="Size of a model. box: its largest side becomes 1 m, and its middle moves to "
+        "the origin. metres: it keeps its size and position.",
     )
     up: Literal["auto", "y", "z"] = Field(
         "auto",
-        description="The axis of an OBJ, PLY or STL model that points up. auto: y in OBJ, z in PLY "
-        "and STL. glTF and USD say it themselves.",
+        description="Axis that points up in an OBJ, PLY or STL model. auto: y for OBJ, z for PLY "
+        "and STL. glTF and USD files define it themselves.",
     )
     ground: bool = Field(
         False,
-        description="Put a floor under a model, which catches its shadow.",
+        description="Put a floor under the model, which receives its shadow.",
     )
     light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
         SOFTBOXES,
-        description="Of a model. softboxes: three lamps and a grey world. Any other name: that "
-        "environment of Blender.",
+        description="Light of a model. softboxes: three lamps and a grey world. Any other name: "
+        "the environment of this name that comes with Blender.",
     )
 
     @field_validator("light")
@@ -402,62 +426,63 @@ class Origin(Settings):
         pattern=pattern(
             "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
         ),
-        description="The builder: the name of a folder in scripts/scenes/.",
+        description="Name of the builder, which is a folder in scripts/scenes/.",
     )
-    parameters: Parameters = Field(Parameters(), description="The builder's parameters.")
+    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
     blend: str | None = Field(
         None,
         pattern=pattern(
             rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
         ),
-        description="The path of your own .blend file, from the folder that Snakemake runs in.",
+        description="Path of your own .blend file, relative to the folder in which Snakemake runs.",
     )
     model: ModelPath | None = Field(
         None,
-        description="The path of a model file in glTF, USD, OBJ, PLY or STL, from the folder that "
-        "Snakemake runs in.",
+        description="Path of a model file (glTF, USD, OBJ, PLY or STL), relative to the folder in "
+        "which Snakemake runs.",
     )
     dataset: str | None = Field(
         None,
-        description="Instead of a scene to render: the folder of a light field in SILVR's layout "
-        "(lightfield.json and exr/), or one with several such folders.",
+        description="Folder of existing views, which replace rendering: a light field in SILVR's "
+        "layout (lightfield.json and exr/), or a folder of several.",
     )
     scene_name: str | None = Field(
         None,
-        description="The .blend's scene to render. Without it, the one that was open when saved.",
+        description="Name of the scene in the .blend to render. Without this key, it is the scene "
+        "that was active when the .blend was saved.",
     )
     view_layers: Literal["all"] | list[str] | None = Field(
         None,
         min_length=1,
-        description="That scene's view layers to render together in one picture. all: those in "
-        "use. Without it, the first in use.",
+        description="View layers of that scene, which are rendered together into one picture. all: "
+        "every layer that is enabled for rendering. Without this key, only the first of these.",
     )
     frame: Frame | Literal["file"] = Field(
         1,
-        description="The frame of the animation to render. file: the frame at which the .blend was "
-        "saved. A model is measured at this frame.",
+        description="Frame of the animation to render. file: the frame at which the .blend was "
+        "saved. The size of a model is measured at this frame.",
     )
     allow_missing: bool | None = Field(
         None,
-        description="Render although textures, fonts, libraries, volumes or caches are missing or "
-        "cannot be read. Such a texture is magenta. The same for the files of a model.",
+        description="Render even if files of the .blend or model are missing or cannot be read: "
+        "textures, fonts, libraries, volumes or caches. Missing textures are magenta.",
     )
     sha256: str | None = Field(
         None,
         pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
-        description="The .blend file's SHA-256, as sha256sum prints it. "
-        "Without it, the one recorded at first use.",
+        description="SHA-256 that the .blend file must have, as sha256sum prints it. Without this "
+        "key, it is the one recorded at first use.",
     )
     url: Address | None = Field(
-        None, description="The address to download the .blend file from if it is missing."
+        None, description="Address from which the .blend file is downloaded if it is missing."
     )
     page: Address | None = Field(
-        None, description="The page on which a person finds the .blend file."
+        None, description="Web page from which you can download the .blend file by hand."
     )
 
 
 class SceneSource(ModelOptions, Origin):
-    """Where a scene is from, and for a model, how it becomes a scene."""
+    """Where a scene comes from. A model has more keys, in the next table."""
 
     @model_validator(mode="after")
     def _one_of_four(self) -> Self:
@@ -495,36 +520,39 @@ CHOSEN = ("samples", "adaptive_threshold", "denoise")
 
 
 class TargetError(Settings):
-    """A target error, and how it may be reached."""
+    """The error that the views must reach, and how it may be reached."""
 
     value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
-        description="The relative mean squared error to reach."
+        description="Relative mean squared error to reach."
     )
     denoise: Literal["auto", "never"] = Field(
-        "auto", description="never: choose only between plain and adaptive sampling."
+        "auto",
+        description="Whether the denoiser may be chosen. auto: if it is cheaper. never: only plain "
+        "and adaptive sampling are compared.",
     )
 
 
 class CameraMotion(Settings):
-    """How each camera moves while its shutter is open, at constant speed.
+    """How each camera moves at constant speed while its shutter is open.
 
     The view's pose is that in the middle of the exposure. Depth and passes are of that moment.
     """
 
     travel: Vector = Field(
         (0.0, 0.0, 0.0),
-        description="How far the camera moves to its right, up and back.",
+        description="How far the camera moves during the exposure: to its right, up and backward.",
         json_schema_extra={"unit": "m"},
     )
     turn: Vector = Field(
         (0.0, 0.0, 0.0),
-        description="How far it turns: a rotation vector about its right, up and back.",
+        description="How far the camera turns during the exposure: a rotation vector whose axes "
+        "are its right, up and backward.",
         json_schema_extra={"unit": "degrees"},
     )
     rolling: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
         None,
-        description="Rolling shutter from the top row to the bottom: the part of the exposure in "
-        "which a row sees light. Without it, all rows see light all the time.",
+        description="Rolling shutter, from the top row to the bottom: the fraction of the exposure "
+        "during which one row is exposed. Without this key, all rows are exposed all the time.",
     )
 
     @model_validator(mode="after")
@@ -545,87 +573,107 @@ class Render(Settings):
 
     samples: AtLeastOne | Literal["file"] | None = Field(
         None,
-        description="Paths for each pixel. file: as many as in the .blend.",
+        description="Number of paths that Cycles traces for each pixel. file: the number in the "
+        ".blend.",
         json_schema_extra={"unit": "paths"},
     )
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
-        description="Instead of samples: choose samples, adaptive_threshold and denoise on probe "
-        "views for this error. It is the relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
-        "with middle grey at 0.18, without the worst thousandth of pixels.",
+        description="Error to reach, instead of samples: samples, adaptive_threshold and denoise "
+        "are then chosen on probe views. It is the relative mean squared error, (x - r)^2 / (r^2 + "
+        "0.01) with middle grey at 0.18, without the worst thousandth of pixels.",
     )
     max_bounces: int | None = Field(
         None,
         ge=0,
         le=1024,
-        description="Bounces of a path, of any kind.",
+        description="Largest number of bounces of a path, of all kinds together. Without this key, "
+        "as in the .blend.",
         json_schema_extra={"unit": "bounces"},
     )
     clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
         None,
-        description="Largest value of one indirect sample. 0 does not clamp.",
+        description="Largest value of one indirect sample, which removes fireflies but darkens. 0: "
+        "no limit. Without this key, as in the .blend.",
         json_schema_extra={"unit": "light"},
     )
     light_tree: bool | None = Field(
-        None, description="Prefer lights that matter at a place, by a tree of all lights."
+        None,
+        description="Sample lights by Cycles' light tree, which reduces noise in scenes with many "
+        "lights. Without this key, as in the .blend.",
     )
     guiding: bool | None = Field(
-        None, description="Learn where light comes from while rendering. Only on CPUs."
+        None,
+        description="Use Cycles' path guiding, which learns where light comes from. It works only "
+        "on CPUs. Without this key, as in the .blend.",
     )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
-        None, description="Width of the pixel filter.", json_schema_extra={"unit": "pixels"}
+        None,
+        description="Width of the pixel filter. Without this key, as in the .blend.",
+        json_schema_extra={"unit": "pixels"},
     )
     adaptive_threshold: Annotated[float, Field(ge=0, le=1), AS_WRITTEN] = Field(
-        0, description="Noise at which adaptive sampling stops early. 0 takes every sample."
+        0,
+        description="Noise level at which adaptive sampling of a pixel stops. 0: every pixel takes "
+        "all samples.",
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
     denoise_quality: Literal["high", "balanced", "fast"] | None = Field(
-        None, description="Quality of the denoiser's network. The default is high."
+        None, description="Quality of the denoiser. The default is high, and the others are faster."
     )
     denoise_prefilter: DenoisePrefilter | None = Field(
         None,
-        description="Prefilter of the albedo and normals that guide the denoiser. The default is "
-        "accurate.",
+        description="How the albedo and normals that guide the denoiser are denoised first. The "
+        "default is accurate.",
     )
     motion_blur: bool | None = Field(
-        None, description="Blur moving objects. Without it, as in the .blend."
+        None, description="Whether moving objects are blurred. Without this key, as in the .blend."
     )
     camera_motion: CameraMotion | None = Field(
-        None, description="Move the cameras while their shutters are open."
+        None, description="How each camera moves while its shutter is open, which blurs the views."
     )
     depth_of_field: bool | None = Field(
         None,
-        description="Use the focus and aperture of the .blend's own camera. Without it, everything "
-        "is sharp.",
+        description="Blur what is out of focus, with the focus and aperture of the .blend's own "
+        "camera. Without this key, everything is sharp.",
     )
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="Each view's seed follows from this and its name."
+        0,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of the noise. Each view's own seed is computed from this and the view's "
+        "name.",
     )
     depth: Literal["auto", "z", "distance", "none"] = Field(
         "auto",
-        description="Meaning of channel Z. auto: z up to 180 degrees, and distance beyond.",
+        description="What channel Z holds. z: depth along the optical axis. distance: distance "
+        "from the camera. none: no depth. auto: z for lenses up to 180 degrees, distance for wider "
+        "ones.",
     )
     depth_precision: Literal["float", "rounded", "half"] = Field(
         "float",
-        description="Precision of depth. float has 24 binary digits, and half has 11. rounded is a "
-        "float with 17 digits, exact to 1e-5, in smaller files.",
+        description="Precision of depth. float: 24 significant bits. rounded: a float with 17 "
+        "significant bits (a relative error below 1e-5), in smaller files. half: 11 significant "
+        "bits.",
     )
     compression: Literal["zip", "zips", "piz", "htj2k", "zstd"] | None = Field(
         None,
         description="Lossless compression of the views' EXR files. The default is zip, which every "
-        "program reads. htj2k and zstd are smaller, for archives and scratch.",
+        "program reads. htj2k and zstd give smaller files, for archives and temporary use.",
     )
     transparent: bool | None = Field(
-        None, description="Leave out the world behind the scene, and write the coverage as alpha."
+        None,
+        description="Make the background transparent: the world behind the scene is left out, and "
+        "alpha holds the coverage.",
     )
     passes: PassNames | None = Field(
-        None, description="Passes to write, each into a folder of its own."
+        None, description="Passes to write beside colour and depth, each into a folder of its own."
     )
     light_groups: Literal["each"] | Emitters | dict[str, Emitters] | None = Field(
         None,
-        description="The light of each lamp, glowing object and world as a pass of its own. each: "
-        "all of them. A list: those of these names. A mapping: groups of them. All others are "
-        "the group rest.",
+        description="Light sources (lamps, glowing objects, the world) whose light is written as "
+        "passes of their own. each: all of them. A list: those with these names. A mapping: groups "
+        "of them. All others form the group rest.",
     )
 
     @model_validator(mode="after")
@@ -661,30 +709,36 @@ class Render(Settings):
 
 
 class Reprojection(ReprojectionOptions):
-    """The same views through another lens, or as other files."""
+    """Versions of the views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
-        None, min_length=1, description="The rigs to reproject. Without it, all of them."
+        None,
+        min_length=1,
+        description="Rigs whose views are reprojected. Without this key, all rigs.",
     )
-    format: Literal["png", "exr"] = Field("png", description="Only EXR has depth.")
+    format: Literal["png", "exr"] = Field(
+        "png", description="Format of the images. Only EXR has depth."
+    )
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0,
-        description="Exposure. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
+        description="Exposure of the images. A list makes a folder for each of its values, such as "
+        "png_ev-2 and png_ev0.",
         json_schema_extra={"unit": "stops"},
     )
     passes: ReprojectedPassNames | None = Field(
         None,
-        description="Passes of render.passes to reproject, too, as EXR. light_groups: those of "
-        "all light groups.",
+        description="Passes of render.passes that are also reprojected, as EXR. light_groups: the "
+        "passes of all light groups.",
     )
     relight: Name | Light | None = Field(
         None,
-        description="Another light: the name of an entry of relight, or strengths as there.",
+        description="Light of the images, if it is not the rendered one: the name of an entry of "
+        "relight, or strengths as in such an entry.",
     )
     primaries: Literal["rec709", "acescg"] | None = Field(
         None,
-        description="The colour space of an EXR. The file names it in its attribute "
-        "chromaticities. Without this key it is Rec. 709, and the file does not say so.",
+        description="Colour space of EXR images, which the files name in their attribute "
+        "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",
     )
 
     @model_validator(mode="after")
@@ -742,35 +796,37 @@ class SensorReprojection(Reprojection):
 
 
 class Flow(Settings):
-    """The optical flow between pairs of views."""
+    """Optical flow between pairs of views."""
 
     pairs: Literal["neighbours"] = Field(
-        description="neighbours: from each view to the one whose camera is nearest."
+        description="Pairs of views. neighbours: from each view to the view whose camera is "
+        "nearest."
     )
 
 
 class MeshFiles(Settings):
-    """The surface that cameras can see, as meshes, and the boxes and poses of its objects."""
+    """Meshes of the surface that cameras can see, and the boxes and poses of its objects."""
 
     formats: Annotated[list[Literal["glb", "ply"]], AfterValidator(_unique)] = Field(
         ["glb", "ply"],
-        description="glb: instances share a mesh, and objects keep their names. ply: all triangles "
-        "in the world.",
+        description="Formats to write. glb: objects keep their names, and instances share a mesh. "
+        "ply: all triangles together, in world coordinates.",
     )
     rigs: list[str] | None = Field(
         None,
         min_length=1,
-        description="The rigs whose datasets hold it. Without it, all of them.",
+        description="Rigs whose datasets get the meshes. Without this key, all rigs.",
     )
 
 
 class Report(Settings):
-    """The contents of a dataset's page."""
+    """What the page of a dataset shows."""
 
     panorama: Auto | bool = Field(
         "auto",
-        description="Show a panorama from the rig's centre. auto: if the cameras look outward, all "
-        "round. Without it, the page shows the view in the rig's middle.",
+        description="Whether the page shows a panorama from the rig's centre. auto: only if the "
+        "cameras look outward in all directions. Otherwise, the page shows the view in the rig's "
+        "middle.",
     )
 
 
@@ -790,19 +846,19 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
 
 
 class Credits(Settings):
-    """What a package's card says of the scene, and what publishing needs beside that."""
+    """What a package's card says about the scene, and what publishing needs in addition."""
 
-    description: str | None = Field(None, description="One line about the scene.")
+    description: str | None = Field(None, description="Description of the scene, in one line.")
     licence: str | None = Field(
         None,
-        description="Of the scene, for a package's card. It is also the data's licence, unless "
-        "publish has another.",
+        description="Licence of the scene, for a package's card. It is also the licence of the "
+        "data, unless publish has another.",
     )
-    credit: str | None = Field(None, description="How the scene's artist is to be cited.")
+    credit: str | None = Field(None, description="How to cite the artist of the scene.")
     publish: Publication | None = Field(
         None,
-        description="Also write what a repository of datasets needs. Without it, a package is an "
-        "archive alone.",
+        description="What a repository of datasets needs to know. With this key, its metadata and "
+        "shards are also written. Without it, a package is only an archive.",
     )
 
     @property
@@ -831,39 +887,53 @@ class Credits(Settings):
 
 
 class Scene(Credits):
-    """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
+    """One scene: where it comes from, how its rigs render it, and what is made of the views."""
 
-    scene: SceneSource = Field(description="The scene: a builder, a .blend, a model, or a dataset.")
+    scene: SceneSource = Field(
+        description="Where the scene comes from: a builder, a .blend, a model, or a dataset."
+    )
     render: Render | None = Field(
-        None, description="How Cycles renders. Required, except with scene.dataset."
+        None,
+        description="How Cycles renders the views. Required, but not allowed with scene.dataset.",
     )
     rigs: dict[Name, AnyRig] = Field(
         {},
         min_length=1,
-        description="The camera setups, by the names of their folders. scene.dataset has its own.",
+        description="Camera setups, by the names of their folders. Leave it out with "
+        "scene.dataset, which has its own cameras.",
     )
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
-        {}, description="The same views through other lenses, by the names of their folders."
+        {},
+        description="Versions of the views through other lenses or as other files, by the names of "
+        "their folders.",
     )
     relight: dict[Name, Light] = Field(
         {},
-        description="The views under other lights, as EXR, by the names of their folders. A light "
-        "has strengths, or red, green and blue, by the names of light groups; others keep theirs. "
-        "each: every group alone, one after the other.",
+        description="Versions of the views under other lights, as EXR, by the names of their "
+        "folders. A light gives light groups a strength, or one each for red, green and blue. "
+        "Other groups keep theirs. each: every group alone, one after the other.",
     )
     sensor: Sensor | None = Field(
-        None, description="The views as a sensor sees them: noise, vignetting, brackets."
+        None,
+        description="Versions of the views as a real sensor would record them, with noise, "
+        "vignetting or exposure brackets.",
     )
     flow: Flow | None = Field(
-        None, description="Optical flow from depth and poses, for a scene that stands still."
+        None,
+        description="Optical flow between views, from depth and poses, for scenes that do not "
+        "move.",
     )
     mesh: MeshFiles | None = Field(
-        None, description="The surface that cameras can see, as meshes, and its objects' boxes."
+        None,
+        description="Meshes of the surface that cameras can see, and the bounding boxes of its "
+        "objects.",
     )
-    exports: Exports = Field(Exports(), description="Files for trainers.")
-    report: Report = Field(Report(), description="The contents of a dataset's page.")
+    exports: Exports = Field(
+        Exports(), description="Exports to the formats of trainers and other programs."
+    )
+    report: Report = Field(Report(), description="What the page of a dataset shows.")
     family: Family | None = Field(
-        None, description="Many scenes that differ by seed, model or drawn values."
+        None, description="Many scenes that differ in seed, model or drawn values."
     )
 
     @model_validator(mode="before")

@@ -81,8 +81,9 @@ class Poses(Rig):
     type: Literal["poses"]
     file: str = Field(
         pattern=pattern(r"\.(json|csv|txt|bin)$", "a path that ends in .json, .csv, .txt or .bin"),
-        description="A lightfield.json; a CSV of name,x,y,z,rx,ry,rz in metres and radians, or of "
-        "name,x,y,z,qw,qx,qy,qz; a transforms.json; COLMAP's images.txt or images.bin.",
+        description="Path of the file with the poses: a lightfield.json, a transforms.json, "
+        "COLMAP's images.txt or images.bin, or a CSV. The CSV's header is name,x,y,z,rx,ry,rz "
+        "(metres and radians) or name,x,y,z,qw,qx,qy,qz.",
     )
     max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
