@@ -1,6 +1,6 @@
 """Print which changes of a scene's settings reach the same error in less time.
 
-Reads what scripts/try_changes.py measured, and writes a table of each scene beside its file.
+Reads what scripts/try_changes.py measured, and writes a table for each scene beside its file.
 """
 
 import argparse

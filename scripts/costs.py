@@ -1,11 +1,11 @@
-"""Add up what a dataset has cost, and what the full one would: report/costs.json.
+"""Add up what a dataset has cost, and estimate what it costs at full size: report/costs.json.
 
-Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
-from the journals of their shards. Journals survive kills. So they hold all the time that was spent,
-also on views that were lost or rendered again. Any other job counts with the time and memory of its
-last run, as Snakemake measured them. Snakemake measures every half second, and after a while every
-30 s. So the processor time may be too short by that much. A job that ends before the first
-measurement counts as busy throughout.
+Times are in seconds, memory and sizes in bytes, and energy in kWh. Wall and processor time of the
+views come from the journals of their shards. Journals survive kills. So they hold all the time that
+was spent, also on views that were lost or rendered again. Any other job counts with the time and
+memory of its last run, as Snakemake measured them. Snakemake measures every half second, and after
+a while every 30 s. So the processor time may be too short by that much. A job that ends before the
+first measurement counts as busy throughout.
 
     {
       "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],

@@ -1,4 +1,4 @@
-"""Compare a reconstructed surface with the true one, as a benchmark defines it.
+"""Compare a reconstructed surface with the true one, by the metrics of a benchmark.
 
 Both are meshes or point clouds: PLY, OBJ, STL, or glTF. Units are metres. Both must be in the
 dataset's coordinates, Z up. glTF is turned, because it has Y up. See

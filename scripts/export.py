@@ -1,4 +1,4 @@
-"""Export a dataset's views for a consumer: COLMAP, nerfstudio, NeRF-synthetic, and others.
+"""Export a dataset's views for other programs: COLMAP, nerfstudio, NeRF-synthetic, and others.
 
 A settings file is JSON: {"options": {"sources": ["perspective"], "points": 50000}, "suffix":
 ".png"}. `options` has the keys of the scene YAML's `exports`, with one source. `suffix` is the

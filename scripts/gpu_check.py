@@ -1,7 +1,7 @@
-"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours.
+"""Check that a GPU renders the same as the processor, and estimate the hours of full datasets.
 
 A settings file is JSON: {"full": {"LFSphere": {"views": 642, "resolution": [2048, 2048]}}}. `full`
-has the size of each dataset whose hours are estimated. Without the file none are.
+has the size of each dataset whose hours are estimated. Without this file, no hours are estimated.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """List what a scene contains, and what its rendering can leave out.
 
-Missing or unreadable files are an error here, before they turn views pink. For a user's .blend it
-prints which settings the dataset takes and which it ignores.
+Missing or unreadable files are reported as an error, before they turn views pink. For a user's
+.blend, it prints which settings the dataset uses and which it ignores.
 """
 
 import argparse

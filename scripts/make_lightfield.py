@@ -1,7 +1,7 @@
 """Write a dataset's lightfield.json: its lens, the poses of its views, and how it is rendered.
 
-The workflow gives the settings file of a dataset, in which the limits of the preset are applied. By
-hand, --scene and --rig name a dataset at full size.
+The workflow gives a settings file, in which the limits of the preset are already applied. By hand,
+give --scene and --rig instead, for a dataset at full size.
 """
 
 import argparse

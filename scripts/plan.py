@@ -1,7 +1,7 @@
 """Tabulate the views, hours and gigabytes of the chosen datasets on this machine.
 
-Reads what scripts/probe.py measured. Hours are of one processor core, or of the GPU if it renders.
-Gigabytes are the size of the rendered views.
+Reads what scripts/probe.py measured. Hours are those of one processor core, or of the GPU if it
+renders. Gigabytes are the size of the rendered views.
 """
 
 import argparse

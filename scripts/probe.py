@@ -1,4 +1,4 @@
-"""Estimate the time and size of a dataset's views from a few small ones with all samples."""
+"""Estimate the time and size of a dataset's views from a few small views with all samples."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Publish the checksums of a valid dataset. Fail with the first causes if it is not valid.
+"""Publish the checksums of a valid dataset. Fail with the first reasons if it is not valid.
 
 The checksums of an invalid dataset are removed, so that the next run validates it again.
 """

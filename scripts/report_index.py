@@ -1,7 +1,7 @@
 """Make the page with links to the pages of all datasets in a results folder.
 
-It is one file with thumbnails. It has every dataset that has a page. It warns about datasets whose
-files cannot be read.
+The page is one file with thumbnails. It lists every dataset that has a page. The program warns
+about datasets whose files cannot be read.
 """
 
 import argparse

@@ -1,7 +1,8 @@
-"""Print the progress of the chosen datasets, from their files only, even during a build.
+"""Print the progress of the chosen datasets, also while a build runs.
 
-The time left assumes that rendering goes on as in the last ten minutes: with as many processes, and
-as many seconds for each view. The journals of the shards have these.
+Only the datasets' files are read. The time left assumes that rendering continues as in the last ten
+minutes: with as many processes, and as many seconds for each view. The journals of the shards
+record both.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Write what cameras can see of a scene as meshes, and the boxes and poses of its objects.
+"""Write the surface that cameras can see as meshes, and the boxes and poses of its objects.
 
 A settings file is JSON: {"formats": ["glb", "ply"], "frame": 1}. `frame`, `scene_name` and
 `view_layers` are those of the scene YAML's `scene`. The output folder gets scene.glb, scene.ply and

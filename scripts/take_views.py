@@ -1,8 +1,8 @@
-"""Copy files that lists name from the view store: the views of shards, and the files of exports.
+"""Copy files from the view store: the views of shards, and the files of exports.
 
-The lists are the records of shards, and the lists of exports. Each file goes into the dataset of
-its list. Files that exist already with the same bytes stay. Arguments that are not lists are
-ignored.
+The arguments are lists that name the files: the records of shards, and the lists of exports. Each
+file goes into the dataset of its list. Files that exist already with the same bytes stay. Arguments
+that are not lists are ignored.
 """
 
 import argparse

@@ -2,10 +2,10 @@
 
 Prints a line for each failure. The exit status is then 1.
 
-The workflow gives --output and --sums. Then the exit status is 0 for an invalid dataset, too.
-Writes validation.json, and the checksums of all files that the dataset publishes.
-scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an earlier
-sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
+With --output and --sums, which the workflow gives, the exit status is 0 even for an invalid
+dataset. The program then writes validation.json, and the checksums of all files that the dataset
+publishes. scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an
+earlier sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
 
 A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "records": []}, for the
 flags --reprojection, --exports and --records.

@@ -88,7 +88,9 @@ REQUIRED = (
 
 
 class Publication(Settings):
-    """What only the author of a dataset knows. Publishing needs all the keys of `REQUIRED`."""
+    """What only the author of a dataset knows. Publishing requires `creators`, `url`, `publisher`,
+    `date`, `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
+    """
 
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
         None, description="People and organizations that made the dataset."
@@ -115,10 +117,10 @@ class Publication(Settings):
     )
     date: Date | None = Field(None, description="Date of publication, such as 2026-11-30.")
     limitations: Text | None = Field(
-        None, description="Limitations: what the dataset should not be used to show."
+        None, description="Limitations of the dataset: what it cannot show."
     )
     biases: Text | None = Field(
-        None, description="Biases: what the dataset shows too often or too rarely."
+        None, description="Biases of the dataset: what it shows too often or too rarely."
     )
     personal_information: Text | None = Field(
         None,
