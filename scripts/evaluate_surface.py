@@ -87,7 +87,7 @@ def check_options(arguments: argparse.Namespace) -> dict[str, float]:
                 continue
             if protocol != arguments.protocol:
                 flag = name.replace("_", "-")
-                raise UserError(f"--{flag}: goes with --protocol {protocol}")
+                raise UserError(f"--{flag}: is only for --protocol {protocol}")
             options[name] = value
     if arguments.protocol == "tanks_and_temples" and "tau" not in options:
         raise UserError("--tau: is missing; the benchmark has 0.003 to 0.025 m, by the scene")

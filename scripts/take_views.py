@@ -57,7 +57,7 @@ def main() -> None:
             for path in set(lost_files.values()):
                 store.remove(_stored(path, arguments.results, arguments.work))
         raise UserError(
-            f"{len(lost_files)} files are not in the view store {store.url}, as "
+            f"{len(lost_files)} files are not in the view store {store.url}, such as "
             f"{min(lost_files)}; {remedy}"
         )
 

@@ -993,7 +993,7 @@ def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
             np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
     alone = sum(len(track) == 1 for track in model.tracks.values())
     printed = capsys.readouterr().out
-    assert f"{len(model.positions)} points; one view alone sees {alone} of them" in printed
+    assert f"{len(model.positions)} points; only one view sees {alone} of them" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):

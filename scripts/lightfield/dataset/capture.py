@@ -102,7 +102,9 @@ class Capture:
         """The identity of the scene: see `scene_fingerprint` and `model_fingerprint`."""
         if self.source.model:
             if self.model_fingerprint is None:
-                raise UserError(f"{self.source.model}: is not imported; import_model.py does it")
+                raise UserError(
+                    f"{self.source.model}: is not imported; run scripts/import_model.py first"
+                )
             return self.model_fingerprint
         return scene_fingerprint(self.source, self.external_files)
 

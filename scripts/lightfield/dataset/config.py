@@ -311,7 +311,8 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(
-                    f"scenes: {name} is not a name for a scene; no dots, and not {used_names}"
+                    f"scenes: {name} cannot be the name of a scene; must have no dots, and not be "
+                    f"one of {used_names}"
                 )
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
@@ -332,7 +333,7 @@ def _check_folder(key: str, folder: str) -> None:
     reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
     is_inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
     if path in parents or path.resolve() in parents or is_inside:
-        raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
+        raise ValueError(f"{key}: is {folder!r}; must be a folder that is used for nothing else")
     if path.exists() and not path.is_dir():
         raise ValueError(f"{key}: is {folder!r}, which is a file; must be a folder")
 
@@ -396,7 +397,9 @@ class ModelOptions(Settings):
 def check_model(model: str, up: str) -> None:
     """Raise a ValueError if ``up`` is given for a model that says itself which axis points up."""
     if up != "auto" and Path(model).suffix.lower() not in UP:
-        raise ValueError("up: goes with OBJ, PLY and STL; glTF and USD say it themselves")
+        raise ValueError(
+            "up: is only for OBJ, PLY and STL; glTF and USD files define it themselves"
+        )
 
 
 ModelPath = Annotated[
@@ -494,9 +497,9 @@ class SceneSource(ModelOptions, Origin):
                 raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
             for name in BLEND_KEYS:
                 if getattr(self, name) is not None:
-                    raise ValueError(f"{name}: goes with blend, not with builder")
+                    raise ValueError(f"{name}: is only for blend, not for builder")
             if self.frame == FILE:
-                raise ValueError("frame: file goes with blend, not with builder")
+                raise ValueError("frame: file is only for blend, not for builder")
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: does not go with dataset")
@@ -505,13 +508,13 @@ class SceneSource(ModelOptions, Origin):
                 if name in self.model_fields_set and name != "allow_missing":
                     raise ValueError(f"{name}: does not go with model")
             if self.frame == FILE:
-                raise ValueError("frame: file goes with blend, not with model")
+                raise ValueError("frame: file is only for blend, not for model")
             check_model(self.model, self.up)
         elif self.blend is not None and "parameters" in self.model_fields_set:
-            raise ValueError("parameters: goes with builder, not with blend")
+            raise ValueError("parameters: is only for builder, not for blend")
         for name in MODEL_KEYS:
             if self.model is None and name in self.model_fields_set:
-                raise ValueError(f"{name}: goes with model")
+                raise ValueError(f"{name}: is only for model")
         return self
 
 
@@ -745,11 +748,11 @@ class Reprojection(ReprojectionOptions):
     def _has_use(self) -> Self:
         for name in ("cube_map", "rotation", "filter", "samples"):
             if self.camera is None and name in self.model_fields_set:
-                raise ValueError(f"{name}: goes with camera; without one nothing is resampled")
+                raise ValueError(f"{name}: needs camera; without one, nothing is resampled")
         if self.format == "exr" and self.bits != 8:
-            raise ValueError("bits: goes with format png; an EXR has halves")
+            raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
         if self.format == "png" and self.primaries:
-            raise ValueError("primaries: goes with format exr; a PNG is sRGB")
+            raise ValueError("primaries: is only for format exr; a PNG is sRGB")
         lights = [
             name
             for name in self.passes or ()
@@ -976,9 +979,11 @@ class Scene(Credits):
             self._check_rig(f"rigs.{name}", name, rig)
         if self.render and self.scene.blend is None:
             if self.render.samples == FILE:
-                raise ValueError("render.samples: file goes with scene.blend")
+                raise ValueError("render.samples: file is only for scene.blend")
             if self.render.depth_of_field:
-                raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
+                raise ValueError(
+                    "render.depth_of_field: is only for scene.blend, whose camera it uses"
+                )
         if self.mesh:
             self._check_mesh(self.mesh)
         for name, reprojection in self.reprojections.items():
@@ -1002,7 +1007,7 @@ class Scene(Credits):
     def _check_family(self, family: Family) -> None:
         """Check that a job can build the members of a family one after the other."""
         if family.seeds and not self.scene.builder:
-            raise ValueError("family.seeds: goes with scene.builder")
+            raise ValueError("family.seeds: needs scene.builder")
         if self.render and self.render.target_error is not None:
             raise ValueError("render.target_error: does not go with family; give samples")
         for key in ("flow", "mesh"):
@@ -1052,7 +1057,9 @@ class Scene(Credits):
                 raise ValueError(f"sensor.vignetting: does not go with the faces of {source}")
             for rig_name in sensor.rigs or ():
                 if original and rig_name not in (original.rigs or self.rigs):
-                    raise ValueError(f"sensor.rigs: {rig_name} is not of the reprojection {source}")
+                    raise ValueError(
+                        f"sensor.rigs: {rig_name} is not a rig of the reprojection {source}"
+                    )
             for name in sensor.folders(source):
                 if name in self.reprojections:
                     raise ValueError(f"reprojections.{name}: the name is taken by sensor")
@@ -1072,7 +1079,7 @@ class Scene(Credits):
         for pass_name in reprojection.passes or ():
             if pass_name == LIGHT_GROUPS:
                 if self.render is None or self.render.light_groups is None:
-                    raise ValueError(f"{key}.passes: light_groups go with render.light_groups")
+                    raise ValueError(f"{key}.passes: light_groups needs render.light_groups")
                 continue
             if self.render is None or pass_name not in (self.render.passes or ()):
                 raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
@@ -1102,7 +1109,7 @@ class Scene(Credits):
         if isinstance(reprojection.relight, str) and reprojection.relight in self.relight:
             at = f"relight.{reprojection.relight}"
         if self.render is None or self.render.light_groups is None:
-            raise ValueError(f"{at}: goes with render.light_groups, which it changes")
+            raise ValueError(f"{at}: needs render.light_groups, whose strengths it changes")
         if light == light_groups.EACH:
             if reprojection.passes:
                 raise ValueError(f"{key}.passes: does not go with the light each")
@@ -1171,7 +1178,9 @@ class Scene(Credits):
                 if refusal := export.refusal(camera.make(), has_depth):
                     raise ValueError(f"{key}: {source} {refusal}")
                 if rig.is_omnidirectional:
-                    raise ValueError(f"{key}: {source} is of the rig {name}, without a centre")
+                    raise ValueError(
+                        f"{key}: {source} is of the rig {name}, whose views have no centre"
+                    )
                 if refusal := export.rig_refusal(rig):
                     raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
 
@@ -1194,9 +1203,9 @@ class Scene(Credits):
         if isinstance(rig, Poses) and not Path(rig.file).is_file():
             raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
         if self.scene.blend is None and isinstance(rig, BlendCamera):
-            raise ValueError(f"{key}.type: blend_camera goes with scene.blend")
+            raise ValueError(f"{key}.type: blend_camera needs scene.blend")
         if camera.lens == FILE and not isinstance(rig, BlendCamera):
-            raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
+            raise ValueError(f"{key}.camera.lens: file is only for a rig of type blend_camera")
         frames = len(rig.sequence.numbers) if rig.sequence else 1
         if frames > MOST_FRAMES or frames * rig.view_count > MOST_VIEWS:
             raise ValueError(
@@ -1238,7 +1247,7 @@ class Scene(Credits):
     def _check_without_centre(self, key: str, name: str) -> None:
         """Check that nothing needs a centre of a rig's views, which have none."""
         if self.rigs[name].camera.lens != "equirectangular":
-            raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
+            raise ValueError(f"{key}.stereo.omnidirectional: needs the lens equirectangular")
         refusal = f"does not go with {key}.stereo.omnidirectional, whose views have no centre"
         if self.render and self.render.camera_motion:
             raise ValueError(f"render.camera_motion: {refusal}")
@@ -1366,9 +1375,7 @@ def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
     try:
         return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
     except (LookupError, TypeError):
-        raise UserError(
-            f"{lock}: sha256: is missing; without the file it is recorded anew"
-        ) from None
+        raise UserError(f"{lock}: sha256: is missing; remove the file to record it again") from None
 
 
 def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:

@@ -137,7 +137,7 @@ class InstantNgp(Export):
         if self.scale is not None and self.bounds == "depth":
             raise ValueError("bounds: does not go with scale, which it would determine")
         if self.scale is None and self.offset is not None:
-            raise ValueError("offset: goes with scale; without it both are fitted")
+            raise ValueError("offset: needs scale; without scale, both are fitted")
         if self.render_aabb:
             lowest, highest = self.render_aabb
             if any(low >= high for low, high in zip(lowest, highest, strict=True)):

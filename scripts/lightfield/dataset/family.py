@@ -130,7 +130,7 @@ class Family(Settings):
             if not re.fullmatch(r"\w[\w-]*(\.\w[\w-]*)+", key) or key.startswith("family."):
                 raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
             if key == own:
-                raise ValueError(f"values: {key} is the members' own")
+                raise ValueError(f"values: {key} cannot be drawn, because each member has its own")
         if self.seeds and len(self._seeds) > MOST_MEMBERS:
             raise ValueError(f"seeds: is {self.seeds!r}; must be at most {MOST_MEMBERS} seeds")
         if self.seeds and not self._seeds:

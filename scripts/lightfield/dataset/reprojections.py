@@ -76,7 +76,7 @@ class ReprojectionOptions(Settings):
         if self.camera is None:
             return self
         if self.camera.lens == "file":
-            raise ValueError("camera.lens: file goes with a rig of type blend_camera")
+            raise ValueError("camera.lens: file is only for a rig of type blend_camera")
         if self.cube_map and (problem := face_problem(self.camera)):
             raise ValueError(f"camera{problem}")
         return self

@@ -58,7 +58,7 @@ class Varied(Settings):
         if self.range and self.range[0] > self.range[1]:
             raise ValueError("range: must have the least value first")
         if self.range and self.start is not None:
-            raise ValueError("start: goes with step, not with range")
+            raise ValueError("start: is only for step, not for range")
         return self
 
     def reaches_beyond(self, limit: float) -> bool:

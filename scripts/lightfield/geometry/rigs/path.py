@@ -63,7 +63,7 @@ class Path(CountedRig):
             raise ValueError("keys: must all have a rotation, or none of them")
         steps = np.diff(self._places(), axis=0) * self.sides
         if (np.linalg.norm(steps, axis=-1) < 1e-9).any():
-            raise ValueError("keys: two in a row are at one place")
+            raise ValueError("keys: two consecutive keys have the same position")
         return self
 
     def is_at_one_place(self) -> bool:

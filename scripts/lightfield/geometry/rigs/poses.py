@@ -259,7 +259,7 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         applied = np.eye(4)
         applied[:3] = read_numbers(key, content[key], (3, 4))
         if abs(np.linalg.det(applied)) < 1e-12:
-            raise UserError(f"{key}: cannot be undone")
+            raise UserError(f"{key}: cannot be inverted")
         undo = np.linalg.inv(applied)
     frames = []
     for index, frame in enumerate(content["frames"]):
