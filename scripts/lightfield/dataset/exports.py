@@ -69,7 +69,9 @@ class Export(Settings):
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_of_sequence and (rig.sequence is None or len(rig.sequence.numbers) < 2):
-            return "has no two frames, and the export is of a sequence; give it frames"
+            return (
+                "has fewer than two frames, and this export is for sequences; give the rig frames"
+            )
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
             return "has one view, so none is left to test with"
         return None
@@ -207,7 +209,7 @@ class Nerfstudio(Developed):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if self.splatfacto and not isinstance(lens, Rectilinear):
-            return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
+            return f"would be read as a pinhole by splatfacto; {TO_RECTILINEAR}"
         if isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
@@ -243,7 +245,7 @@ class OpenDibr(Developed):
         elif not isinstance(lens, Rectilinear | Equirectangular):
             return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "h265" and shutil.which("ffmpeg") is None:
-            return "is to be H.265, for which ffmpeg must be installed; or give format: png"
+            return "becomes H.265, for which ffmpeg must be installed; or give format: png"
         refusal = _odd_size_refusal(lens) if self.format == "h265" else None
         return refusal or (None if has_depth else NO_DEPTH)
 
@@ -337,7 +339,7 @@ class LichtFeld(Developed):
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "exr" and not has_depth:
-            return "is not of EXR; give it format: exr"
+            return "is not in EXR; give it format: exr"
         return NO_DEPTH if self.depth and not has_depth else None
 
 
@@ -374,7 +376,7 @@ class Neural3dVideo(Developed):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if shutil.which("ffmpeg") is None:
-            return "is to be a video, for which ffmpeg must be installed"
+            return "becomes a video, for which ffmpeg must be installed"
         return _centred_pinhole(lens) or _odd_size_refusal(lens)
 
 
