@@ -252,7 +252,8 @@ REFUSED = [
         (
             f"exports.{name}",
             {"sources": ["perspective"]},
-            f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
+            f"exports.{name}.sources: perspective is of the rig LFSphere, which has fewer than two "
+            "frames",
         )
         for name in ("dnerf", "colmap_frames", "multipleview")
     ),

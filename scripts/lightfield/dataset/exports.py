@@ -118,7 +118,7 @@ class InstantNgp(Export):
     bounds: Literal["rig", "depth"] = Field(
         "rig",
         description="What the unit cube is fitted to without a scale. rig: the cameras. depth: the "
-        "surfaces that the views see.",
+        "cameras, and most of the surfaces that the views see.",
     )
     aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = Field(
         None,
@@ -209,7 +209,7 @@ class Nerfstudio(Developed):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if self.splatfacto and not isinstance(lens, Rectilinear):
-            return f"would be read as a pinhole by splatfacto; {TO_RECTILINEAR}"
+            return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
         if isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
