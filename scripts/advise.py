@@ -1,6 +1,6 @@
 """Print which changes of a scene's settings reach the same error in less time.
 
-Reads what scripts/try_changes.py measured, and writes a table of each scene beside its file.
+Reads what scripts/try_changes.py measured, and writes a table for each scene beside its file.
 """
 
 import argparse
@@ -14,7 +14,10 @@ from lightfield.core.files import read_keys, write_text
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "measured", nargs="*", type=Path, help="JSON of a scene, with the scene's name"
+        "measured",
+        nargs="*",
+        type=Path,
+        help="JSON files that scripts/try_changes.py wrote, each named like its scene",
     )
     paths = parser.parse_args().measured
 

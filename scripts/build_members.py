@@ -1,10 +1,10 @@
 """Build a batch of a family's members: all their datasets, one member after the other.
 
 Each member starts from a clean Blender file. A member that fails is recorded with its cause, and
-the others are built. A member that is finished and has its bytes is kept.
+the others are built. A finished member whose files are intact is kept.
 
 A settings file is JSON: {"family": "chairs", "scene": {…}, "members": [{"name": "0007", "seed":
-7}]}. `scene` and `values` are of the family's scene YAML.
+7}]}. `scene` and `values` come from the family's scene YAML.
 """
 
 import argparse
@@ -24,7 +24,7 @@ def main() -> None:
         "--device",
         default="auto",
         choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
-        help="device of Cycles (default: auto)",
+        help="device on which Cycles renders (default: auto)",
     )
     parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
     parser.add_argument(

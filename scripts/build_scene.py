@@ -41,10 +41,17 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--builder", choices=builders(), help="builder of the scene")
-    flags.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
-    flags.add_argument("--detail", type=float, default=1.0, help="up to 1, which is full (default)")
-    flags.add_argument("--place", type=int, help="draws another layout, materials and light")
+    flags.add_argument("--builder", choices=builders(), help="builder that makes the scene")
+    flags.add_argument("--seed", type=int, default=0, help="seed of everything random (default: 0)")
+    flags.add_argument(
+        "--detail",
+        type=float,
+        default=1.0,
+        help="level of detail, above 0 to 1 (default: 1, full detail)",
+    )
+    flags.add_argument(
+        "--place", type=int, help="number of a variant with another layout, materials and light"
+    )
 
 
 if __name__ == "__main__":

@@ -25,10 +25,18 @@ def main() -> None:
         "--probes",
         type=positive,
         default=PROBES,
-        help="windows of views; as many others are held out (default: %(default)s)",
+        help="number of windows of views to render; as many others are held out to check the "
+        "choice (default: %(default)s)",
     )
-    parser.add_argument("--output", required=True, type=Path, help="JSON of choice and evidence")
-    parser.add_argument("--seconds", type=Path, help="JSON of each method's seconds to write")
+    parser.add_argument(
+        "--output",
+        required=True,
+        type=Path,
+        help="JSON to write: the chosen method, and the measurements behind the choice",
+    )
+    parser.add_argument(
+        "--seconds", type=Path, help="JSON to write: the seconds that each method took"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

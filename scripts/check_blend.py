@@ -17,8 +17,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
-    parser.add_argument("--blend", required=True, type=Path, help="file to check")
-    parser.add_argument("--output", required=True, type=Path, help="JSON to write on success")
+    parser.add_argument("--blend", required=True, type=Path, help=".blend to check")
+    parser.add_argument(
+        "--output",
+        required=True,
+        type=Path,
+        help="JSON to write if the .blend has the right SHA-256",
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

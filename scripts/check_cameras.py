@@ -11,9 +11,13 @@ from lightfield.core.cli import run
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
-    parser.add_argument("--inventory", type=Path, help="JSON of the scene's contents")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
+    parser.add_argument(
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
+    )
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

@@ -17,12 +17,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", type=Path, help="folder of the family, with one for each member")
+    parser.add_argument(
+        "folder", type=Path, help="folder of the family, which holds a folder for each member"
+    )
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
     parser.add_argument(
-        "--cache", required=True, type=Path, metavar="JSON", help="what is known of the views"
+        "--cache",
+        required=True,
+        type=Path,
+        metavar="JSON",
+        help="JSON that keeps what was computed from the views, so that it is not computed again",
     )
     arguments = parser.parse_args()
 

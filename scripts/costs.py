@@ -1,11 +1,11 @@
-"""Add up what a dataset has cost, and what the full one would: report/costs.json.
+"""Add up what a dataset has cost, and estimate what it costs at full size: report/costs.json.
 
-Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
-from the journals of their shards. Journals survive kills. So they hold all the time that was spent,
-also on views that were lost or rendered again. Any other job counts with the time and memory of its
-last run, as Snakemake measured them. Snakemake measures every half second, and after a while every
-30 s. So the processor time may be too short by that much. A job that ends before the first
-measurement counts as busy throughout.
+Times are in seconds, memory and sizes in bytes, and energy in kWh. Wall and processor time of the
+views come from the journals of their shards. Journals survive kills. So they hold all the time that
+was spent, also on views that were lost or rendered again. Any other job counts with the time and
+memory of its last run, as Snakemake measured them. Snakemake measures every half second, and after
+a while every 30 s. So the processor time may be too short by that much. A job that ends before the
+first measurement counts as busy throughout.
 
     {
       "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
@@ -53,27 +53,35 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument("--journals", required=True, type=Path, help="folder of its journals")
     parser.add_argument(
-        "--benchmarks", required=True, type=Path, help="folder of its jobs' benchmark files"
+        "--journals", required=True, type=Path, help="folder of the journals of its shards"
+    )
+    parser.add_argument(
+        "--benchmarks",
+        required=True,
+        type=Path,
+        help="folder of the benchmark files that Snakemake wrote for its jobs",
     )
     parser.add_argument(
         "--scene-benchmarks",
         required=True,
         nargs="+",
         type=Path,
-        help="folders of the benchmark files of the scene's jobs",
+        help="folders of the benchmark files that Snakemake wrote for the scene's jobs",
     )
-    parser.add_argument("--blend", type=Path, help="the scene, if there is one")
+    parser.add_argument("--blend", type=Path, help="the scene's .blend, if there is one")
     parser.add_argument(
         "--settings",
         required=True,
         type=Path,
         metavar="JSON",
-        help="energy (watts, price_per_kwh, currency and cores), full (views and resolution of the "
-        "full dataset, and samples and denoise if they differ), and names of reprojections",
+        help="settings file with the keys energy (watts, price_per_kwh, currency and cores), full "
+        "(views and resolution of the full dataset, and samples and denoise if they differ), and "
+        "reprojections (their names)",
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of the scene's contents")
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

@@ -16,8 +16,15 @@ def main() -> None:
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
-    parser.add_argument("--failed", required=True, type=Path, help="list of failed members")
-    parser.add_argument("--output", required=True, type=Path, help="JSON to write if none failed")
+    parser.add_argument(
+        "--failed",
+        required=True,
+        type=Path,
+        help="text file to write: the failed members, with their errors",
+    )
+    parser.add_argument(
+        "--output", required=True, type=Path, help="JSON to write if no member failed"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for it.

@@ -16,7 +16,8 @@ def main() -> None:
         "--probes",
         type=positive,
         default=1,
-        help="windows of each stratum; a neighbouring view also gets the first (default: 1)",
+        help="windows of each stratum of the views; the first is also rendered in a neighbouring "
+        "view (default: 1)",
     )
     parser.add_argument(
         "--octaves",
@@ -25,16 +26,23 @@ def main() -> None:
         help="how often to double the samples, starting from 1 (default: 8)",
     )
     parser.add_argument(
-        "--reference", type=positive, default=2048, help="samples of a reference (default: 2048)"
+        "--reference",
+        type=positive,
+        default=2048,
+        help="samples of the reference renders (default: 2048)",
     )
     parser.add_argument(
         "--seeds",
         type=int,
         default=2,
-        help="renders of each method, 2 or more; more separate bias from variance (default: 2)",
+        help="renders of each method with different seeds, 2 or more; more of them separate bias "
+        "from variance better (default: 2)",
     )
     parser.add_argument(
-        "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"
+        "--output",
+        required=True,
+        type=Path,
+        help="path without suffix of the .csv, .json, .svg and .png to write",
     )
     arguments = parser.parse_args()
 

@@ -19,9 +19,9 @@ NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
-    add("renders", type=Path, metavar="RENDERS", help="folder of the renders")
+    add("renders", type=Path, metavar="RENDERS", help="folder of the renders to evaluate")
     add("--dataset", type=Path, required=True, help="the dataset's folder")
-    add("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS}, as rendered)")
+    add("--source", default=VIEWS, help=f"name of a reprojection (default: {VIEWS}, as rendered)")
     add(
         "--suffix",
         choices=[".png", ".exr"],
@@ -29,13 +29,17 @@ def parse_arguments() -> argparse.Namespace:
         help="suffix of the dataset's views (default: .exr)",
     )
     add(
-        "--exposure", type=stops, default=0.0, help="exposure of EXR views, as in the export, stops"
+        "--exposure",
+        type=stops,
+        default=0.0,
+        help="exposure of EXR views in stops, as in the export (default: 0)",
     )
     add(
         "--reinhard",
         type=white,
         default=1.0,
-        help="value of EXR views that becomes white (default: 1, no tone mapping)",
+        help="tone mapping of EXR views, as in the export: the value that becomes white (default: "
+        "1, no tone mapping)",
     )
     add(
         "--background",
@@ -44,7 +48,11 @@ def parse_arguments() -> argparse.Namespace:
         metavar="COLOUR",
         help="colour behind transparent pixels: black, white or rrggbb (default: black)",
     )
-    add("--masks", type=Path, help="folder of <view>.png, whose pixels of 0 are not compared")
+    add(
+        "--masks",
+        type=Path,
+        help="folder of masks, <view>.png; pixels that are 0 in them are not compared",
+    )
     add("--output", type=Path, required=True, help="folder to write")
     return parser.parse_args()
 

@@ -1,4 +1,4 @@
-"""Compare a reconstructed surface with the true one, as a benchmark defines it.
+"""Compare a reconstructed surface with the true one, by the metrics of a benchmark.
 
 Both are meshes or point clouds: PLY, OBJ, STL, or glTF. Units are metres. Both must be in the
 dataset's coordinates, Z up. glTF is turned, because it has Y up. See
@@ -29,19 +29,27 @@ def main() -> None:
         "--protocol",
         choices=list(PROTOCOLS),
         required=True,
-        help="the benchmark whose definition counts",
+        help="benchmark whose definition of the metrics is used",
     )
-    add("--spacing", type=above_zero, help="dtu: metres between points (default: 0.0002)")
+    add(
+        "--spacing",
+        type=above_zero,
+        help="for dtu: distance between sampled points, in metres (default: 0.0002)",
+    )
     add(
         "--most-distance",
         type=above_zero,
-        help="dtu: metres from which on a point does not count (default: 0.02)",
+        help="for dtu: distance in metres beyond which a point is ignored (default: 0.02)",
     )
-    add("--points", type=positive, help="nerf_synthetic: points on each surface (default: 2500000)")
+    add(
+        "--points",
+        type=positive,
+        help="for nerf_synthetic: number of points sampled on each surface (default: 2500000)",
+    )
     add(
         "--tau",
         type=above_zero,
-        help="tanks_and_temples: metres below which a point counts as right",
+        help="for tanks_and_temples: distance in metres below which a point counts as correct",
     )
     add("--output", type=Path, help="JSON to write")
     arguments = parser.parse_args()
@@ -79,7 +87,7 @@ def check_options(arguments: argparse.Namespace) -> dict[str, float]:
                 continue
             if protocol != arguments.protocol:
                 flag = name.replace("_", "-")
-                raise UserError(f"--{flag}: goes with --protocol {protocol}")
+                raise UserError(f"--{flag}: is only for --protocol {protocol}")
             options[name] = value
     if arguments.protocol == "tanks_and_temples" and "tau" not in options:
         raise UserError("--tau: is missing; the benchmark has 0.003 to 0.025 m, by the scene")

@@ -1,4 +1,4 @@
-"""Export a dataset's views for a consumer: COLMAP, nerfstudio, NeRF-synthetic, and others.
+"""Export a dataset's views for other programs: COLMAP, nerfstudio, NeRF-synthetic, and others.
 
 A settings file is JSON: {"options": {"sources": ["perspective"], "points": 50000}, "suffix":
 ".png"}. `options` has the keys of the scene YAML's `exports`, with one source. `suffix` is the
@@ -18,9 +18,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("format", choices=EXPORTS, help="format to write")
+    parser.add_argument("format", choices=EXPORTS, help="format of the export")
     parser.add_argument(
-        "--dataset", type=Path, required=True, help="the dataset's folder; of a sequence, the rig's"
+        "--dataset",
+        type=Path,
+        required=True,
+        help="folder of the dataset; for a sequence, folder of the rig",
     )
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
@@ -49,12 +52,12 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that can replace a settings file with default options."""
     flags = parser.add_argument_group("Instead of --settings, with default options")
-    flags.add_argument("--source", default=VIEWS, help=f"a reprojection (default: {VIEWS})")
+    flags.add_argument("--source", default=VIEWS, help=f"name of a reprojection (default: {VIEWS})")
     flags.add_argument(
         "--suffix",
         choices=[".png", ".exr"],
         default=".exr",
-        help="suffix of the views (default: .exr)",
+        help="suffix of the source's images (default: .exr)",
     )
 
 

@@ -25,8 +25,8 @@ def main(words: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--input-cfg", type=Path, required=True, help="the lightfield.json")
-    add("--output", type=Path, required=True, help="the transforms.json to write")
+    add("--input-cfg", type=Path, required=True, help="lightfield.json of the views")
+    add("--output", type=Path, required=True, help="transforms.json to write")
     add("--settings", type=Path, metavar="JSON", help="settings file, as for scripts/export.py")
     add("--image-dir", type=Path, help="folder of the views (default: that of --input-cfg)")
     add(
@@ -47,19 +47,29 @@ def main(words: Sequence[str] | None = None) -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that replace a settings file."""
     add = parser.add_argument_group("Instead of --settings").add_argument
-    add("--image-suffix", choices=[".png", ".exr"], default=".png", help="suffix of the views")
+    add(
+        "--image-suffix",
+        choices=[".png", ".exr"],
+        default=".png",
+        help="suffix of the views (default: .png)",
+    )
     add(
         "--depth-dir",
         type=Path,
-        help="write 16-bit depth PNGs there, in millimetres, from channel Z of the .exr views",
+        help="folder for depth maps (16-bit PNG, in millimetres), which are made from channel Z of "
+        "the .exr views",
     )
-    add("--scale", type=above_zero, help="metres to unit cubes (default: fitted to the scene)")
+    add(
+        "--scale",
+        type=above_zero,
+        help="scale from metres to unit cubes (default: fitted to the scene)",
+    )
     add(
         "--offset",
         type=finite,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="where the mean camera lies in the unit cube, with --scale (default: 0.5 0.5 0.5)",
+        help="position of the mean camera in the unit cube, with --scale (default: 0.5 0.5 0.5)",
     )
     add(
         "--depth-bounds",
@@ -78,7 +88,7 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
         type=finite,
         nargs=6,
         metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
-        help="the part of the unit cube that instant-ngp shows",
+        help="two opposite corners of the part of the unit cube that instant-ngp shows",
     )
     add(
         "--placed-as",

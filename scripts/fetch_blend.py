@@ -1,7 +1,7 @@
 """Download the .blend of a scene YAML. Continue where an earlier download was interrupted.
 
-The file has the suffix .part until it is complete, and has the SHA-256 of the scene YAML or its
-lock file.
+The file has the suffix .part until it is complete and has the SHA-256 that the scene YAML or its
+lock file gives.
 """
 
 import argparse

@@ -2,7 +2,8 @@
 
 scripts/make_lightfield.py has chosen the neighbour of each frame in lightfield.json. The output
 FOLDER/<view>_to_<other>.exr has channels X and Y, in pixels to the right and down. Channel V is 1
-where the other view sees the same point. All are 0 where the other view has no ray to the point.
+where the other view sees the same point. All three are 0 where the other view has no ray to the
+point.
 """
 
 import argparse
@@ -16,17 +17,21 @@ from lightfield.core.progress import Progress
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument(
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
+    )
     parser.add_argument(
         "--views",
         metavar="FIRST:END",
         default=":",
-        help="a slice of lightfield.json's frames (default: all of them)",
+        help="which frames of lightfield.json, as a slice from 0, END excluded (default: all)",
     )
     parser.add_argument(
         "--output", required=True, type=Path, metavar="FOLDER", help="folder to write"
     )
-    parser.add_argument("--record", type=Path, help="JSON of the files' sizes and checksums")
+    parser.add_argument(
+        "--record", type=Path, help="JSON to write: the sizes and checksums of the files"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

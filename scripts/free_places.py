@@ -15,11 +15,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend reads")
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

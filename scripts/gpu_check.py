@@ -1,7 +1,7 @@
-"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours.
+"""Check that a GPU renders the same as the processor, and estimate the hours of full datasets.
 
 A settings file is JSON: {"full": {"LFSphere": {"views": 642, "resolution": [2048, 2048]}}}. `full`
-has the size of each dataset whose hours are estimated. Without the file none are.
+has the size of each dataset whose hours are estimated. Without this file, no hours are estimated.
 """
 
 import argparse
@@ -20,7 +20,12 @@ def main() -> None:
     trial_flags.add_arguments(parser, "lightfield.json")
     trial_flags.add_calibration(parser)
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
-    parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
+    parser.add_argument(
+        "--output",
+        required=True,
+        type=Path,
+        help="path without suffix of the .json and .md to write",
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

@@ -1,4 +1,4 @@
-"""Make a scene of a model file in glTF, USD, OBJ, PLY or STL, and save it as a .blend.
+"""Make a scene from a model file in glTF, USD, OBJ, PLY or STL, and save it as a .blend.
 
 A settings file is JSON: {"model": "chair.glb", "unit": "box", "light": "softboxes"}.
 """
@@ -50,19 +50,33 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
         "--unit",
         choices=("box", "metres"),
         default="box",
-        help="box (default): the largest side becomes 1 m; metres: size and place stay",
+        help="size of the model. box (default): its largest side becomes 1 m. metres: it keeps its "
+        "size and position",
     )
     flags.add_argument(
         "--up",
         choices=("auto", "y", "z"),
         default="auto",
-        help="axis of an OBJ, PLY or STL that points up (default: y for OBJ, z for the others)",
+        help="axis that points up in an OBJ, PLY or STL (default: auto, y for OBJ and z for the "
+        "others)",
     )
-    flags.add_argument("--ground", action="store_true", help="put a floor under it")
-    flags.add_argument("--light", choices=LIGHTS, default=SOFTBOXES, help="light (default: lamps)")
-    flags.add_argument("--frame", type=int, default=1, help="frame to measure at (default: 1)")
+    flags.add_argument("--ground", action="store_true", help="put a floor under the model")
     flags.add_argument(
-        "--allow-missing", action="store_true", help="import although files are missing"
+        "--light",
+        choices=LIGHTS,
+        default=SOFTBOXES,
+        help="light of the scene (default: softboxes, which are three lamps)",
+    )
+    flags.add_argument(
+        "--frame",
+        type=int,
+        default=1,
+        help="frame of the animation at which the size is measured (default: 1)",
+    )
+    flags.add_argument(
+        "--allow-missing",
+        action="store_true",
+        help="import the model even if files that it names are missing",
     )
 
 

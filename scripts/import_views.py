@@ -11,11 +11,25 @@ from lightfield.core.progress import Progress
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True, type=Path, help="folder with views in exr/")
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
-    parser.add_argument("--views", default=":", metavar="FIRST:END", help="a slice of its frames")
-    parser.add_argument("--output", required=True, type=Path, help="folder of the views")
-    parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
+    parser.add_argument(
+        "--dataset",
+        required=True,
+        type=Path,
+        help="folder of the existing dataset, with views in exr/",
+    )
+    parser.add_argument(
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset to write"
+    )
+    parser.add_argument(
+        "--views",
+        default=":",
+        metavar="FIRST:END",
+        help="which frames of lightfield.json, as a slice from 0, END excluded (default: all)",
+    )
+    parser.add_argument("--output", required=True, type=Path, help="folder to write the views to")
+    parser.add_argument(
+        "--record", type=Path, help="JSON to write: the sizes and checksums of the views"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

@@ -1,7 +1,7 @@
 """List what a scene contains, and what its rendering can leave out.
 
-Missing or unreadable files are an error here, before they turn views pink. For a user's .blend it
-prints which settings the dataset takes and which it ignores.
+Missing or unreadable files are reported as an error, before they turn views pink. For a user's
+.blend, it prints which settings the dataset uses and which it ignores.
 """
 
 import argparse
@@ -12,8 +12,8 @@ from lightfield.core.cli import run
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", help="name of a file in configs/scenes/ that uses this .blend")
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--scene", help="name of the file in configs/scenes/ that uses this .blend")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

@@ -1,7 +1,7 @@
 """Write a dataset's lightfield.json: its lens, the poses of its views, and how it is rendered.
 
-The workflow gives the settings file of a dataset, in which the limits of the preset are applied. By
-hand, --scene and --rig name a dataset at full size.
+The workflow gives a settings file, in which the limits of the preset are already applied. By hand,
+give --scene and --rig instead, for a dataset at full size.
 """
 
 import argparse
@@ -42,16 +42,18 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--calibration",
         type=Path,
-        help="JSON of scripts/calibrate.py, for a scene with target_error",
+        help="JSON that scripts/calibrate.py wrote, for a scene with target_error",
     )
     parser.add_argument(
         "--inventory",
         type=Path,
-        help="JSON of scripts/inventory.py, for a user's .blend, and for light_groups",
+        help="JSON that scripts/inventory.py wrote, for a user's .blend and for light_groups",
     )
-    parser.add_argument("--model", type=Path, help="JSON of scripts/import_model.py, for a model")
     parser.add_argument(
-        "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"
+        "--model", type=Path, help="JSON that scripts/import_model.py wrote, for a model"
+    )
+    parser.add_argument(
+        "--places", type=Path, help="JSON that scripts/free_places.py wrote, for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     add_settings_flags(parser)
@@ -66,8 +68,8 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     flags.add_argument("--scene", help="name of a file in configs/scenes/")
     flags.add_argument(
         "--rig",
-        help="name of a rig in the scene YAML; for a frame of a sequence with /f00001 behind it "
-        "(default: the first)",
+        help="name of a rig in the scene YAML (default: the first rig); for a frame of a sequence, "
+        "add its folder, as in rig/f00001",
     )
 
 

@@ -1,4 +1,4 @@
-"""Pack a finished dataset as tar archives with a card: the same bytes whoever packs it.
+"""Pack a finished dataset as tar archives with a card. The same files give the same bytes.
 
 A settings file is JSON: {"gigabytes": 4, "scene": {"licence": "CC0-1.0"}}. `gigabytes` is the
 largest size of a part. `scene` has the keys description, licence and credit of the scene YAML.
@@ -17,8 +17,15 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
-    parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
-    parser.add_argument("--output", type=Path, required=True, help="<scene>_<rig>.tar, and .json")
+    parser.add_argument(
+        "--folder", type=Path, required=True, help="folder of a rig, with one or more datasets"
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        help="archive to write, <scene>_<rig>.tar; a .json is written beside it",
+    )
     add_settings_flags(parser)
     arguments = parser.parse_args()
     if arguments.output.suffix != ".tar":
@@ -48,9 +55,11 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--scene", help="name of a file in configs/scenes/, whose credits are taken")
     flags.add_argument(
-        "--gigabytes", type=above_zero, help="size of a part, at most (default: one)"
+        "--scene", help="name of the file in configs/scenes/ that gives the licence and credit"
+    )
+    flags.add_argument(
+        "--gigabytes", type=above_zero, help="largest size of a part (default: no limit, one part)"
     )
 
 

@@ -1,7 +1,7 @@
 """Tabulate the views, hours and gigabytes of the chosen datasets on this machine.
 
-Reads what scripts/probe.py measured. Hours are of one processor core, or of the GPU if it renders.
-Gigabytes are the size of the rendered views.
+Reads what scripts/probe.py measured. Hours are those of one processor core, or of the GPU if it
+renders. Gigabytes are the size of the rendered views.
 """
 
 import argparse
@@ -20,7 +20,7 @@ def main() -> None:
         nargs=3,
         default=[],
         metavar=("NAME", "FRAMES", "PROBE"),
-        help="scene/rig, the number of its frames, and its probe's JSON",
+        help="a dataset: scene/rig, its number of frames, and the JSON that scripts/probe.py wrote",
     )
     parser.add_argument(
         "--advice",
@@ -28,12 +28,13 @@ def main() -> None:
         nargs=2,
         default=[],
         metavar=("NAME", "JSON"),
-        help="scene/rig, and the JSON that scripts/try_changes.py wrote for its scene",
+        help="advice for a dataset: scene/rig, and the JSON that scripts/try_changes.py wrote for "
+        "its scene",
     )
     parser.add_argument(
-        "--family", action="append", default=[], metavar="NAME", help="a family of scenes"
+        "--family", action="append", default=[], metavar="NAME", help="name of a family of scenes"
     )
-    parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
+    parser.add_argument("--output", required=True, type=Path, help="Markdown file to write")
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

@@ -1,4 +1,4 @@
-"""Estimate the time and size of a dataset's views from a few small ones with all samples."""
+"""Estimate the time and size of a dataset's views from a few small views with all samples."""
 
 import argparse
 from pathlib import Path
@@ -9,16 +9,28 @@ from lightfield.core.files import write_json
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
     parser.add_argument(
-        "--inventory", required=True, type=Path, help="JSON of the scene's contents"
+        "--inventory",
+        required=True,
+        type=Path,
+        help="JSON that scripts/inventory.py wrote for the scene",
     )
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
-    parser.add_argument("--views", type=positive, default=3, help="views to render (default: 3)")
     parser.add_argument(
-        "--size", type=positive, default=48, help="pixels of their longer side (default: 48)"
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
     )
-    parser.add_argument("--device", default="auto", help="device of Cycles (default: auto)")
+    parser.add_argument(
+        "--views", type=positive, default=3, help="number of views to render (default: 3)"
+    )
+    parser.add_argument(
+        "--size",
+        type=positive,
+        default=48,
+        help="longer side of these views, in pixels (default: 48)",
+    )
+    parser.add_argument(
+        "--device", default="auto", help="device on which Cycles renders (default: auto)"
+    )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 

@@ -18,7 +18,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
-    parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
+    parser.add_argument(
+        "--folder", type=Path, required=True, help="folder of a rig, with one or more datasets"
+    )
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
@@ -42,8 +44,10 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--scene", help="name of a file in configs/scenes/ with the key publish")
-    flags.add_argument("--gigabytes", type=above_zero, help="size of a shard, at most (default: 1)")
+    flags.add_argument(
+        "--scene", help="name of the file in configs/scenes/ that has the key publish"
+    )
+    flags.add_argument("--gigabytes", type=above_zero, help="largest size of a shard (default: 1)")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Publish the checksums of a valid dataset. Fail with the first causes if it is not valid.
+"""Publish the checksums of a valid dataset. Fail with the first reasons if it is not valid.
 
 The checksums of an invalid dataset are removed, so that the next run validates it again.
 """
@@ -13,11 +13,15 @@ from lightfield.core.files import read_keys, write_bytes
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--validation", required=True, type=Path, help="validation.json")
     parser.add_argument(
-        "--page", required=True, type=Path, help="the dataset's page, for the message"
+        "--validation", required=True, type=Path, help="validation.json of the dataset"
     )
-    parser.add_argument("--sums", required=True, type=Path, help="checksums that validation wrote")
+    parser.add_argument(
+        "--page", required=True, type=Path, help="page of the dataset, to name in the error message"
+    )
+    parser.add_argument(
+        "--sums", required=True, type=Path, help="checksums that scripts/validate.py wrote"
+    )
     parser.add_argument("--output", required=True, type=Path, help="sha256sums.txt to write")
     arguments = parser.parse_args()
 

@@ -1,6 +1,7 @@
-"""Write the pages of docs/reference/ that follow from the models of settings and the programs.
+"""Write the pages of docs/reference/ that are generated from the settings and the programs.
 
-Run this after a change of a model's key or of a program's flag, and scripts/schema.py, too.
+Run this after changing a key of a settings model or a flag of a program, and also
+scripts/schema.py.
 """
 
 import argparse

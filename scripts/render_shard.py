@@ -8,27 +8,36 @@ from lightfield.core.cli import positive, run
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
+    parser.add_argument(
+        "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
+    )
     parser.add_argument(
         "--inventory",
         type=Path,
-        help="JSON of the scene's contents, to leave out what no pixel depends on",
+        help="JSON that scripts/inventory.py wrote for the scene, which lists what rendering can "
+        "leave out",
     )
     parser.add_argument(
         "--views",
         metavar="FIRST:END",
         default=":",
-        help="a slice of lightfield.json's frames (default: all of them)",
+        help="which frames of lightfield.json, as a slice from 0, END excluded (default: all)",
     )
-    parser.add_argument("--output", required=True, type=Path, help="folder of the views")
-    parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
-    parser.add_argument("--journal", type=Path, help="JSON lines with the time of each view")
+    parser.add_argument("--output", required=True, type=Path, help="folder to write the views to")
+    parser.add_argument(
+        "--record", type=Path, help="JSON to write: the sizes and checksums of the views"
+    )
+    parser.add_argument(
+        "--journal",
+        type=Path,
+        help="file to which a JSON line is added for each view, with its time",
+    )
     parser.add_argument(
         "--device",
         default="auto",
         choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
-        help="device of Cycles (default: auto)",
+        help="device on which Cycles renders (default: auto)",
     )
     parser.add_argument("--threads", type=positive, help="CPU threads (default: all cores)")
     parser.add_argument(
@@ -36,7 +45,7 @@ def main() -> None:
         type=int,
         default=0,
         metavar="S",
-        help="seconds after which a view counts as hung, and the process ends (default: 0, never)",
+        help="seconds after which a view counts as hung and the process ends (default: 0, never)",
     )
     arguments = parser.parse_args()
 

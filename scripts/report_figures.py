@@ -20,9 +20,10 @@ def main() -> None:
         "--panorama",
         nargs="?",
         type=Path,
-        help="EXR seen from the rig's centre (default: the view in its middle is the overview)",
+        help="EXR of a panorama from the rig's centre, for the overview (default: the view in the "
+        "rig's middle)",
     )
-    parser.add_argument("--output", required=True, type=Path, help="folder to write to")
+    parser.add_argument("--output", required=True, type=Path, help="folder to write")
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

@@ -1,10 +1,10 @@
-"""Make a dataset's page: one file that shows what it looks like, how good it is, what it cost.
+"""Make a dataset's page: one file that shows its views, their quality, and their cost.
 
-Everything is in the file, pictures too, so that it can be read without a network, kept and sent.
-Missing parts (measurements, depth, costs) are left out without an error.
-A settings file is JSON with these keys: `rig`, as in the scene YAML; `yaml`, that file's text;
-`command`, what makes the dataset again; `panorama`, whether the overview is one; `measurements`, a
-list of {"file": …}, the .csv, .json, .svg and .png that measurements wrote.
+The file contains everything, also the pictures. So you can read it offline, keep it, and send it.
+Missing parts (measurements, depth, costs) are left out without an error. A settings file is JSON
+with these keys: `rig`, as in the scene YAML; `yaml`, that file's text; `command`, which builds the
+dataset again; `panorama`, whether the overview is a panorama; `measurements`, a list of {"file":
+…}, the .csv, .json, .svg and .png that measurements wrote.
 """
 
 import argparse
@@ -18,11 +18,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument("--name", required=True, help="how it is called: scene/rig")
+    parser.add_argument("--name", required=True, help="name of the dataset, scene/rig")
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
 

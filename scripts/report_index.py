@@ -1,7 +1,7 @@
 """Make the page with links to the pages of all datasets in a results folder.
 
-It is one file with thumbnails. It has every dataset that has a page. It warns about datasets whose
-files cannot be read.
+The page is one file with thumbnails. It lists every dataset that has a page. The program warns
+about datasets whose files cannot be read.
 """
 
 import argparse
@@ -14,7 +14,9 @@ from lightfield.core.errors import UserError
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
-    parser.add_argument("--output", required=True, type=Path, help="HTML file to write in it")
+    parser.add_argument(
+        "--output", required=True, type=Path, help="HTML file to write, in that folder"
+    )
     arguments = parser.parse_args()
     if not arguments.results.is_dir():
         raise UserError(f"{arguments.results}: no such folder")

@@ -17,8 +17,10 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("scenes", nargs="+", type=Path, help="scene YAML files")
-    parser.add_argument("--markdown", type=Path, required=True, help="table to write")
-    parser.add_argument("--csv", type=Path, required=True, help="the same figures, unrounded")
+    parser.add_argument("--markdown", type=Path, required=True, help="Markdown table to write")
+    parser.add_argument(
+        "--csv", type=Path, required=True, help="CSV to write: the same figures, unrounded"
+    )
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.

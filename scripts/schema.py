@@ -1,6 +1,6 @@
 """Write the JSON schemas in configs/schema/, with which editors complete and check YAML files.
 
-They follow from the models in lightfield/dataset/config.py. Run this after a change there.
+They are generated from the models in lightfield/dataset/config.py. Run this after a change there.
 """
 
 import argparse
@@ -14,7 +14,9 @@ FOLDER = Path(__file__).resolve().parents[1] / "configs" / "schema"
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=FOLDER, help="default: %(default)s")
+    parser.add_argument(
+        "--folder", type=Path, default=FOLDER, help="folder to write (default: %(default)s)"
+    )
     folder: Path = parser.parse_args().folder
 
     # Only now, so that --help need not wait for it.

@@ -1,4 +1,4 @@
-"""List which views of a scene's rigs train, validate and test."""
+"""List which views of a scene's rigs are for training, validation and testing."""
 
 import argparse
 from pathlib import Path

@@ -1,7 +1,8 @@
-"""Print the progress of the chosen datasets, from their files only, even during a build.
+"""Print the progress of the chosen datasets, also while a build runs.
 
-The time left assumes that rendering goes on as in the last ten minutes: with as many processes, and
-as many seconds for each view. The journals of the shards have these.
+Only the datasets' files are read. The time left assumes that rendering continues as in the last ten
+minutes: with as many processes, and as many seconds for each view. The journals of the shards
+record both.
 """
 
 import argparse
@@ -14,14 +15,20 @@ from lightfield.core.cli import counted, run
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
-    parser.add_argument("--work", required=True, type=Path, help="folder of the journals")
+    parser.add_argument(
+        "--work",
+        required=True,
+        type=Path,
+        help="folder of intermediate files, with the journals of the shards",
+    )
     parser.add_argument(
         "--dataset",
         action="append",
         nargs=3,
         default=[],
         metavar=("NAME", "VIEWS", "REPROJECTIONS"),
-        help="scene/rig, its number of views, and its reprojections, separated by commas",
+        help="a dataset: scene/rig, its number of views, and the names of its reprojections, "
+        "separated by commas",
     )
     parser.add_argument(
         "--family",
@@ -29,7 +36,7 @@ def main() -> None:
         nargs=2,
         default=[],
         metavar=("NAME", "MEMBERS"),
-        help="folder of a family of scenes, and the number of its members",
+        help="a family: its folder, and its number of members",
     )
     arguments = parser.parse_args()
 

@@ -1,4 +1,4 @@
-"""Write what cameras can see of a scene as meshes, and the boxes and poses of its objects.
+"""Write the surface that cameras can see as meshes, and the boxes and poses of its objects.
 
 A settings file is JSON: {"formats": ["glb", "ply"], "frame": 1}. `frame`, `scene_name` and
 `view_layers` are those of the scene YAML's `scene`. The output folder gets scene.glb, scene.ply and
@@ -15,11 +15,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
     parser.add_argument(
         "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene contains")
+    parser.add_argument(
+        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
+    )
     parser.add_argument(
         "--output", required=True, type=Path, metavar="FOLDER", help="folder to write"
     )

@@ -2,7 +2,7 @@
 
 The truth is other datasets of the scene, with cameras between those of the dataset. Without them it
 is the test views of the dataset's own split. OUTPUT.csv has a row for each variant, view and
-region. There are regions of each kind of light if the truth has all parts of its light as passes.
+region. If the truth has all parts of its light as passes, each kind of light is a region.
 OUTPUT.svg and OUTPUT.png show the quality over the number and the bytes of the views used.
 """
 
@@ -18,8 +18,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
-    add("--settings", type=Path, metavar="JSON", help="settings file with the flags' names as keys")
-    add("--output", type=Path, required=True, metavar="STEM", help="stem of the files to write")
+    add(
+        "--settings",
+        type=Path,
+        metavar="JSON",
+        help="settings file, whose keys are the names of the flags",
+    )
+    add(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="STEM",
+        help="path without suffix of the files to write",
+    )
     add_settings_flags(parser)
     arguments = parser.parse_args()
     check_settings(arguments, add_settings_flags)
@@ -77,9 +88,17 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    flags.add_argument("--truth", nargs="+", default=[], help="folders of the held-out datasets")
     flags.add_argument(
-        "--views", type=positive, default=12, help="compared views of each truth (default: 12)"
+        "--truth",
+        nargs="+",
+        default=[],
+        help="folders of the datasets to compare with (default: the dataset's own test views)",
+    )
+    flags.add_argument(
+        "--views",
+        type=positive,
+        default=12,
+        help="number of views to compare of each of these datasets (default: 12)",
     )
 
 

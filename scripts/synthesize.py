@@ -26,18 +26,26 @@ def main() -> None:
     )
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
-    add("--reprojection", default="", help="of its views, as EXR (default: as rendered)")
+    add(
+        "--reprojection",
+        default="",
+        help="name of an EXR reprojection to use (default: the views as rendered)",
+    )
     add(
         "--poses",
         type=Path,
-        help="a lightfield.json, or a YAML of a rig with its camera (default: synthesise the test "
-        "views of the dataset's split from its other views)",
+        help="cameras to synthesise: a lightfield.json, or a YAML with a rig and its camera "
+        "(default: the test views of the dataset's split, from its other views)",
     )
     help_text = f"views a picture is made of (default: {BEST})"
     add("--best", type=positive, default=BEST, metavar="K", help=help_text)
-    add("--exposure", type=stops, help="of the PNGs, in stops (default: by the first picture)")
-    add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
-    add("--rate", type=positive, default=25, help="pictures a second of the video (default: 25)")
+    add(
+        "--exposure",
+        type=stops,
+        help="exposure of the PNGs, in stops (default: chosen from the first picture)",
+    )
+    add("--video", action="store_true", help="also write the video walk.mp4, with ffmpeg")
+    add("--rate", type=positive, default=25, help="pictures per second of the video (default: 25)")
     add("--output", type=Path, required=True, metavar="FOLDER", help="folder to write")
     arguments = parser.parse_args()
 

@@ -17,7 +17,9 @@ from lightfield.dataset.view_store import ViewStore
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("datasets", nargs="+", type=Path, help="such as results/scene/rig")
+    parser.add_argument(
+        "datasets", nargs="+", type=Path, help="folders to copy, such as results/scene/rig"
+    )
     parser.add_argument("--store", required=True, help="URL or folder of the storage")
     arguments = parser.parse_args()
     store = ViewStore(arguments.store)
@@ -43,7 +45,7 @@ def take(store: ViewStore, dataset: Path) -> None:
         progress.done()
     if lost_files:
         raise UserError(
-            f"{len(lost_files)} files are not in {store.url} as {listing} has them, as "
+            f"{len(lost_files)} files are not in {store.url} as {listing} has them, such as "
             f"{lost_files[0]}; `snakemake verify` with the storage names them, and --mend makes "
             "them again"
         )

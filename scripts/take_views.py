@@ -1,8 +1,8 @@
-"""Copy files that lists name from the view store: the views of shards, and the files of exports.
+"""Copy files from the view store: the views of shards, and the files of exports.
 
-The lists are the records of shards, and the lists of exports. Each file goes into the dataset of
-its list. Files that exist already with the same bytes stay. Arguments that are not lists are
-ignored.
+The arguments are lists that name the files: the records of shards, and the lists of exports. Each
+file goes into the dataset of its list. Files that exist already with the same bytes stay. Arguments
+that are not lists are ignored.
 """
 
 import argparse
@@ -20,14 +20,19 @@ from lightfield.dataset.view_store import VARIABLE, ViewStore
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("lists", nargs="+", type=Path, help="files that list others")
+    parser.add_argument(
+        "lists", nargs="+", type=Path, help="records of shards, and lists of exports"
+    )
     parser.add_argument("--store", help=f"URL or folder of the store (default: ${VARIABLE})")
-    parser.add_argument("--results", required=True, type=Path, help="folder of all datasets")
-    parser.add_argument("--work", required=True, type=Path, help="folder of their records")
+    parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
+    parser.add_argument(
+        "--work", required=True, type=Path, help="folder of intermediate files, with the records"
+    )
     parser.add_argument(
         "--mend",
         action="store_true",
-        help="remove lists of lost files from the storage, so that the next run makes them again",
+        help="remove lists of lost files from the storage, so that the next run makes these files "
+        "again",
     )
     arguments = parser.parse_args()
     store = ViewStore(arguments.store) if arguments.store else ViewStore.configured()
@@ -52,7 +57,7 @@ def main() -> None:
             for path in set(lost_files.values()):
                 store.remove(_stored(path, arguments.results, arguments.work))
         raise UserError(
-            f"{len(lost_files)} files are not in the view store {store.url}, as "
+            f"{len(lost_files)} files are not in the view store {store.url}, such as "
             f"{min(lost_files)}; {remedy}"
         )
 

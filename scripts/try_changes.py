@@ -13,19 +13,23 @@ def main() -> None:
     trial_flags.add_arguments(parser, "lightfield.json")
     trial_flags.add_calibration(parser)
     parser.add_argument(
-        "--probes", type=positive, default=1, help="windows of each stratum (default: %(default)s)"
+        "--probes",
+        type=positive,
+        default=1,
+        help="windows of each stratum of the views (default: %(default)s)",
     )
     parser.add_argument(
         "--reference",
         type=positive,
         default=512,
-        help="samples of a reference (default: %(default)s)",
+        help="samples of the reference renders (default: %(default)s)",
     )
     parser.add_argument(
         "--cores",
         type=positive,
         default=1,
-        help="cores on which to try numbers of threads for each process (default: 1)",
+        help="cores of the machine, for which different numbers of threads per process are tried "
+        "(default: 1)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()

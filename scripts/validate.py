@@ -2,10 +2,10 @@
 
 Prints a line for each failure. The exit status is then 1.
 
-The workflow gives --output and --sums. Then the exit status is 0 for an invalid dataset, too.
-Writes validation.json, and the checksums of all files that the dataset publishes.
-scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an earlier
-sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
+With --output and --sums, which the workflow gives, the exit status is 0 even for an invalid
+dataset. The program then writes validation.json, and the checksums of all files that the dataset
+publishes. scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an
+earlier sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
 
 A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "records": []}, for the
 flags --reprojection, --exports and --records.
@@ -31,13 +31,17 @@ def main() -> None:
     add("dataset", type=Path, help="folder of the dataset")
     add("--settings", type=Path, metavar="JSON", help="settings file")
     add("--output", type=Path, help="validation.json to write, with --sums")
-    add("--sums", type=Path, help="checksums to write, with --output")
-    add("--clearance", type=Path, help="JSON of what surrounds each camera")
-    add("--inventory", type=Path, help="JSON of what the scene contains")
+    add("--sums", type=Path, help="list of checksums to write, with --output")
+    add("--clearance", type=Path, help="JSON that scripts/check_cameras.py wrote for the dataset")
+    add("--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene")
     add("--splits", type=Path, help="splits.json of the scene")
-    add("--ledger", type=Path, help="the workflow's ledger of what its jobs made")
-    add("--removed", type=Path, help="folder to which files go that are not the dataset's")
-    add("--processes", type=positive, default=1, help="worker processes (default: 1)")
+    add("--ledger", type=Path, help="the workflow's ledger, which lists what its jobs made")
+    add(
+        "--removed",
+        type=Path,
+        help="folder to which files that do not belong to the dataset are moved",
+    )
+    add("--processes", type=positive, default=1, help="number of worker processes (default: 1)")
     add_settings_flags(parser)
     arguments = parser.parse_args()
     if (arguments.output is None) != (arguments.sums is None):
@@ -104,11 +108,13 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
     add = flags.add_argument
-    records = "JSON of the sizes and checksums with which images were written"
+    records = "records with the sizes and checksums with which images were written"
     add("--records", nargs="*", default=[], help=records)
-    folders = "folders of the dataset that hold a reprojection (default without --output: all)"
+    folders = "reprojections, by their folders in the dataset (default without --output: all)"
     add("--reprojection", action="extend", nargs="+", default=[], help=folders)
-    lists = "export.json or transforms.json of each export that it shall have (default: any)"
+    lists = (
+        "export.json or transforms.json of each export that the dataset must have (default: any)"
+    )
     add("--exports", nargs="*", help=lists)
 
 

@@ -26,7 +26,11 @@ def main() -> None:
     add("--settings", type=Path, metavar="JSON", help="settings file")
     add("--output", type=Path, help="validation.json to write, with --sums")
     add("--sums", type=Path, help="sha256sums.txt to write, with --output")
-    add("--removed", type=Path, help="folder to which files go that are not the sequence's")
+    add(
+        "--removed",
+        type=Path,
+        help="folder to which files that do not belong to the sequence are moved",
+    )
     add_settings_flags(parser)
     arguments = parser.parse_args()
     if (arguments.output is None) != (arguments.sums is None):
@@ -72,7 +76,7 @@ def main() -> None:
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     """Add the flags that stand for a settings file."""
     flags = parser.add_argument_group("Instead of --settings")
-    lists = "export.json of each export that it shall have (default: any)"
+    lists = "export.json of each export that the sequence must have (default: any)"
     flags.add_argument("--exports", nargs="*", help=lists)
 
 

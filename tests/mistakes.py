@@ -253,7 +253,8 @@ REFUSED = [
         (
             f"exports.{name}",
             {"sources": ["perspective"]},
-            f"exports.{name}.sources: perspective is of the rig LFSphere, which has no",
+            f"exports.{name}.sources: perspective is of the rig LFSphere, which has fewer than two "
+            "frames",
         )
         for name in ("dnerf", "colmap_frames", "multipleview")
     ),
@@ -482,7 +483,7 @@ EXPLAINED = [
     (
         "family",
         {"seeds": "0-9", "values": {"scene.parameters.seed": {"integers": [0, 1]}}},
-        "family.values: scene.parameters.seed is the members' own",
+        "family.values: scene.parameters.seed cannot be drawn, because each member has its own",
     ),
     (
         "family",
@@ -532,18 +533,18 @@ EXPLAINED = [
     ("render.light_groups", {"a b": ["x"]}, "render.light_groups: 'a b' is not a name of at most"),
     ("render.light_groups", {}, "render.light_groups: must have one group or more"),
     ("render.light_groups", "all", 'render.light_groups: is "all"; must be each or a list'),
-    ("relight", {"night": {"Lamp": 0}}, "relight.night: goes with render.light_groups"),
+    ("relight", {"night": {"Lamp": 0}}, "relight.night: needs render.light_groups"),
     ("relight", {"night": {"Lamp": -1}}, "relight.night.Lamp: is -1; must be a number at least 0"),
     ("relight", {"perspective": {}}, "relight.perspective: is the name of a reprojection, too"),
     (
         "reprojections.perspective.relight",
         "night",
-        "reprojections.perspective.relight: goes with render.light_groups",
+        "reprojections.perspective.relight: needs render.light_groups",
     ),
     (
         "reprojections.perspective.passes",
         ["light_groups"],
-        "reprojections.perspective.passes: light_groups go with render.light_groups",
+        "reprojections.perspective.passes: light_groups needs render.light_groups",
     ),
     ("exports.nerfstudio", None, "exports.nerfstudio: is null; must have a value, or be left out"),
     ("rigs.LFSphere", None, "rigs.LFSphere: is null; must be a mapping of keys to values"),
@@ -552,7 +553,7 @@ EXPLAINED = [
     (
         "scene",
         {"blend": "a.blend", "parameters": {"seed": 1}},
-        "scene.parameters: goes with builder, not with blend",
+        "scene.parameters: is only for builder, not for blend",
     ),
     (
         "publish",
@@ -591,7 +592,7 @@ EXPLAINED = [
     (
         "scene",
         {"model": "a.glb", "up": "z"},
-        "scene.up: goes with OBJ, PLY and STL; glTF and USD say it themselves",
+        "scene.up: is only for OBJ, PLY and STL; glTF and USD files define it themselves",
     ),
     (
         "scene",
@@ -605,21 +606,21 @@ EXPLAINED = [
     (
         "scene",
         {"model": "a.obj", "frame": "file"},
-        "scene.frame: file goes with blend, not with model",
+        "scene.frame: file is only for blend, not for model",
     ),
-    ("scene.light", "city", "scene.light: goes with model"),
-    ("scene.url", "https://example.org/a.blend", "scene.url: goes with blend, not with builder"),
-    ("scene.frame", "file", "scene.frame: file goes with blend, not with builder"),
-    ("render.samples", "file", "render.samples: file goes with scene.blend"),
+    ("scene.light", "city", "scene.light: is only for model"),
+    ("scene.url", "https://example.org/a.blend", "scene.url: is only for blend, not for builder"),
+    ("scene.frame", "file", "scene.frame: file is only for blend, not for builder"),
+    ("render.samples", "file", "render.samples: file is only for scene.blend"),
     (
         "rigs.LFSphere",
         {"type": "blend_camera", "camera": {"lens": "file", "resolution": [8, 8]}},
-        "rigs.LFSphere.type: blend_camera goes with scene.blend",
+        "rigs.LFSphere.type: blend_camera needs scene.blend",
     ),
     (
         "rigs.LFSphere.camera",
         {"lens": "file", "resolution": [8, 8]},
-        "rigs.LFSphere.camera.lens: file goes with a rig of type blend_camera",
+        "rigs.LFSphere.camera.lens: file is only for a rig of type blend_camera",
     ),
     (
         "rigs.LFSphere.camera",
@@ -728,7 +729,7 @@ EXPLAINED = [
     (
         "reprojections.perspective.primaries",
         "rec709",
-        "reprojections.perspective.primaries: goes with format exr; a PNG is sRGB",
+        "reprojections.perspective.primaries: is only for format exr; a PNG is sRGB",
     ),
     (
         "sensor",
@@ -739,7 +740,7 @@ EXPLAINED = [
     (
         "sensor",
         {"sources": ["perspective"], "rigs": ["LFCuboid"]},
-        "sensor.rigs: LFCuboid is not of the reprojection perspective",
+        "sensor.rigs: LFCuboid is not a rig of the reprojection perspective",
     ),
     ("sensor", {"noise": {"a": 0}}, "sensor.noise: must have a, b, or both above 0"),
     (
@@ -924,7 +925,7 @@ PROGRAMS = [
         ("import_model.json", {"model": "a.obj", **content}, said)
         for content, said in (
             ({"model": "a.txt"}, 'model: is "a.txt"; must be a path that ends in .glb'),
-            ({"model": "a.glb", "up": "y"}, "up: goes with OBJ, PLY and STL"),
+            ({"model": "a.glb", "up": "y"}, "up: is only for OBJ, PLY and STL"),
             ({"light": "day"}, 'light: is "day"; must be one of softboxes'),
             ({"frame": "file"}, 'frame: is "file"; must be a whole number'),
             ({"units": "box"}, "units: unknown key; did you mean unit?"),
@@ -954,7 +955,7 @@ CHOICES = [
     ),
     ({"device": "quantum"}, 'device: is "quantum"; must be auto, cpu, optix,'),
     ({"views_per_shard": 0}, "views_per_shard: is 0; must be auto or a whole number at least 1"),
-    ({"results": "."}, "results: is '.'; must be a folder of its own"),
+    ({"results": "."}, "results: is '.'; must be a folder that is used for nothing else"),
     ({"most_shards": 100}, "most_shards: ", "views_per_shard"),
     ({"shard_minutes": 100}, "shard_minutes: ", "views_per_shard"),
     ({"energy": {"watts": -5}}, "energy.watts: is -5; must be a number at least 0"),

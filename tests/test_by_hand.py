@@ -421,7 +421,7 @@ def test_a_lens_from_a_missing_blend_is_refused(refused, lightfield, tmp_path):
     write_text(tmp_path / "flat.json", f'{{"camera": {camera}, "formats": ["exr"]}}')
     arguments = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
     said = refused("reproject.py", *arguments, "--settings", tmp_path / "flat.json")
-    assert said == f"{tmp_path}/flat.json: camera.lens: file goes with a rig of type blend_camera"
+    assert said == f"{tmp_path}/flat.json: camera.lens: file is only for a rig of type blend_camera"
     rig = '{"type": "plane", "cameras": [1, 1], "size": 1, "camera": ' + camera + "}"
     write_text(tmp_path / "rig.yaml", rig)
     arguments = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]

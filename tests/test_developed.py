@@ -192,9 +192,9 @@ def test_a_bracket_is_a_folder_for_each_exposure():
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [
-        ({"rotation": [10, 0, 0]}, "rotation: goes with camera; without one nothing is resampled"),
-        ({"filter": "bilinear"}, "filter: goes with camera"),
-        ({"format": "exr", "bits": 16}, "bits: goes with format png"),
+        ({"rotation": [10, 0, 0]}, "rotation: needs camera; without one, nothing is resampled"),
+        ({"filter": "bilinear"}, "filter: needs camera"),
+        ({"format": "exr", "bits": 16}, "bits: is only for format png"),
         ({"exposure": [1, 1.0]}, "must not name png_ev1 twice"),
     ],
 )

@@ -283,7 +283,7 @@ def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFi
     images.write_png(dataset.folder / "view_0000f.png", np.ones((48, 64, 3), np.uint8))
     assert len(dataset.export()["frames"]) == 6
     first = dataset.folder / "view_0001f.png"
-    expected = f"warning: 5 images are not there, the first is {first}\n"
+    expected = f"warning: 5 images are missing, the first is {first}\n"
     assert capsys.readouterr().err.endswith(expected)
 
 
@@ -503,7 +503,7 @@ def test_the_yaml_has_every_option_of_the_program(dataset: Dataset) -> None:
         dataset.export("--settings", file, "--scale", 1)
     with pytest.raises(ValidationError, match="bounds: does not go with scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
-    with pytest.raises(ValidationError, match="offset: goes with scale"):
+    with pytest.raises(ValidationError, match="offset: needs scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
 
 
@@ -573,7 +573,7 @@ def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) ->
         # A fisheye along both axes of the image, but not between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
         (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: does not go with scale"),
-        (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
+        (FISHEYE, ["--offset", 0, 0, 0], "--offset: needs --scale"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
         (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),

@@ -992,7 +992,7 @@ def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
             np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
     alone = sum(len(track) == 1 for track in model.tracks.values())
     printed = capsys.readouterr().out
-    assert f"{len(model.positions)} points; one view alone sees {alone} of them" in printed
+    assert f"{len(model.positions)} points; only one view sees {alone} of them" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
@@ -1081,7 +1081,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("lichtfeld", "views", VIEWS, {}, "sees 180 degrees, where LichtFeld's fisheye ends"),
         ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
         ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
-        ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not of EXR; give it format: exr"),
+        ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not in EXR; give it format: exr"),
         ("lichtfeld", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
         ("lichtfeld", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
@@ -1244,5 +1244,5 @@ def test_a_point_that_several_views_see_alike_is_kept_once():
 
 def test_views_of_another_lens_do_not_test(dataset):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
-    with pytest.raises(UserError, match="camera: is another than that of"):
+    with pytest.raises(UserError, match="camera: is not the same as that of"):
         _ = source.lightfield

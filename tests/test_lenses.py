@@ -826,7 +826,7 @@ def test_defaults_of_a_scene_yamls_camera() -> None:
     assert from_camera(OF_OPENCV | size) == KannalaBrandt(
         **LANDSCAPE, focal_length=9, coefficients=(0, 0, 0, 0), fov=2 * math.pi
     )
-    with pytest.raises(UserError, match="goes with a rig of type blend_camera"):
+    with pytest.raises(UserError, match="is only for a rig of type blend_camera"):
         from_camera({"lens": "file", **size})
 
 

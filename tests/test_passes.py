@@ -465,7 +465,7 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
 @pytest.mark.parametrize(
     ("lens", "more", "problem"),
     [
-        ("fisheye", {}, "rigs.one.stereo.omnidirectional: goes with the lens equirectangular"),
+        ("fisheye", {}, "rigs.one.stereo.omnidirectional: needs the lens equirectangular"),
         ("panorama", {"flow": {"pairs": "neighbours"}}, "flow: does not go with rigs.one.stereo"),
         (
             "panorama",
@@ -480,7 +480,7 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
         (
             "panorama",
             {"exports": {"poses_csv": {"sources": ["views"]}}},
-            "views is of the rig one, without a centre",
+            "views is of the rig one, whose views have no centre",
         ),
     ],
 )

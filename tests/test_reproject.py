@@ -229,7 +229,9 @@ def test_an_unreadable_file_is_named_and_the_others_are_done(dataset, run, capsy
     content = (dataset / "exr" / "view_0001f.exr").read_bytes()
     (dataset / "exr" / "view_0001f.exr").write_bytes(content[: len(content) // 2])
     record = dataset / "record.json"
-    with pytest.raises(UserError, match=r"2 of 4 views could not be reprojected, as .*broken\.exr"):
+    with pytest.raises(
+        UserError, match=r"2 of 4 views could not be reprojected, such as .*broken\.exr"
+    ):
         run(*PERSPECTIVE, "--png", "--record", str(record))
     message = capsys.readouterr().err
     assert "broken.exr" in message and "view_0001f.exr" in message

@@ -83,7 +83,7 @@ def test_rotations_turn_evenly_from_key_to_key():
     ("keys", "expected"),
     [
         ([CORNER[0]], "keys: is .* at least 2"),
-        ([CORNER[0], CORNER[0]], "keys: two in a row are at one place"),
+        ([CORNER[0], CORNER[0]], "keys: two consecutive keys have the same position"),
         ([CORNER[0], {"position": [1, 1, 1], "rotation": [0, 0, 0]}], "keys: must all have a rot"),
         ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [0, 0, 0, 0]}], "have a length"),
         ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [1e200, 0, 0, 0]}], "have a len"),
@@ -97,7 +97,7 @@ def test_rotations_turn_evenly_from_key_to_key():
 def test_an_invalid_path_is_refused(keys, expected):
     with pytest.raises(UserError, match=expected):
         path(keys, 3).poses()
-    with pytest.raises(UserError, match="keys: two in a row are at one place"):
+    with pytest.raises(UserError, match="keys: two consecutive keys have the same position"):
         path(CORNER, 3, size=0)
 
 
@@ -161,7 +161,7 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
     result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
     assert result.returncode == 1
-    assert "3 of 3 cameras find no place with 0.5 m around it in 100 tries" in result.stderr
+    assert "3 of 3 cameras found no place with 0.5 m of free space in 100 tries" in result.stderr
     assert not (tmp_path / "none.json").exists()
 
 

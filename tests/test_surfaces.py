@@ -130,7 +130,7 @@ def test_a_spacing_that_is_too_fine_for_the_surface_is_refused(surface):
 @pytest.mark.parametrize(
     ("name", "content", "problem"),
     [
-        ("a.txt", "x", "a.txt: is no surface; must end in .ply"),
+        ("a.txt", "x", "a.txt: is not a surface file; its name must end in .ply"),
         ("a.ply", "no ply", "a.ply: is not a valid surface"),
         ("a.obj", "", "a.obj: "),
         ("a.glb", "glTF", "a.glb: is not a valid surface"),
@@ -158,7 +158,7 @@ def test_the_program_writes_the_figures(tmp_path, run_program):
     expected |= {"precision": 1.0, "recall": 1.0, "f_score": 1.0}
     assert json.loads(output.read_text()) == expected
     for wrong, problem in (
-        (["--protocol", "dtu", "--tau", "1"], "--tau: goes with --protocol tanks_and_temples"),
+        (["--protocol", "dtu", "--tau", "1"], "--tau: is only for --protocol tanks_and_temples"),
         (["--protocol", "tanks_and_temples"], "--tau: is missing"),
     ):
         result = run_program("evaluate_surface.py", *surfaces_given, *wrong, check=False)

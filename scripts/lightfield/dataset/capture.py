@@ -102,7 +102,9 @@ class Capture:
         """The identity of the scene: see `scene_fingerprint` and `model_fingerprint`."""
         if self.source.model:
             if self.model_fingerprint is None:
-                raise UserError(f"{self.source.model}: is not imported; import_model.py does it")
+                raise UserError(
+                    f"{self.source.model}: is not imported; run scripts/import_model.py first"
+                )
             return self.model_fingerprint
         return scene_fingerprint(self.source, self.external_files)
 
@@ -168,20 +170,23 @@ class LightfieldSettings(Settings):
         description="The block `render` of the scene YAML, within the limits of the preset."
     )
     rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)] = Field(
-        description="As in the scene YAML."
+        description="The rig's block in the scene YAML."
     )
-    flow: bool = Field(False, description="Whether each view has a neighbour for its flow.")
+    flow: bool = Field(
+        False, description="Whether to choose a neighbour of each view, for its optical flow."
+    )
     panorama_width: AtLeastOne | None = Field(
         None,
-        description="Width of a panorama from the rig's centre, which replaces the rig.",
+        description="Width of a panorama from the rig's centre. With this key, the panorama is the "
+        "only view.",
         json_schema_extra={"unit": "pixels"},
     )
     fingerprint: str | None = Field(
-        None, description="Changes with the builder's text, so that the scene is captured again."
+        None, description="Hash of the builder's code. If it changes, the scene is captured again."
     )
     poses_sha256: str | None = Field(
         None,
-        description="Changes with the rig's file of poses, so that it is read again.",
+        description="SHA-256 of the rig's file of poses. If it changes, the file is read again.",
     )
 
     @classmethod

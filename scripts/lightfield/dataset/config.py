@@ -199,20 +199,28 @@ DenoisePrefilter = Literal["accurate", "fast", "none"]
 
 
 class Preset(Settings):
-    """Upper limits of a scene YAML's values. A key that is left out limits nothing."""
+    """A preset limits the values of scene YAMLs. A key that is left out limits nothing."""
 
     resolution: AtLeastOne | None = Field(
-        None, description="Length of an image's longer side.", json_schema_extra={"unit": "pixels"}
+        None,
+        description="Largest length of an image's longer side. Larger images are made smaller.",
+        json_schema_extra={"unit": "pixels"},
     )
     samples: AtLeastOne | None = Field(
-        None, description="Paths for each pixel.", json_schema_extra={"unit": "paths"}
+        None,
+        description="Largest number of paths for each pixel.",
+        json_schema_extra={"unit": "paths"},
     )
     views: AtLeastOne | None = Field(
-        None, description="Views of a rig.", json_schema_extra={"unit": "views"}
+        None,
+        description="Largest number of views of a rig. Rigs with more are thinned.",
+        json_schema_extra={"unit": "views"},
     )
-    denoise: bool | None = Field(None, description="Denoise even if the scene YAML does not.")
+    denoise: bool | None = Field(
+        None, description="Whether to denoise the views even if the scene YAML does not."
+    )
     denoise_prefilter: DenoisePrefilter | None = Field(
-        None, description="Prefilter of denoised views, unless the scene YAML names one."
+        None, description="Prefilter of the denoiser, unless the scene YAML names one."
     )
 
 
@@ -223,22 +231,23 @@ class Energy(Settings):
         65,
         ge=0,
         le=1e6,
-        description="Power of a machine whose cores all work.",
+        description="Power of the machine when all its cores work.",
         json_schema_extra={"unit": "W"},
     )
     cores: Auto | AtLeastOne = Field(
         "auto",
-        description="Cores of that machine. auto: those of the machine that computes the costs.",
+        description="Number of cores of that machine. auto: as many as the machine that computes "
+        "the costs has.",
         json_schema_extra={"unit": "cores"},
     )
     price_per_kwh: float = Field(
         0.32,
         ge=0,
         le=1e6,
-        description="Price of electricity.",
+        description="Price of electricity, in the currency below.",
         json_schema_extra={"unit": "currency/kWh"},
     )
-    currency: str = Field("EUR", max_length=20, description="Currency of the price.")
+    currency: str = Field("EUR", max_length=20, description="Currency of that price.")
 
 
 _SHARDS_ARE_AUTOMATIC = (
@@ -247,7 +256,7 @@ _SHARDS_ARE_AUTOMATIC = (
 
 
 class Configuration(Settings):
-    """Which scenes to build, how well, and where."""
+    """Which scenes to build, at which quality, and into which folders."""
 
     removed_keys: ClassVar[Mapping[str, str]] = {
         "most_shards": _SHARDS_ARE_AUTOMATIC,
@@ -255,12 +264,13 @@ class Configuration(Settings):
     }
 
     scenes: Names = Field(
-        description="Names of files in configs/scenes/, without .yaml. One name needs no list."
+        description="Scenes to build: names of files in configs/scenes/, without .yaml. A single "
+        "name needs no list."
     )
     rigs: Literal["all"] | Names = Field(
-        "all", description="all, or the names of the rigs to build."
+        "all", description="Rigs to build, by their names in the scene YAMLs. all: every rig."
     )
-    preset: str = Field(description="One of the presets below.")
+    preset: str = Field(description="Name of the preset to apply: one of those in presets.")
     presets: dict[
         Annotated[
             str,
@@ -272,33 +282,41 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ] = Field(min_length=1, description="Upper limits of a scene YAML's values, by name.")
-    results: Folder = Field("results", description="Folder of the datasets.")
+    ] = Field(
+        min_length=1,
+        description="Presets by their names. Each sets upper limits for values of the scene YAMLs.",
+    )
+    results: Folder = Field("results", description="Folder in which the datasets are built.")
     work: Folder = Field(
         "work",
-        description="Folder of intermediate files: scenes, lens maps, records, timings.",
+        description="Folder for intermediate files: scenes, lens maps, records and timings.",
     )
     device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = Field(
-        "auto", description="The device that Cycles renders on."
+        "auto",
+        description="Device on which Cycles renders. auto: a GPU if there is one, else the CPU.",
     )
     views_per_shard: Auto | AtLeastOne = Field(
         "auto",
-        description="How many views one render job makes. With auto, the number follows from the "
-        "expected time of a view, and on a cluster from the jobs that run at once (--jobs). A "
-        "dataset that was begun with auto keeps its jobs.",
+        description="How many views one render job makes. auto: chosen from the expected time of a "
+        "view, and on a cluster also from the number of simultaneous jobs (--jobs). A dataset that "
+        "was begun with auto keeps its jobs.",
         json_schema_extra={"unit": "views"},
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
-        description="Accept each .blend as it is now. This rewrites its lock file beside the scene "
-        "YAML.",
+        description="Accept each .blend file as it is now, even if its SHA-256 has changed. This "
+        "rewrites the lock file beside the scene YAML.",
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,
-        description="Largest size of a package's parts. Without it, a package is one file.",
+        description="Largest size of a package's parts. Without this key, a package is one file.",
         json_schema_extra={"unit": "GB"},
     )
-    energy: Energy = Field(Energy(), description="From what energy and costs are computed.")
+    energy: Energy = Field(
+        Energy(),
+        description="Power and price of electricity, from which the energy and costs of a dataset "
+        "are computed.",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -309,7 +327,8 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(
-                    f"scenes: {name} is not a name for a scene; no dots, and not {used_names}"
+                    f"scenes: {name} cannot be the name of a scene; must have no dots, and not be "
+                    f"one of {used_names}"
                 )
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
@@ -330,7 +349,7 @@ def _check_folder(key: str, folder: str) -> None:
     reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
     is_inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
     if path in parents or path.resolve() in parents or is_inside:
-        raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
+        raise ValueError(f"{key}: is {folder!r}; must be a folder that is used for nothing else")
     if path.exists() and not path.is_dir():
         raise ValueError(f"{key}: is {folder!r}, which is a file; must be a folder")
 
@@ -339,15 +358,21 @@ class Parameters(Settings):
     """The parameters of a builder."""
 
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="Another seed places and shapes things anew."
+        0,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of everything random. Another seed gives other positions and shapes of "
+        "objects.",
     )
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
-        1.0, description="Level of detail of plants and meshes. 1 is full."
+        1.0,
+        description="Level of detail of plants and meshes. 1 is full detail, and less is faster.",
     )
     place: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = Field(
         None,
-        description="Another place has another layout, other materials and another light. "
-        "None is the builder's own layout. The builder `room` has no other.",
+        description="Number of a variant of the scene, with another layout, materials and light. "
+        "Without this key, the scene has the builder's own layout. The builder `room` has no "
+        "other.",
     )
 
 
@@ -359,22 +384,22 @@ class ModelOptions(Settings):
 
     unit: Literal["box", "metres"] = Field(
         "box",
-        description="Of a model. box: its largest side becomes 1 m, and its middle the origin. "
-        "metres: it keeps its size and place.",
+        description="Size of a model. box: its largest side becomes 1 m, and its middle moves to "
+        "the origin. metres: it keeps its size and position.",
     )
     up: Literal["auto", "y", "z"] = Field(
         "auto",
-        description="The axis of an OBJ, PLY or STL model that points up. auto: y in OBJ, z in PLY "
-        "and STL. glTF and USD say it themselves.",
+        description="Axis that points up in an OBJ, PLY or STL model. auto: y for OBJ, z for PLY "
+        "and STL. glTF and USD files define it themselves.",
     )
     ground: bool = Field(
         False,
-        description="Put a floor under a model, which catches its shadow.",
+        description="Put a floor under the model, which receives its shadow.",
     )
     light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
         SOFTBOXES,
-        description="Of a model. softboxes: three lamps and a grey world. Any other name: that "
-        "environment of Blender.",
+        description="Light of a model. softboxes: three lamps and a grey world. Any other name: "
+        "the environment of this name that comes with Blender.",
     )
 
     @field_validator("light")
@@ -388,7 +413,9 @@ class ModelOptions(Settings):
 def check_model(model: str, up: str) -> None:
     """Raise a ValueError if ``up`` is given for a model that says itself which axis points up."""
     if up != "auto" and Path(model).suffix.lower() not in UP:
-        raise ValueError("up: goes with OBJ, PLY and STL; glTF and USD say it themselves")
+        raise ValueError(
+            "up: is only for OBJ, PLY and STL; glTF and USD files define it themselves"
+        )
 
 
 ModelPath = Annotated[
@@ -418,62 +445,63 @@ class Origin(Settings):
         pattern=pattern(
             "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
         ),
-        description="The builder: the name of a folder in scripts/scenes/.",
+        description="Name of the builder, which is a folder in scripts/scenes/.",
     )
-    parameters: Parameters = Field(Parameters(), description="The builder's parameters.")
+    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
     blend: str | None = Field(
         None,
         pattern=pattern(
             rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
         ),
-        description="The path of your own .blend file, from the folder that Snakemake runs in.",
+        description="Path of your own .blend file, relative to the folder in which Snakemake runs.",
     )
     model: ModelPath | None = Field(
         None,
-        description="The path of a model file in glTF, USD, OBJ, PLY or STL, from the folder that "
-        "Snakemake runs in.",
+        description="Path of a model file (glTF, USD, OBJ, PLY or STL), relative to the folder in "
+        "which Snakemake runs.",
     )
     dataset: str | None = Field(
         None,
-        description="Instead of a scene to render: the folder of a light field in SILVR's layout "
-        "(lightfield.json and exr/), or one with several such folders.",
+        description="Folder of existing views, which replace rendering: a light field in SILVR's "
+        "layout (lightfield.json and exr/), or a folder of several.",
     )
     scene_name: str | None = Field(
         None,
-        description="The .blend's scene to render. Without it, the one that was open when saved.",
+        description="Name of the scene in the .blend to render. Without this key, it is the scene "
+        "that was active when the .blend was saved.",
     )
     view_layers: Literal["all"] | list[str] | None = Field(
         None,
         min_length=1,
-        description="That scene's view layers to render together in one picture. all: those in "
-        "use. Without it, the first in use.",
+        description="View layers of that scene, which are rendered together into one picture. all: "
+        "every layer that is enabled for rendering. Without this key, only the first of these.",
     )
     frame: Frame | Literal["file"] = Field(
         1,
-        description="The frame of the animation to render. file: the frame at which the .blend was "
-        "saved. A model is measured at this frame.",
+        description="Frame of the animation to render. file: the frame at which the .blend was "
+        "saved. The size of a model is measured at this frame.",
     )
     allow_missing: bool | None = Field(
         None,
-        description="Render although textures, fonts, libraries, volumes or caches are missing or "
-        "cannot be read. Such a texture is magenta. The same for the files of a model.",
+        description="Render even if files of the .blend or model are missing or cannot be read: "
+        "textures, fonts, libraries, volumes or caches. Missing textures are magenta.",
     )
     sha256: str | None = Field(
         None,
         pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
-        description="The .blend file's SHA-256, as sha256sum prints it. "
-        "Without it, the one recorded at first use.",
+        description="SHA-256 that the .blend file must have, as sha256sum prints it. Without this "
+        "key, it is the one recorded at first use.",
     )
     url: Address | None = Field(
-        None, description="The address to download the .blend file from if it is missing."
+        None, description="Address from which the .blend file is downloaded if it is missing."
     )
     page: Address | None = Field(
-        None, description="The page on which a person finds the .blend file."
+        None, description="Web page from which you can download the .blend file by hand."
     )
 
 
 class SceneSource(ModelOptions, Origin):
-    """Where a scene is from, and for a model, how it becomes a scene."""
+    """Where a scene comes from. A model has more keys, in the next table."""
 
     @model_validator(mode="after")
     def _one_of_four(self) -> Self:
@@ -485,9 +513,9 @@ class SceneSource(ModelOptions, Origin):
                 raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
             for name in BLEND_KEYS:
                 if getattr(self, name) is not None:
-                    raise ValueError(f"{name}: goes with blend, not with builder")
+                    raise ValueError(f"{name}: is only for blend, not for builder")
             if self.frame == FILE:
-                raise ValueError("frame: file goes with blend, not with builder")
+                raise ValueError("frame: file is only for blend, not for builder")
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: does not go with dataset")
@@ -496,13 +524,13 @@ class SceneSource(ModelOptions, Origin):
                 if name in self.model_fields_set and name != "allow_missing":
                     raise ValueError(f"{name}: does not go with model")
             if self.frame == FILE:
-                raise ValueError("frame: file goes with blend, not with model")
+                raise ValueError("frame: file is only for blend, not for model")
             check_model(self.model, self.up)
         elif self.blend is not None and "parameters" in self.model_fields_set:
-            raise ValueError("parameters: goes with builder, not with blend")
+            raise ValueError("parameters: is only for builder, not for blend")
         for name in MODEL_KEYS:
             if self.model is None and name in self.model_fields_set:
-                raise ValueError(f"{name}: goes with model")
+                raise ValueError(f"{name}: is only for model")
         return self
 
 
@@ -511,36 +539,39 @@ CHOSEN = ("samples", "adaptive_threshold", "denoise")
 
 
 class TargetError(Settings):
-    """A target error, and how it may be reached."""
+    """The error that the views must reach, and how it may be reached."""
 
     value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
-        description="The relative mean squared error to reach."
+        description="Relative mean squared error to reach."
     )
     denoise: Literal["auto", "never"] = Field(
-        "auto", description="never: choose only between plain and adaptive sampling."
+        "auto",
+        description="Whether the denoiser may be chosen. auto: if it is cheaper. never: only plain "
+        "and adaptive sampling are compared.",
     )
 
 
 class CameraMotion(Settings):
-    """How each camera moves while its shutter is open, at constant speed.
+    """How each camera moves at constant speed while its shutter is open.
 
     The view's pose is that in the middle of the exposure. Depth and passes are of that moment.
     """
 
     travel: Vector = Field(
         (0.0, 0.0, 0.0),
-        description="How far the camera moves to its right, up and back.",
+        description="How far the camera moves during the exposure: to its right, up and backward.",
         json_schema_extra={"unit": "m"},
     )
     turn: Vector = Field(
         (0.0, 0.0, 0.0),
-        description="How far it turns: a rotation vector about its right, up and back.",
+        description="How far the camera turns during the exposure: a rotation vector whose axes "
+        "are its right, up and backward.",
         json_schema_extra={"unit": "degrees"},
     )
     rolling: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
         None,
-        description="Rolling shutter from the top row to the bottom: the part of the exposure in "
-        "which a row sees light. Without it, all rows see light all the time.",
+        description="Rolling shutter, from the top row to the bottom: the fraction of the exposure "
+        "during which one row is exposed. Without this key, all rows are exposed all the time.",
     )
 
     @model_validator(mode="after")
@@ -561,87 +592,107 @@ class Render(Settings):
 
     samples: AtLeastOne | Literal["file"] | None = Field(
         None,
-        description="Paths for each pixel. file: as many as in the .blend.",
+        description="Number of paths that Cycles traces for each pixel. file: the number in the "
+        ".blend.",
         json_schema_extra={"unit": "paths"},
     )
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
-        description="Instead of samples: choose samples, adaptive_threshold and denoise on probe "
-        "views for this error. It is the relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
-        "with middle grey at 0.18, without the worst thousandth of pixels.",
+        description="Error to reach, instead of samples: samples, adaptive_threshold and denoise "
+        "are then chosen on probe views. It is the relative mean squared error, (x - r)^2 / (r^2 + "
+        "0.01) with middle grey at 0.18, without the worst thousandth of pixels.",
     )
     max_bounces: int | None = Field(
         None,
         ge=0,
         le=1024,
-        description="Bounces of a path, of any kind.",
+        description="Largest number of bounces of a path, of all kinds together. Without this key, "
+        "as in the .blend.",
         json_schema_extra={"unit": "bounces"},
     )
     clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
         None,
-        description="Largest value of one indirect sample. 0 does not clamp.",
+        description="Largest value of one indirect sample, which removes fireflies but darkens. 0: "
+        "no limit. Without this key, as in the .blend.",
         json_schema_extra={"unit": "light"},
     )
     light_tree: bool | None = Field(
-        None, description="Prefer lights that matter at a place, by a tree of all lights."
+        None,
+        description="Sample lights by Cycles' light tree, which reduces noise in scenes with many "
+        "lights. Without this key, as in the .blend.",
     )
     guiding: bool | None = Field(
-        None, description="Learn where light comes from while rendering. Only on CPUs."
+        None,
+        description="Use Cycles' path guiding, which learns where light comes from. It works only "
+        "on CPUs. Without this key, as in the .blend.",
     )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
-        None, description="Width of the pixel filter.", json_schema_extra={"unit": "pixels"}
+        None,
+        description="Width of the pixel filter. Without this key, as in the .blend.",
+        json_schema_extra={"unit": "pixels"},
     )
     adaptive_threshold: Annotated[float, Field(ge=0, le=1), AS_WRITTEN] = Field(
-        0, description="Noise at which adaptive sampling stops early. 0 takes every sample."
+        0,
+        description="Noise level at which adaptive sampling of a pixel stops. 0: every pixel takes "
+        "all samples.",
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
     denoise_quality: Literal["high", "balanced", "fast"] | None = Field(
-        None, description="Quality of the denoiser's network. The default is high."
+        None, description="Quality of the denoiser. The default is high, and the others are faster."
     )
     denoise_prefilter: DenoisePrefilter | None = Field(
         None,
-        description="Prefilter of the albedo and normals that guide the denoiser. The default is "
-        "accurate.",
+        description="How the albedo and normals that guide the denoiser are denoised first. The "
+        "default is accurate.",
     )
     motion_blur: bool | None = Field(
-        None, description="Blur moving objects. Without it, as in the .blend."
+        None, description="Whether moving objects are blurred. Without this key, as in the .blend."
     )
     camera_motion: CameraMotion | None = Field(
-        None, description="Move the cameras while their shutters are open."
+        None, description="How each camera moves while its shutter is open, which blurs the views."
     )
     depth_of_field: bool | None = Field(
         None,
-        description="Use the focus and aperture of the .blend's own camera. Without it, everything "
-        "is sharp.",
+        description="Blur what is out of focus, with the focus and aperture of the .blend's own "
+        "camera. Without this key, everything is sharp.",
     )
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="Each view's seed follows from this and its name."
+        0,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of the noise. Each view's own seed is computed from this and the view's "
+        "name.",
     )
     depth: Literal["auto", "z", "distance", "none"] = Field(
         "auto",
-        description="Meaning of channel Z. auto: z up to 180 degrees, and distance beyond.",
+        description="What channel Z holds. z: depth along the optical axis. distance: distance "
+        "from the camera. none: no depth. auto: z for lenses up to 180 degrees, distance for wider "
+        "ones.",
     )
     depth_precision: Literal["float", "rounded", "half"] = Field(
         "float",
-        description="Precision of depth. float has 24 binary digits, and half has 11. rounded is a "
-        "float with 17 digits, exact to 1e-5, in smaller files.",
+        description="Precision of depth. float: 24 significant bits. rounded: a float with 17 "
+        "significant bits (a relative error below 1e-5), in smaller files. half: 11 significant "
+        "bits.",
     )
     compression: Literal["zip", "zips", "piz", "htj2k", "zstd"] | None = Field(
         None,
         description="Lossless compression of the views' EXR files. The default is zip, which every "
-        "program reads. htj2k and zstd are smaller, for archives and scratch.",
+        "program reads. htj2k and zstd give smaller files, for archives and temporary use.",
     )
     transparent: bool | None = Field(
-        None, description="Leave out the world behind the scene, and write the coverage as alpha."
+        None,
+        description="Make the background transparent: the world behind the scene is left out, and "
+        "alpha holds the coverage.",
     )
     passes: PassNames | None = Field(
-        None, description="Passes to write, each into a folder of its own."
+        None, description="Passes to write beside colour and depth, each into a folder of its own."
     )
     light_groups: Literal["each"] | Emitters | dict[str, Emitters] | None = Field(
         None,
-        description="The light of each lamp, glowing object and world as a pass of its own. each: "
-        "all of them. A list: those of these names. A mapping: groups of them. All others are "
-        "the group rest.",
+        description="Light sources (lamps, glowing objects, the world) whose light is written as "
+        "passes of their own. each: all of them. A list: those with these names. A mapping: groups "
+        "of them. All others form the group rest.",
     )
 
     @model_validator(mode="after")
@@ -677,41 +728,47 @@ class Render(Settings):
 
 
 class Reprojection(ReprojectionOptions):
-    """The same views through another lens, or as other files."""
+    """Versions of the views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
-        None, min_length=1, description="The rigs to reproject. Without it, all of them."
+        None,
+        min_length=1,
+        description="Rigs whose views are reprojected. Without this key, all rigs.",
     )
-    format: Literal["png", "exr"] = Field("png", description="Only EXR has depth.")
+    format: Literal["png", "exr"] = Field(
+        "png", description="Format of the images. Only EXR has depth."
+    )
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0,
-        description="Exposure. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
+        description="Exposure of the images. A list makes a folder for each of its values, such as "
+        "png_ev-2 and png_ev0.",
         json_schema_extra={"unit": "stops"},
     )
     passes: ReprojectedPassNames | None = Field(
         None,
-        description="Passes of render.passes to reproject, too, as EXR. light_groups: those of "
-        "all light groups.",
+        description="Passes of render.passes that are also reprojected, as EXR. light_groups: the "
+        "passes of all light groups.",
     )
     relight: Name | Light | None = Field(
         None,
-        description="Another light: the name of an entry of relight, or strengths as there.",
+        description="Light of the images, if it is not the rendered one: the name of an entry of "
+        "relight, or strengths as in such an entry.",
     )
     primaries: Literal["rec709", "acescg"] | None = Field(
         None,
-        description="The colour space of an EXR. The file names it in its attribute "
-        "chromaticities. Without this key it is Rec. 709, and the file does not say so.",
+        description="Colour space of EXR images, which the files name in their attribute "
+        "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",
     )
 
     @model_validator(mode="after")
     def _has_use(self) -> Self:
         for name in ("cube_map", "rotation", "filter", "samples"):
             if self.camera is None and name in self.model_fields_set:
-                raise ValueError(f"{name}: goes with camera; without one nothing is resampled")
+                raise ValueError(f"{name}: needs camera; without one, nothing is resampled")
         if self.format == "exr" and self.bits != 8:
-            raise ValueError("bits: goes with format png; an EXR has halves")
+            raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
         if self.format == "png" and self.primaries:
-            raise ValueError("primaries: goes with format exr; a PNG is sRGB")
+            raise ValueError("primaries: is only for format exr; a PNG is sRGB")
         lights = [
             name
             for name in self.passes or ()
@@ -758,35 +815,37 @@ class SensorReprojection(Reprojection):
 
 
 class Flow(Settings):
-    """The optical flow between pairs of views."""
+    """Optical flow between pairs of views."""
 
     pairs: Literal["neighbours"] = Field(
-        description="neighbours: from each view to the one whose camera is nearest."
+        description="Pairs of views. neighbours: from each view to the view whose camera is "
+        "nearest."
     )
 
 
 class MeshFiles(Settings):
-    """The surface that cameras can see, as meshes, and the boxes and poses of its objects."""
+    """Meshes of the surface that cameras can see, and the boxes and poses of its objects."""
 
     formats: Annotated[list[Literal["glb", "ply"]], AfterValidator(_unique)] = Field(
         ["glb", "ply"],
-        description="glb: instances share a mesh, and objects keep their names. ply: all triangles "
-        "in the world.",
+        description="Formats to write. glb: objects keep their names, and instances share a mesh. "
+        "ply: all triangles together, in world coordinates.",
     )
     rigs: list[str] | None = Field(
         None,
         min_length=1,
-        description="The rigs whose datasets hold it. Without it, all of them.",
+        description="Rigs whose datasets get the meshes. Without this key, all rigs.",
     )
 
 
 class Report(Settings):
-    """The contents of a dataset's page."""
+    """What the page of a dataset shows."""
 
     panorama: Auto | bool = Field(
         "auto",
-        description="Show a panorama from the rig's centre. auto: if the cameras look outward, all "
-        "round. Without it, the page shows the view in the rig's middle.",
+        description="Whether the page shows a panorama from the rig's centre. auto: only if the "
+        "cameras look outward in all directions. Otherwise, the page shows the view in the rig's "
+        "middle.",
     )
 
 
@@ -806,19 +865,19 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
 
 
 class Credits(Settings):
-    """What a package's card says of the scene, and what publishing needs beside that."""
+    """What a package's card says about the scene, and what publishing needs in addition."""
 
-    description: str | None = Field(None, description="One line about the scene.")
+    description: str | None = Field(None, description="Description of the scene, in one line.")
     licence: str | None = Field(
         None,
-        description="Of the scene, for a package's card. It is also the data's licence, unless "
-        "publish has another.",
+        description="Licence of the scene, for a package's card. It is also the licence of the "
+        "data, unless publish has another.",
     )
-    credit: str | None = Field(None, description="How the scene's artist is to be cited.")
+    credit: str | None = Field(None, description="How to cite the artist of the scene.")
     publish: Publication | None = Field(
         None,
-        description="Also write what a repository of datasets needs. Without it, a package is an "
-        "archive alone.",
+        description="What a repository of datasets needs to know. With this key, its metadata and "
+        "shards are also written. Without it, a package is only an archive.",
     )
 
     @property
@@ -847,39 +906,53 @@ class Credits(Settings):
 
 
 class Scene(Credits):
-    """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
+    """One scene: where it comes from, how its rigs render it, and what is made of the views."""
 
-    scene: SceneSource = Field(description="The scene: a builder, a .blend, a model, or a dataset.")
+    scene: SceneSource = Field(
+        description="Where the scene comes from: a builder, a .blend, a model, or a dataset."
+    )
     render: Render | None = Field(
-        None, description="How Cycles renders. Required, except with scene.dataset."
+        None,
+        description="How Cycles renders the views. Required, but not allowed with scene.dataset.",
     )
     rigs: dict[Name, AnyRig] = Field(
         {},
         min_length=1,
-        description="The camera setups, by the names of their folders. scene.dataset has its own.",
+        description="Camera setups, by the names of their folders. Leave it out with "
+        "scene.dataset, which has its own cameras.",
     )
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
-        {}, description="The same views through other lenses, by the names of their folders."
+        {},
+        description="Versions of the views through other lenses or as other files, by the names of "
+        "their folders.",
     )
     relight: dict[Name, Light] = Field(
         {},
-        description="The views under other lights, as EXR, by the names of their folders. A light "
-        "has strengths, or red, green and blue, by the names of light groups; others keep theirs. "
-        "each: every group alone, one after the other.",
+        description="Versions of the views under other lights, as EXR, by the names of their "
+        "folders. A light gives light groups a strength, or one each for red, green and blue. "
+        "Other groups keep theirs. each: every group alone, one after the other.",
     )
     sensor: Sensor | None = Field(
-        None, description="The views as a sensor sees them: noise, vignetting, brackets."
+        None,
+        description="Versions of the views as a real sensor would record them, with noise, "
+        "vignetting or exposure brackets.",
     )
     flow: Flow | None = Field(
-        None, description="Optical flow from depth and poses, for a scene that stands still."
+        None,
+        description="Optical flow between views, from depth and poses, for scenes that do not "
+        "move.",
     )
     mesh: MeshFiles | None = Field(
-        None, description="The surface that cameras can see, as meshes, and its objects' boxes."
+        None,
+        description="Meshes of the surface that cameras can see, and the bounding boxes of its "
+        "objects.",
     )
-    exports: Exports = Field(Exports(), description="Files for trainers.")
-    report: Report = Field(Report(), description="The contents of a dataset's page.")
+    exports: Exports = Field(
+        Exports(), description="Exports to the formats of trainers and other programs."
+    )
+    report: Report = Field(Report(), description="What the page of a dataset shows.")
     family: Family | None = Field(
-        None, description="Many scenes that differ by seed, model or drawn values."
+        None, description="Many scenes that differ in seed, model or drawn values."
     )
 
     @model_validator(mode="before")
@@ -922,9 +995,11 @@ class Scene(Credits):
             self._check_rig(f"rigs.{name}", name, rig)
         if self.render and self.scene.blend is None:
             if self.render.samples == FILE:
-                raise ValueError("render.samples: file goes with scene.blend")
+                raise ValueError("render.samples: file is only for scene.blend")
             if self.render.depth_of_field:
-                raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
+                raise ValueError(
+                    "render.depth_of_field: is only for scene.blend, whose camera it uses"
+                )
         if self.mesh:
             self._check_mesh(self.mesh)
         for name, reprojection in self.reprojections.items():
@@ -948,7 +1023,7 @@ class Scene(Credits):
     def _check_family(self, family: Family) -> None:
         """Check that a job can build the members of a family one after the other."""
         if family.seeds and not self.scene.builder:
-            raise ValueError("family.seeds: goes with scene.builder")
+            raise ValueError("family.seeds: needs scene.builder")
         if self.render and self.render.target_error is not None:
             raise ValueError("render.target_error: does not go with family; give samples")
         for key in ("flow", "mesh"):
@@ -998,7 +1073,9 @@ class Scene(Credits):
                 raise ValueError(f"sensor.vignetting: does not go with the faces of {source}")
             for rig_name in sensor.rigs or ():
                 if original and rig_name not in (original.rigs or self.rigs):
-                    raise ValueError(f"sensor.rigs: {rig_name} is not of the reprojection {source}")
+                    raise ValueError(
+                        f"sensor.rigs: {rig_name} is not a rig of the reprojection {source}"
+                    )
             for name in sensor.folders(source):
                 if name in self.reprojections:
                     raise ValueError(f"reprojections.{name}: the name is taken by sensor")
@@ -1018,7 +1095,7 @@ class Scene(Credits):
         for pass_name in reprojection.passes or ():
             if pass_name == LIGHT_GROUPS:
                 if self.render is None or self.render.light_groups is None:
-                    raise ValueError(f"{key}.passes: light_groups go with render.light_groups")
+                    raise ValueError(f"{key}.passes: light_groups needs render.light_groups")
                 continue
             if self.render is None or pass_name not in (self.render.passes or ()):
                 raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
@@ -1048,7 +1125,7 @@ class Scene(Credits):
         if isinstance(reprojection.relight, str) and reprojection.relight in self.relight:
             at = f"relight.{reprojection.relight}"
         if self.render is None or self.render.light_groups is None:
-            raise ValueError(f"{at}: goes with render.light_groups, which it changes")
+            raise ValueError(f"{at}: needs render.light_groups, whose strengths it changes")
         if light == light_groups.EACH:
             if reprojection.passes:
                 raise ValueError(f"{key}.passes: does not go with the light each")
@@ -1117,7 +1194,9 @@ class Scene(Credits):
                 if refusal := export.refusal(camera.make(), has_depth):
                     raise ValueError(f"{key}: {source} {refusal}")
                 if rig.is_omnidirectional:
-                    raise ValueError(f"{key}: {source} is of the rig {name}, without a centre")
+                    raise ValueError(
+                        f"{key}: {source} is of the rig {name}, whose views have no centre"
+                    )
                 if refusal := export.rig_refusal(rig):
                     raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
 
@@ -1140,9 +1219,9 @@ class Scene(Credits):
         if isinstance(rig, Poses) and not Path(rig.file).is_file():
             raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
         if self.scene.blend is None and isinstance(rig, BlendCamera):
-            raise ValueError(f"{key}.type: blend_camera goes with scene.blend")
+            raise ValueError(f"{key}.type: blend_camera needs scene.blend")
         if camera.lens == FILE and not isinstance(rig, BlendCamera):
-            raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
+            raise ValueError(f"{key}.camera.lens: file is only for a rig of type blend_camera")
         frames = len(rig.sequence.numbers) if rig.sequence else 1
         if frames > MOST_FRAMES or frames * rig.view_count > MOST_VIEWS:
             raise ValueError(
@@ -1184,7 +1263,7 @@ class Scene(Credits):
     def _check_without_centre(self, key: str, name: str) -> None:
         """Check that nothing needs a centre of a rig's views, which have none."""
         if self.rigs[name].camera.lens != "equirectangular":
-            raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
+            raise ValueError(f"{key}.stereo.omnidirectional: needs the lens equirectangular")
         refusal = f"does not go with {key}.stereo.omnidirectional, whose views have no centre"
         if self.render and self.render.camera_motion:
             raise ValueError(f"render.camera_motion: {refusal}")
@@ -1312,9 +1391,7 @@ def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
     try:
         return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
     except (LookupError, TypeError):
-        raise UserError(
-            f"{lock}: sha256: is missing; without the file it is recorded anew"
-        ) from None
+        raise UserError(f"{lock}: sha256: is missing; remove the file to record it again") from None
 
 
 def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:

@@ -23,10 +23,12 @@ def evenly_spread(text: str) -> float:
 
 
 class Shares(Settings):
-    """The shares of the members that validate and test. All others train."""
+    """Shares of the members for validation and testing. All other members are for training."""
 
-    validation: float = Field(0.1, ge=0, le=1, description="Share of the members that validate.")
-    test: float = Field(0.1, ge=0, le=1, description="Share of the members that test.")
+    validation: float = Field(
+        0.1, ge=0, le=1, description="Share of the members that are for validation."
+    )
+    test: float = Field(0.1, ge=0, le=1, description="Share of the members that are for testing.")
 
     @model_validator(mode="after")
     def _some_train(self) -> Self:
@@ -46,19 +48,23 @@ class Shares(Settings):
 
 
 class CorpusOptions(Settings):
-    """The key `corpus` of a family."""
+    """How the members of a family form one corpus."""
 
-    splits: Shares = Field(Shares(), description="How the members are split.")
-    shards: bool = Field(False, description="Whether to write the views as WebDataset shards too.")
+    splits: Shares = Field(
+        Shares(), description="Shares of the members that are for validation and for testing."
+    )
+    shards: bool = Field(False, description="Whether to also write the views as WebDataset shards.")
     shard_gigabytes: float = Field(
-        1, gt=0, description="Size of a shard, at most.", json_schema_extra={"unit": "GB"}
+        1, gt=0, description="Largest size of a shard.", json_schema_extra={"unit": "GB"}
     )
 
 
 class CorpusSettings(CorpusOptions):
     """The settings of scripts/corpus.py."""
 
-    family: str = Field(description="The name of the corpus.")
+    family: str = Field(description="Name of the corpus, which is that of the family's scene YAML.")
     members: list[str] | None = Field(
-        None, description="The family's members. Without this key, all that have a record."
+        None,
+        description="Names of the members. Without this key, the corpus has all members that have "
+        "a record.",
     )

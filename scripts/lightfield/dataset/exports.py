@@ -46,7 +46,7 @@ class Export(Settings):
 
     sources: list[str] = Field(
         min_length=1,
-        description=f"Names of reprojections; `{VIEWS}` stands for the rendered views.",
+        description=f"Names of reprojections to export. `{VIEWS}` stands for the rendered views.",
     )
 
     @property
@@ -69,27 +69,30 @@ class Export(Settings):
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_of_sequence and (rig.sequence is None or len(rig.sequence.numbers) < 2):
-            return "has no two frames, and the export is of a sequence; give it frames"
+            return (
+                "has fewer than two frames, and this export is for sequences; give the rig frames"
+            )
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
             return "has one view, so none is left to test with"
         return None
 
 
 class Developed(Export):
-    """An export of 8-bit pictures. ``exposure`` and ``reinhard`` apply only to EXR sources."""
+    """Exports of 8-bit images. ``exposure`` and ``reinhard`` apply only to EXR sources."""
 
     exposure: float = Field(
         0.0,
         ge=-100,
         le=100,
-        description="Exposure of EXR sources.",
+        description="Exposure that is applied to EXR sources.",
         json_schema_extra={"unit": "stops"},
     )
     reinhard: float = Field(
         1.0,
         ge=1e-9,
         le=1e9,
-        description="Tone mapping of EXR sources: the value that becomes white; 1 is none.",
+        description="Reinhard tone mapping of EXR sources: the value that becomes white. 1: no "
+        "tone mapping.",
         json_schema_extra={"unit": "light"},
     )
 
@@ -103,28 +106,32 @@ class InstantNgp(Export):
 
     scale: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
         None,
-        description="Scale from the world to the unit cube. Without it, fitted to the scene.",
+        description="Scale from metres to unit cubes. Without this key, it is fitted to the scene.",
         json_schema_extra={"unit": "cubes/m"},
     )
     offset: Vector | None = Field(
         None,
-        description="The mean camera's place in the unit cube. Without it, 0.5 each.",
+        description="Position of the mean camera in the unit cube. Without this key, it is 0.5 "
+        "along each axis.",
         json_schema_extra={"unit": "cubes"},
     )
     bounds: Literal["rig", "depth"] = Field(
         "rig",
-        description="What is fitted without a scale: the rig, or what the views' depth shows.",
+        description="What the unit cube is fitted to without a scale. rig: the cameras. depth: the "
+        "cameras, and most of the surfaces that the views see.",
     )
     aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = Field(
-        None, description="Side of the training volume.", json_schema_extra={"unit": "cubes"}
+        None,
+        description="Length of a side of the volume in which instant-ngp trains.",
+        json_schema_extra={"unit": "cubes"},
     )
     render_aabb: Annotated[tuple[Vector, Vector], as_list(2)] | None = Field(
         None,
-        description="Two corners of the part of the unit cube that is shown.",
+        description="Two opposite corners of the part of the unit cube that instant-ngp shows.",
         json_schema_extra={"unit": "cubes"},
     )
     depth: bool = Field(
-        False, description="Write depth maps of 16 bits, too, from sources with depth."
+        False, description="Also write depth maps of 16 bits. The source must have depth."
     )
 
     @model_validator(mode="after")
@@ -132,7 +139,7 @@ class InstantNgp(Export):
         if self.scale is not None and self.bounds == "depth":
             raise ValueError("bounds: does not go with scale, which it would determine")
         if self.scale is None and self.offset is not None:
-            raise ValueError("offset: goes with scale; without it both are fitted")
+            raise ValueError("offset: needs scale; without scale, both are fitted")
         if self.render_aabb:
             lowest, highest = self.render_aabb
             if any(low >= high for low, high in zip(lowest, highest, strict=True)):
@@ -161,15 +168,17 @@ class InstantNgp(Export):
 
 
 class Colmap(Developed):
-    """A COLMAP model, for gsplat, 3DGRUT, the original 3D Gaussian splatting."""
+    """A COLMAP model, for gsplat, 3DGRUT and the original 3D Gaussian splatting."""
 
     is_for_training: ClassVar[bool] = True
 
-    format: Literal["binary", "text"] = Field("binary", description="The form of COLMAP's files.")
+    format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
     points: PointCount = Field(
-        50000, description="Most points lifted from depth. An image without any gets one more."
+        50000,
+        description="Largest number of points, which are computed from depth. An image in which "
+        "none of them lies gets one more.",
     )
-    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
+    depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | KannalaBrandt):
@@ -191,11 +200,11 @@ class Nerfstudio(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Most points of the point cloud.")
-    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
+    points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
+    depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
     # This changes no file.
     splatfacto: bool = Field(
-        False, exclude=True, description="Refuse what splatfacto cannot train on."
+        False, exclude=True, description="Whether to refuse lenses that splatfacto cannot train on."
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -214,7 +223,7 @@ class Nerfstudio(Developed):
 
 
 class NerfSynthetic(Developed):
-    """The layout of NeRF's synthetic scenes: RGBA, three lists."""
+    """The layout of NeRF's synthetic scenes: RGBA images, and a list for each part of the split."""
 
     is_for_training: ClassVar[bool] = True
 
@@ -226,7 +235,7 @@ class OpenDibr(Developed):
     """The views and list that OpenDIBR plays."""
 
     format: Literal["png", "h265"] = Field(
-        "png", description="The form of colour and disparity. h265 needs ffmpeg."
+        "png", description="Form of the colour and disparity images. h265 needs ffmpeg."
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -236,13 +245,13 @@ class OpenDibr(Developed):
         elif not isinstance(lens, Rectilinear | Equirectangular):
             return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "h265" and shutil.which("ffmpeg") is None:
-            return "is to be H.265, for which ffmpeg must be installed; or give format: png"
+            return "becomes H.265, for which ffmpeg must be installed; or give format: png"
         refusal = _odd_size_refusal(lens) if self.format == "h265" else None
         return refusal or (None if has_depth else NO_DEPTH)
 
 
 class Miv(Developed):
-    """A sequence of MPEG immersive video's test model."""
+    """A sequence for TMIV, the test model of MPEG immersive video."""
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if not isinstance(lens, Rectilinear | Equirectangular):
@@ -271,7 +280,9 @@ class ScanNetPP(Developed):
     is_for_training: ClassVar[bool] = True
 
     points: PointCount = Field(
-        50000, description="Most points lifted from depth. An image without any gets one more."
+        50000,
+        description="Largest number of points, which are computed from depth. An image in which "
+        "none of them lies gets one more.",
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -286,7 +297,9 @@ class NCore(Developed):
     is_for_training: ClassVar[bool] = True
     has_row_times: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Most points lifted from depth.")
+    points: PointCount = Field(
+        50000, description="Largest number of points, which are computed from depth."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | Rectilinear):
@@ -300,12 +313,12 @@ class LichtFeld(Developed):
     is_for_training: ClassVar[bool] = True
 
     format: Literal["png", "exr"] = Field(
-        "png", description="The form of the images. exr keeps their light for HDR training."
+        "png", description="Format of the images. exr keeps linear light, for HDR training."
     )
-    points: PointCount = Field(50000, description="Most points of the point cloud.")
-    depth: bool = Field(False, description="Write depth maps, too, from sources with depth.")
+    points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
+    depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
     normals: bool = Field(
-        False, description="Write normals, too, from sources with the pass normal."
+        False, description="Also write normals. The source must have the pass normal."
     )
 
     @property
@@ -326,7 +339,7 @@ class LichtFeld(Developed):
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "exr" and not has_depth:
-            return "is not of EXR; give it format: exr"
+            return "is not in EXR; give it format: exr"
         return NO_DEPTH if self.depth and not has_depth else None
 
 
@@ -336,7 +349,9 @@ class Dnerf(Developed):
     is_for_training: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+    points: PointCount = Field(
+        50000, description="Largest number of points in the point cloud of the first frame."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return _centred_pinhole(lens)
@@ -348,14 +363,20 @@ class Neural3dVideo(Developed):
     is_for_training: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+    points: PointCount = Field(
+        50000, description="Largest number of points in the point cloud of the first frame."
+    )
     rate: float = Field(
-        30, gt=0, le=1000, description="Frames a second.", json_schema_extra={"unit": "Hz"}
+        30,
+        gt=0,
+        le=1000,
+        description="Frames per second of the videos.",
+        json_schema_extra={"unit": "Hz"},
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if shutil.which("ffmpeg") is None:
-            return "is to be a video, for which ffmpeg must be installed"
+            return "becomes a video, for which ffmpeg must be installed"
         return _centred_pinhole(lens) or _odd_size_refusal(lens)
 
 
@@ -375,7 +396,9 @@ class MultipleView(Developed):
 
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Most points of the first frame's point cloud.")
+    points: PointCount = Field(
+        50000, description="Largest number of points in the point cloud of the first frame."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return _centred_pinhole(lens)
@@ -417,7 +440,7 @@ class PointCloud(Developed):
     voxel: float = Field(
         0.01,
         gt=0,
-        description="Side of a voxel. Each keeps one point.",
+        description="Side of a voxel. Each voxel keeps one point at most.",
         json_schema_extra={"unit": "m"},
     )
 
@@ -425,36 +448,48 @@ class PointCloud(Developed):
 class Exports(Settings):
     """The exports, by format."""
 
-    instant_ngp: InstantNgp | None = Field(None, description="For instant-ngp.")
-    colmap: Colmap | None = Field(None, description="For gsplat, 3DGRUT and 3D Gaussian splatting.")
-    nerfstudio: Nerfstudio | None = Field(None, description="For nerfstudio.")
+    instant_ngp: InstantNgp | None = Field(None, description="transforms.json for instant-ngp.")
+    colmap: Colmap | None = Field(
+        None, description="COLMAP model for gsplat, 3DGRUT and the original 3D Gaussian splatting."
+    )
+    nerfstudio: Nerfstudio | None = Field(None, description="Dataset for nerfstudio.")
     nerf_synthetic: NerfSynthetic | None = Field(
-        None, description="For readers of NeRF's synthetic scenes."
+        None, description="Layout of NeRF's synthetic scenes, for programs that read it."
     )
-    opendibr: OpenDibr | None = Field(None, description="For OpenDIBR.")
-    miv: Miv | None = Field(None, description="For TMIV.")
-    hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
-    scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    opendibr: OpenDibr | None = Field(None, description="Views for OpenDIBR.")
+    miv: Miv | None = Field(
+        None, description="Sequence for TMIV, the test model of MPEG immersive video."
+    )
+    hci: Hci | None = Field(
+        None, description="Layout of the HCI 4D light field benchmark, for programs that read it."
+    )
+    scannetpp: ScanNetPP | None = Field(
+        None, description="ScanNet++'s fisheye layout, for 3DGRUT and Fisheye-GS."
+    )
     ncore: NCore | None = Field(
-        None, description="For gsplat and 3DGRUT: NCore v4, fisheyes past 180° too."
+        None, description="NCore v4 for gsplat and 3DGRUT, also for fisheyes wider than 180°."
     )
-    lichtfeld: LichtFeld | None = Field(None, description="For LichtFeld Studio.")
-    coco: Coco | None = Field(None, description="For detectors: the boxes of objects in the views.")
-    dnerf: Dnerf | None = Field(None, description="A sequence, for D-NeRF and 4DGaussians.")
+    lichtfeld: LichtFeld | None = Field(None, description="Dataset for LichtFeld Studio.")
+    coco: Coco | None = Field(
+        None, description="Boxes of the objects in each view, for object detectors."
+    )
+    dnerf: Dnerf | None = Field(None, description="Sequence for D-NeRF and 4DGaussians.")
     neural_3d_video: Neural3dVideo | None = Field(
-        None, description="A sequence, for readers of Neural 3D Video."
+        None, description="Sequence in the layout of Neural 3D Video, for programs that read it."
     )
     colmap_frames: ColmapFrames | None = Field(
-        None, description="A sequence, for SpacetimeGaussians."
+        None, description="Sequence for SpacetimeGaussians: a COLMAP model for each frame."
     )
     multipleview: MultipleView | None = Field(
-        None, description="A sequence, for 4DGaussians: its MultipleView."
+        None, description="Sequence for 4DGaussians, in its layout MultipleView."
     )
     scene_flow: SceneFlow | None = Field(
-        None, description="A sequence: the motion of surfaces in the world."
+        None, description="Motion of surfaces in the world, for each frame of a sequence."
     )
-    poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
-    point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
+    poses_csv: PosesCsv | None = Field(None, description="Table of poses, for any program.")
+    point_cloud: PointCloud | None = Field(
+        None, description="Point cloud of all surfaces that the views see, for any program."
+    )
 
     @property
     def selected(self) -> dict[str, Export]:
@@ -484,16 +519,24 @@ Options = TypeVar("Options", bound=Export)
 class ExportSettings(Settings, Generic[Options]):
     """The settings of one job, which exports the views of one source."""
 
-    options: Options = Field(description="As in the scene YAML, with one source.")
-    suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the views.")
+    options: Options = Field(
+        description="Keys of the export in the scene YAML, with exactly one source."
+    )
+    suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the source's images.")
     tested_by: dict[str, str] = Field(
-        {}, description="Folders of the rigs' datasets whose views test what is trained on these."
+        {},
+        description="Datasets whose views are the test views of this export: their folders, by the "
+        "names of their rigs.",
     )
     frames: list[str] | None = Field(
-        None, min_length=2, description="Folders of a sequence's frames in the rig's folder."
+        None,
+        min_length=2,
+        description="Names of the folders of a sequence's frames, in the rig's folder.",
     )
     trained_by: str | None = Field(
-        None, description="The training views' transforms.json, which gives these views its scale."
+        None,
+        description="Path of the transforms.json of the training views, whose scale and offset "
+        "these views get.",
     )
 
     @model_validator(mode="after")

@@ -39,14 +39,20 @@ _Bounds = Annotated[tuple[float, float], as_list(2)]
 class Draw(Settings):
     """How a value is drawn for each member."""
 
-    uniform: _Bounds | None = Field(None, description="A number between two bounds.")
+    uniform: _Bounds | None = Field(
+        None, description="Draw a number between two bounds. All numbers are equally likely."
+    )
     log_uniform: _Bounds | None = Field(
-        None, description="A number between two bounds above 0, with a uniform logarithm."
+        None,
+        description="Draw a number between two bounds above 0. Its logarithm is uniform, so 1 to "
+        "10 is as likely as 10 to 100.",
     )
     integers: Annotated[tuple[int, int], as_list(2)] | None = Field(
-        None, description="A whole number from the first bound to the last."
+        None,
+        description="Draw a whole number from the first bound to the last. Both bounds are "
+        "included.",
     )
-    choice: list[Any] | None = Field(None, min_length=1, description="One of the listed values.")
+    choice: list[Any] | None = Field(None, min_length=1, description="Draw one of these values.")
 
     @model_validator(mode="after")
     def _one_of_four(self) -> Self:
@@ -79,41 +85,43 @@ class Draw(Settings):
 
 
 class Member(Settings):
-    """A member of a family, by its name and by what is its own."""
+    """A member of a family: its name, and its own seed or model."""
 
-    name: str = Field(description="The name of the member's folder.")
-    seed: int | None = Field(None, description="The member's seed.")
-    model: str | None = Field(None, description="The path of the member's model file.")
+    name: str = Field(description="Name of the member's folder.")
+    seed: int | None = Field(None, description="Seed that the builder gets for this member.")
+    model: str | None = Field(None, description="Path of the member's model file.")
 
 
 class Family(Settings):
-    """Many scenes from one scene YAML. Each of them has datasets of its own."""
+    """Many scenes from one scene YAML, its members. Each member has datasets of its own."""
 
     seeds: str | None = Field(
         None,
         pattern=pattern(r"^\d{1,9}-\d{1,9}$", "the first and the last seed, such as 0-999"),
-        description="The first and the last seed of the members. The builder takes a member's "
-        "seed, and lays out the place of that number, unless scene.parameters.place is given.",
+        description="First and last seed: each seed between them makes a member. The builder gets "
+        "it as its seed, and also as its place, unless scene.parameters.place is given.",
     )
     models: str | None = Field(
         None,
         min_length=1,
         max_length=1000,
-        description="The model files of the members: a path with * and **, such as "
-        "models/**/*.glb, from the folder that Snakemake runs in. scene.model is left out.",
+        description="Model files, each of which makes a member: a path with * and **, such as "
+        "models/**/*.glb, relative to the folder in which Snakemake runs. Leave out scene.model.",
     )
     values: dict[str, Draw] = Field(
         {},
-        description="How other keys of the scene YAML are drawn for each member, by their names "
-        "with dots, such as scene.parameters.detail.",
+        description="Other keys of the scene YAML that are drawn anew for each member, and how. "
+        "Their names have dots, such as scene.parameters.detail.",
     )
     batch: Annotated[int, Field(ge=1, le=10_000)] = Field(
         32,
-        description="How many members one job builds, at most about.",
+        description="About how many members one job builds at most.",
         json_schema_extra={"unit": "members"},
     )
     corpus: CorpusOptions = Field(
-        CorpusOptions(), description="How the members become one corpus: splits, and shards."
+        CorpusOptions(),
+        description="How the members form one corpus: its split into training, validation and "
+        "test, and its shards.",
     )
 
     @model_validator(mode="after")
@@ -125,7 +133,7 @@ class Family(Settings):
             if not re.fullmatch(r"\w[\w-]*(\.\w[\w-]*)+", key) or key.startswith("family."):
                 raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
             if key == own:
-                raise ValueError(f"values: {key} is the members' own")
+                raise ValueError(f"values: {key} cannot be drawn, because each member has its own")
         if self.seeds and len(self._seeds) > MOST_MEMBERS:
             raise ValueError(f"seeds: is {self.seeds!r}; must be at most {MOST_MEMBERS} seeds")
         if self.seeds and not self._seeds:

@@ -51,26 +51,30 @@ class BuildSettings(Settings):
     """The settings of scripts/build_scene.py."""
 
     builder: Annotated[str, AfterValidator(_known_builder)] = Field(
-        description="A folder of scripts/scenes/."
+        description="Name of the builder, which is a folder in scripts/scenes/."
     )
-    parameters: Parameters = Field(Parameters(), description="The builder's parameters.")
+    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
     fingerprint: str | None = Field(
-        None, description="Changes with the builder's text, so that the scene is built again."
+        None, description="Hash of the builder's code. If it changes, the scene is built again."
     )
 
 
 class ImportSettings(ModelOptions):
     """The settings of scripts/import_model.py."""
 
-    model: ModelPath = Field(description="The path of the model file.")
-    frame: Frame = Field(1, description="The frame at which the model is measured.")
+    model: ModelPath = Field(description="Path of the model file.")
+    frame: Frame = Field(
+        1, description="Frame of the animation at which the size of the model is measured."
+    )
     allow_missing: bool = Field(
-        False, description="Import although files that the model names are missing."
+        False, description="Import the model even if files that it names are missing."
     )
     version: int | None = Field(
-        None, description="Changes with the importer, so that the model is imported again."
+        None, description="Version of the importer. If it changes, the model is imported again."
     )
-    bpy: str | None = Field(None, description="The same for Blender's version.")
+    bpy: str | None = Field(
+        None, description="Version of Blender. If it changes, the job runs again."
+    )
 
     @classmethod
     def of_source(cls, source: SceneSource) -> Self:
@@ -92,9 +96,11 @@ class FreePlacesSettings(Settings):
     """The settings of scripts/free_places.py."""
 
     rig: Annotated[Random, PlainSerializer(_places_as_written)] = Field(
-        description="As in the scene YAML, without camera and split."
+        description="The rig's block in the scene YAML, without camera and split."
     )
-    frame: Frame | Literal["file"] = Field(1, description=f"{FILE}: the .blend's own frame.")
+    frame: Frame | Literal["file"] = Field(
+        1, description=f"Frame to load. {FILE}: the .blend's own."
+    )
     scene_name: str | None = Field(None, description="As in the scene YAML.")
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
@@ -107,13 +113,17 @@ class MeshSettings(Settings):
     formats: list[Literal["glb", "ply"]] = Field(
         ["glb", "ply"], min_length=1, description="As in the scene YAML."
     )
-    frame: Frame | Literal["file"] = Field(1, description=f"{FILE}: the .blend's own frame.")
+    frame: Frame | Literal["file"] = Field(
+        1, description=f"Frame to load. {FILE}: the .blend's own."
+    )
     scene_name: str | None = Field(None, description="As in the scene YAML.")
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
     numbered: bool = Field(
-        False, description="Whether objects.json has the numbers of the passes object and instance."
+        False,
+        description="Whether objects.json lists the numbers that objects have in the passes object "
+        "and instance.",
     )
 
 
@@ -124,11 +134,13 @@ class FiguresSettings(Settings):
 
 
 class Measurement(Settings):
-    """A file of a measurement that a page shows."""
+    """A file that a measurement wrote, and that the page shows."""
 
-    file: str = Field(description="The path of the measurement's file.")
+    file: str = Field(description="Path of the file.")
     modified_ns: int | None = Field(
-        None, description="Changes when it is measured again, so that the page is made again."
+        None,
+        description="When the file was modified, in nanoseconds. If it changes, the page is made "
+        "again.",
     )
 
 
@@ -136,36 +148,48 @@ class PageSettings(Settings):
     """The settings of scripts/report_html.py."""
 
     rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
-    yaml: str = Field(description="The scene YAML's text.")
-    command: str = Field(description="What makes the dataset again.")
+    yaml: str = Field(description="Text of the scene YAML.")
+    command: str = Field(description="Command that builds the dataset again.")
     panorama: bool = Field(
-        False, description="Whether the overview is a panorama, not the view in the rig's middle."
+        False,
+        description="Whether the overview is a panorama. false: it is the view in the rig's "
+        "middle.",
     )
-    measurements: list[Measurement] = Field([], description="Measurements that the page shows.")
+    measurements: list[Measurement] = Field(
+        [], description="Files of measurements that the page shows."
+    )
 
 
 class ValidationSettings(Settings):
     """The settings of scripts/validate.py. Paths are those of the working folder."""
 
-    reprojections: list[str] = Field([], description="Folders in the dataset.")
+    reprojections: list[str] = Field(
+        [], description="Names of the folders in the dataset that hold reprojections."
+    )
     exports: list[str] | None = Field(
         None,
-        description="The export.json or transforms.json of each export that the dataset shall "
-        "have. Without this key it may have any.",
+        description="Paths of the export.json or transforms.json of each export that the dataset "
+        "must have. Without this key, any exports are allowed.",
     )
-    records: list[str] = Field([], description="Sizes and checksums of the images as written.")
+    records: list[str] = Field(
+        [],
+        description="Paths of records, which hold the sizes and checksums with which images were "
+        "written.",
+    )
 
 
 class SequenceValidationSettings(Settings):
     """The settings of scripts/validate_sequence.py. Paths are those of the working folder."""
 
     frames: list[str] | None = Field(
-        None, description="Folders of the sequence's frames in the rig's folder. Without it, all."
+        None,
+        description="Names of the folders of the sequence's frames, in the rig's folder. Without "
+        "this key, all of them.",
     )
     exports: list[str] | None = Field(
         None,
-        description="The export.json of each export that the sequence shall have. Without this key "
-        "it may have any.",
+        description="Paths of the export.json of each export that the sequence must have. Without "
+        "this key, any exports are allowed.",
     )
 
 
@@ -173,17 +197,19 @@ class PackSettings(Settings):
     """The settings of scripts/package.py and scripts/publish.py."""
 
     datasets: list[str] = Field(
-        [], description="The datasets in the folder. With others the folder is packed again."
+        [],
+        description="Names of the datasets in the folder. If they change, the folder is packed "
+        "again.",
     )
     gigabytes: float | None = Field(
         None,
         gt=0,
-        description="The largest size of a part, or of a shard. Without it, a package "
-        "has one part, and a shard has 1 GB.",
+        description="Largest size of a package's part, or of a shard. Without this key, a package "
+        "is one file, and shards have at most 1 GB.",
         json_schema_extra={"unit": "GB"},
     )
     scene: Credits = Field(
-        Credits(), description="What the card says of the scene, and what publishing needs."
+        Credits(), description="What the card says about the scene, and what publishing needs."
     )
 
     @classmethod
@@ -204,12 +230,12 @@ class SynthesisSettings(Settings):
 
     truth: list[str] = Field(
         [],
-        description="Folders of the datasets that synthesised views are compared with. Without "
-        "any, they are compared with the dataset's own test views.",
+        description="Folders of the datasets with which synthesised views are compared. Without "
+        "this key, they are compared with the dataset's own test views.",
     )
     views: AtLeastOne = Field(
         12,
-        description="Views of each of these that are compared.",
+        description="How many views of each of these datasets are compared.",
         json_schema_extra={"unit": "views"},
     )
 
@@ -217,26 +243,32 @@ class SynthesisSettings(Settings):
 class BatchSettings(Settings):
     """The settings of scripts/build_members.py."""
 
-    family: str = Field(description="The name of the family's scene YAML.")
+    family: str = Field(description="Name of the family's scene YAML.")
     scene: dict[str, Any] = Field(
-        description="The content of the family's scene YAML, without the block `family`."
+        description="Content of the family's scene YAML, without the block `family`."
     )
     values: dict[str, Draw] = Field({}, description="As in the block `family`.")
-    members: list[Member] = Field(min_length=1, description="The members to build.")
-    preset: str = Field("full", description="The preset, whose name is in the folder's name.")
-    limits: Preset = Field(Preset(), description="The preset's limits.")
-    results: str = Field("results", description="Folder of the datasets.")
-    work: str = Field("work", description="Folder of intermediate files.")
+    members: list[Member] = Field(min_length=1, description="Members to build.")
+    preset: str = Field(
+        "full", description="Name of the preset, which becomes part of the folder's name."
+    )
+    limits: Preset = Field(Preset(), description="Limits of the preset.")
+    results: str = Field("results", description="Folder in which the datasets are built.")
+    work: str = Field("work", description="Folder for intermediate files.")
     fingerprint: str | None = Field(
         None,
-        description="Changes with the builder's text, or with the import of models, so that the "
-        "members are built again.",
+        description="Hash of the builder's code, or version of the importer of models. If it "
+        "changes, the members are built again.",
     )
-    bpy: str | None = Field(None, description="The same for Blender's version.")
+    bpy: str | None = Field(
+        None, description="Version of Blender. If it changes, the job runs again."
+    )
 
 
 class CountSettings(Settings):
     """The settings of scripts/count_members.py."""
 
-    family: str = Field(description="The name of the family's scene YAML.")
-    records: list[str] = Field(min_length=1, description="The records of its batches.")
+    family: str = Field(description="Name of the family's scene YAML.")
+    records: list[str] = Field(
+        min_length=1, description="Paths of the records of the family's batches."
+    )

@@ -61,18 +61,22 @@ Ror = Annotated[
 class Creator(Settings):
     """A person or an organization that made a dataset."""
 
-    name: Text = Field(description="The whole name.")
-    type: Literal["person", "organization"] = Field("person", description="What the creator is.")
+    name: Text = Field(description="Full name.")
+    type: Literal["person", "organization"] = Field(
+        "person", description="Whether the creator is a person or an organization."
+    )
     orcid: str | None = Field(
         None,
         pattern=pattern(
             r"^[0-9]{4}-[0-9]{4}-[0-9]{4}-[0-9]{3}[0-9X]$", "digits such as 0000-0002-1825-0097"
         ),
-        description="ORCID of a person.",
+        description="ORCID of the person.",
     )
-    affiliation: str | None = Field(None, description="Where a person works.")
+    affiliation: str | None = Field(
+        None, description="Name of the institution where the person works."
+    )
     ror: Ror | None = Field(
-        None, description="ROR of the organization, or of the place where a person works."
+        None, description="ROR of the organization, or of the institution where the person works."
     )
 
 
@@ -91,56 +95,76 @@ REQUIRED = (
 
 
 class Publication(Settings):
-    """What only the author knows of a dataset. All of `REQUIRED` must have a value."""
+    """What only the author of a dataset knows. Publishing requires `creators`, `url`, `publisher`,
+    `date`, `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
+    """
 
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
-        None, description="Who made the dataset."
+        None, description="People and organizations that made the dataset."
     )
     licence: Licence | None = Field(
         None,
         description="Licence of the data, by its short name at https://spdx.org/licenses. Without "
-        "it, the licence of the scene.",
+        "this key, it is the licence of the scene.",
     )
-    url: Address | None = Field(None, description="The page on which the dataset will be found.")
+    url: Address | None = Field(
+        None, description="Address of the web page where the dataset will be available."
+    )
     publisher: Text | None = Field(
-        None, description="Who keeps the dataset: Zenodo, Hugging Face, a university."
+        None,
+        description="Name of the publisher that hosts the dataset, such as Zenodo, Hugging Face or "
+        "a university.",
     )
-    publisher_url: Address | None = Field(None, description="The publisher's page.")
+    publisher_url: Address | None = Field(None, description="Address of the publisher's web page.")
     publisher_ror: Ror | None = Field(None, description="ROR of the publisher.")
     contact: str | None = Field(
         None,
         pattern=pattern(r"^[^@\s]+@[^@\s]+$", "an e-mail address"),
-        description="E-mail address for questions about the dataset, which becomes public.",
+        description="E-mail address for questions about the dataset. It becomes public.",
     )
-    date: Date | None = Field(None, description="The day of publication, as 2026-11-30.")
-    limitations: Text | None = Field(None, description="What the dataset cannot show.")
-    biases: Text | None = Field(None, description="What it shows too often, or too seldom.")
+    date: Date | None = Field(None, description="Date of publication, such as 2026-11-30.")
+    limitations: Text | None = Field(
+        None, description="Limitations of the dataset: what it cannot show."
+    )
+    biases: Text | None = Field(
+        None, description="Biases of the dataset: what it shows too often or too rarely."
+    )
     personal_information: Text | None = Field(
-        None, description="Which information about persons it has. None, for most scenes."
+        None,
+        description="Which personal information the dataset contains. For most scenes, write None.",
     )
-    use_cases: Text | None = Field(None, description="What it was made for, and what not.")
-    social_impact: Text | None = Field(None, description="Its use and its risks for society.")
+    use_cases: Text | None = Field(
+        None,
+        description="Uses for which the dataset was made, and uses for which it is unsuitable.",
+    )
+    social_impact: Text | None = Field(
+        None, description="Benefits and risks of the dataset for society."
+    )
     title: Text | None = Field(
-        None, description="Title. Without it, the archive's name: <scene>_<rig>."
+        None,
+        description="Title of the dataset. Without this key, it is the archive's name, "
+        "<scene>_<rig>.",
     )
     doi: str | None = Field(
         None,
         pattern=pattern(r"^10\.[0-9]{4,9}/\S+$", "a DOI such as 10.5281/zenodo.1234"),
-        description="DOI, if one is reserved.",
+        description="DOI of the dataset, if one is reserved.",
     )
     version: str = Field(
         "1.0.0",
         pattern=pattern(r"^[0-9]+\.[0-9]+\.[0-9]+$", "three numbers such as 1.0.0"),
         description="Version of the dataset.",
     )
-    synthetic: bool = Field(True, description="Whether the views are rendered, not photographed.")
+    synthetic: bool = Field(
+        True, description="Whether the views are rendered. false: they are photographed."
+    )
     keywords: list[Text] = Field(
         ["light field", "novel view synthesis", "synthetic images"],
         min_length=1,
-        description="Words to find it by.",
+        description="Keywords by which people find the dataset.",
     )
     derived_from: list[Address] = Field(
-        [], description="Addresses of what the scene was made from: models, textures, scans."
+        [], description="Addresses of the models, textures or scans from which the scene was made."
     )
 
     @property

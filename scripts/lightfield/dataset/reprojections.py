@@ -37,30 +37,37 @@ class ReprojectionOptions(Settings):
 
     camera: CameraSettings | None = Field(
         None,
-        description="The lens and image. Without it, those of the views: nothing is resampled.",
+        description="Lens and image of the result. Without this key, they are those of the views, "
+        "and nothing is resampled.",
     )
-    cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
+    cube_map: bool = Field(
+        False, description="Make six views of 90° from each view, as the faces of a cube."
+    )
     rotation: Vector = Field(
-        (0.0, 0.0, 0.0), description="Pan, pitch and roll.", json_schema_extra={"unit": "degrees"}
+        (0.0, 0.0, 0.0),
+        description="Rotation of the camera: pan to the left, pitch downward, and roll clockwise.",
+        json_schema_extra={"unit": "degrees"},
     )
     filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
-        "adaptive", description="How colour is resampled."
+        "adaptive",
+        description="Filter that resamples colour. adaptive averages over the whole area of each "
+        "pixel, so it also suits smaller images.",
     )
     samples: int = Field(
         1,
         ge=1,
         le=MOST_SAMPLES,
-        description="Samples along each side of a pixel: n x n in all.",
+        description="Samples along each side of a pixel: n gives n × n samples.",
         json_schema_extra={"unit": "samples"},
     )
     bits: Literal[8, 16] = Field(
-        8, description="Depth of a PNG's values.", json_schema_extra={"unit": "bits"}
+        8, description="Bits per channel of a PNG.", json_schema_extra={"unit": "bits"}
     )
     reinhard: float = Field(
         1.0,
         ge=1e-9,
         le=1e9,
-        description="Reinhard tone mapping: the value that becomes white; 1 is none.",
+        description="Reinhard tone mapping: the value that becomes white. 1: no tone mapping.",
         json_schema_extra={"unit": "light"},
     )
 
@@ -69,7 +76,7 @@ class ReprojectionOptions(Settings):
         if self.camera is None:
             return self
         if self.camera.lens == "file":
-            raise ValueError("camera.lens: file goes with a rig of type blend_camera")
+            raise ValueError("camera.lens: file is only for a rig of type blend_camera")
         if self.cube_map and (problem := face_problem(self.camera)):
             raise ValueError(f"camera{problem}")
         return self
@@ -88,25 +95,34 @@ class ReprojectionSettings(ReprojectionOptions):
     """The settings of scripts/reproject.py. scripts/lens_map.py needs only `LENS_MAP_KEYS`."""
 
     formats: list[Literal["exr", "png"]] = Field(
-        [], description="The files to write. EXR holds depth, too."
+        [], description="Formats of the images to write. EXR also holds depth."
     )
-    exposure: Stops = Field(0.0, description="Exposure.", json_schema_extra={"unit": "stops"})
+    exposure: Stops = Field(
+        0.0, description="Exposure of the images.", json_schema_extra={"unit": "stops"}
+    )
     depth_png: float | None = Field(
         None,
         gt=0,
-        description="Steps of 16-bit depth maps. Without it, no such maps.",
+        description="Steps per metre of 16-bit depth maps. Without this key, no such maps are "
+        "written.",
         json_schema_extra={"unit": "steps/m"},
     )
-    mask: bool = Field(False, description="Also write masks of the pixels without a source.")
-    passes: list[str] = Field([], description="Passes to reproject, too.")
+    mask: bool = Field(
+        False, description="Also write masks of the pixels that the source views do not see."
+    )
+    passes: list[str] = Field([], description="Names of passes that are also reprojected.")
     relight: Light | None = Field(
-        None, description="Strengths of light groups, as in the scene YAML's relight."
+        None,
+        description="Light of the images: strengths of light groups, as in relight of the scene "
+        "YAML.",
     )
     primaries: Literal["rec709", "acescg"] | None = Field(
-        None, description="The colour space of an EXR, as its attribute chromaticities says."
+        None,
+        description="Colour space of EXR images, which the files name in their attribute "
+        "chromaticities.",
     )
     sensor: SensorSettings | None = Field(
-        None, description="The sensor that develops the PNG, instead of exposure and reinhard."
+        None, description="Sensor that makes the PNG images, instead of exposure and reinhard."
     )
 
     @model_validator(mode="after")

@@ -38,15 +38,17 @@ class Varied(Settings):
     """A number that differs from view to view: at random in a range, or by a random walk."""
 
     range: Annotated[tuple[float, float], as_list(2)] | None = Field(
-        None, description="The least and the largest value. Each view's is drawn by itself."
+        None, description="Smallest and largest value. Each view's value is drawn independently."
     )
     start: float | None = Field(
-        None, description="The first view's value, with step. Without it, 0."
+        None,
+        description="Value of the first view, for a random walk with step. Without this key, it is "
+        "0.",
     )
     step: Annotated[float, Field(gt=0, le=100)] | None = Field(
         None,
-        description="The standard deviation of the change from each view to the next. The views "
-        "have the order of lightfield.json.",
+        description="Random walk: the standard deviation of the change from each view to the next, "
+        "in the order of lightfield.json.",
     )
 
     @model_validator(mode="after")
@@ -56,7 +58,7 @@ class Varied(Settings):
         if self.range and self.range[0] > self.range[1]:
             raise ValueError("range: must have the least value first")
         if self.range and self.start is not None:
-            raise ValueError("start: goes with step, not with range")
+            raise ValueError("start: is only for step, not for range")
         return self
 
     def reaches_beyond(self, limit: float) -> bool:
@@ -65,15 +67,15 @@ class Varied(Settings):
 
 
 class Vignetting(Settings):
-    """The fall of light to the corners: 1 + α₁r² + α₂r⁴ + α₃r⁶, at least 0 and at most 1."""
+    """Light is multiplied by 1 + α₁r² + α₂r⁴ + α₃r⁶, limited to the range from 0 to 1."""
 
     alpha: Alphas | Annotated[tuple[Alphas, Alphas, Alphas], as_list(CHANNELS)] = Field(
         description="α₁, α₂ and α₃, or three such lists for red, green and blue. r is the distance "
-        "from the centre, in parts of the image's longer side.",
+        "from the centre, divided by the image's longer side.",
     )
     center: Annotated[tuple[Place, Place], as_list(2)] = Field(
         (0.0, 0.0),
-        description="The centre, to the right and down from the image's middle.",
+        description="Centre of the vignetting, to the right and down from the image's middle.",
         json_schema_extra={"unit": "longer sides"},
     )
 
@@ -86,14 +88,17 @@ class Vignetting(Settings):
 
 
 class Response(Settings):
-    """The curve from linear values to codes: a toe, a shoulder, and a gamma."""
+    """The curve from linear light to the values of the image: a toe, a shoulder, and a gamma."""
 
-    toe: float = Field(1.0, gt=0.3, le=20, description="The power below the center.")
-    shoulder: float = Field(1.0, gt=0.3, le=20, description="The power above the center.")
+    toe: float = Field(1.0, gt=0.3, le=20, description="Exponent for values below center.")
+    shoulder: float = Field(1.0, gt=0.3, le=20, description="Exponent for values above center.")
     gamma: float = Field(
-        1.0, gt=0.1, le=20, description="The power of the result. 0.4545 brightens it as sRGB does."
+        1.0,
+        gt=0.1,
+        le=20,
+        description="Exponent that is applied to the result. 0.4545 brightens it as sRGB does.",
     )
-    center: float = Field(0.5, gt=0, lt=1, description="The value where both powers meet.")
+    center: float = Field(0.5, gt=0, lt=1, description="Value at which toe and shoulder meet.")
 
     @property
     def channels(self) -> tuple[tuple[float, ...], ...]:
@@ -103,8 +108,16 @@ class Response(Settings):
 class Noise(Settings):
     """Noise of variance a · y + b, where the raw value y is 1 at saturation (Foi et al. 2008)."""
 
-    a: float = Field(0.0, ge=0, le=1, description="Variance of light: 1 / electrons at saturation.")
-    b: float = Field(0.0, ge=0, le=1, description="Variance without light.")
+    a: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="Factor a, the noise of the light itself: 1 / the number of electrons at "
+        "saturation.",
+    )
+    b: float = Field(
+        0.0, ge=0, le=1, description="Offset b, the variance of the noise without light."
+    )
 
     @model_validator(mode="after")
     def _has_noise(self) -> Self:
@@ -119,10 +132,12 @@ class SensorOptions(Settings):
     """The options that a scene YAML shares with the programs' settings files."""
 
     exposure: Stops | Varied = Field(
-        0.0, description="Exposure, or how it varies.", json_schema_extra={"unit": "stops"}
+        0.0,
+        description="Exposure of all views, or how it varies from view to view.",
+        json_schema_extra={"unit": "stops"},
     )
     vignetting: Vignetting | None = Field(
-        None, description="The fall of light to the corners. The same in all views."
+        None, description="How the image darkens toward its corners. It is the same in all views."
     )
     colour: (
         Annotated[
@@ -132,22 +147,26 @@ class SensorOptions(Settings):
         | None
     ) = Field(
         None,
-        description="PPISP's eight numbers of colour, or how each of them varies. They move blue, "
-        "red, green and grey.",
+        description="Colour shift: PPISP's eight numbers, two each for blue, red, green and grey, "
+        "or how each number varies.",
     )
-    noise: Noise | None = Field(None, description="Noise. Without it, there is none.")
+    noise: Noise | None = Field(
+        None, description="Noise of the sensor. Without this key, there is none."
+    )
     response: Response | None = Field(
-        None, description="The response, the same in all views. Without it, sRGB."
+        None,
+        description="Response curve, the same in all views. Without this key, it is that of sRGB.",
     )
     bits: int = Field(
         8,
         ge=1,
         le=16,
-        description="Bits of a code. A PNG holds the codes scaled to 8 bits, or to 16 for more.",
+        description="Bits to which the sensor quantises. The PNG holds its values scaled to 8 "
+        "bits, or to 16 if bits is above 8.",
         json_schema_extra={"unit": "bits"},
     )
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="Parameters and noise of all views follow from it."
+        0, ge=0, le=2**63 - 1, description="Seed of the noise and of all values that vary."
     )
 
     @model_validator(mode="after")
@@ -161,35 +180,37 @@ class SensorOptions(Settings):
 
 
 class SensorSettings(SensorOptions):
-    """The settings of a reprojection that a sensor develops."""
+    """The sensor of one reprojection: the keys of the first table, and this one."""
 
     bracket: Stops | None = Field(
         None,
-        description="Stops beside the exposure, for one bracket. With it, write clipping masks and "
-        "weights, too.",
+        description="Exposure of one bracket, relative to the sensor's exposure. With this key, "
+        "clipping masks and weights are also written.",
         json_schema_extra={"unit": "stops"},
     )
 
 
 class Sensor(SensorOptions):
-    """The views as a sensor would see them, beside the clean ones."""
+    """Versions of the views as a sensor would record them. The clean views stay."""
 
     sources: list[str] = Field(
         [VIEWS],
         min_length=1,
-        description=f"Names of reprojections; `{VIEWS}` stands for the rendered views. The new "
-        "folders are sensor, and perspective_sensor for perspective.",
+        description=f"Names of reprojections to which the sensor is applied. `{VIEWS}` stands for "
+        "the rendered views. Its folder is sensor, and that of perspective is perspective_sensor.",
     )
     rigs: list[str] | None = Field(
-        None, min_length=1, description="The rigs whose views are developed. Without it, all."
+        None,
+        min_length=1,
+        description="Rigs to whose views the sensor is applied. Without this key, all rigs.",
     )
     brackets: (
         Annotated[list[Stops], AfterValidator(_increasing), Field(min_length=2, max_length=32)]
         | None
     ) = Field(
         None,
-        description="An exposure bracket for each value, with clipping masks and weights. Their "
-        "folders are sensor_ev-2 and so on.",
+        description="Exposure brackets: each value makes a folder of images (such as sensor_ev-2) "
+        "with clipping masks and weights.",
         json_schema_extra={"unit": "stops"},
     )
 

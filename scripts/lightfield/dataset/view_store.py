@@ -175,7 +175,7 @@ class ViewStore:
             raise
         except ImportError as error:
             raise UserError(
-                f"{self.url}: needs {error.name}: make .venv/complete-with-storage"
+                f"{self.url}: needs the package {error.name}; run make .venv/complete-with-storage"
             ) from None
         except Exception as error:
             raise UserError(f"{self.url}: the view store cannot be used: {error}") from None

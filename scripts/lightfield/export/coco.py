@@ -31,8 +31,8 @@ def export(source: SourceDataset, settings: Coco, folder: Path) -> None:
     available = {each.name for each in source.lightfield.passes}
     if "object" not in available:
         raise UserError(
-            f"{source.lightfield.path}: passes: lack object, from which the boxes come; give "
-            "render.passes, and passes of the reprojection, the pass object"
+            f"{source.lightfield.path}: passes: lack object, from which the boxes are computed; "
+            "add it to render.passes, and to passes of the reprojection"
         )
     kind = "instance" if "instance" in available else "object"
     names = {number: name for name, number in _names(source, kind).items()}

@@ -96,7 +96,7 @@ def model(source: SourceDataset, count: int) -> "Model":
     )
     visible = np.flatnonzero(view_counts)
     seen_once = int((view_counts == 1).sum())
-    print(f"{len(visible):,} points; one view alone sees {seen_once:,} of them")
+    print(f"{len(visible):,} points; only one view sees {seen_once:,} of them")
     return Model(source, points, seen_points, visible)
 
 

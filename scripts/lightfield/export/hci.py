@@ -72,7 +72,7 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
     if not regular:
         raise UserError(
             f"{lightfield.path}: frames: are not a grid of cameras that look in parallel, "
-            "as far apart across as down, which this layout is for"
+            "with equal distances across and down; this layout needs one"
         )
     order = np.lexsort((places[:, 0].round(9), -places[:, 1].round(9)))
     return [views[index] for index in order], len(x), float(steps.mean())

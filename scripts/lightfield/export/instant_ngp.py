@@ -72,7 +72,7 @@ def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
     if arguments.settings:
         return read_settings(ExportSettings[InstantNgp], arguments.settings)
     if arguments.scale is None and arguments.offset is not None:
-        raise UserError("--offset: goes with --scale; without it both are fitted")
+        raise UserError("--offset: needs --scale; without --scale, both are fitted")
     corners = arguments.render_aabb
     options = {
         "sources": [VIEWS],
@@ -217,7 +217,7 @@ class _Writer:
             progress.done()
         if missing:
             print(
-                f"warning: {len(missing)} images are not there, the first is {missing[0]}",
+                f"warning: {len(missing)} images are missing, the first is {missing[0]}",
                 file=sys.stderr,
             )
         return frames

@@ -94,8 +94,8 @@ def _write_glb(path: Path, surface: Surface) -> None:
     size = 12 + 8 + len(text) + 8 + length
     if size > _MOST_GLB_BYTES:
         raise UserError(
-            f"mesh.formats: a GLB ends at 4.3 GB, and the scene takes {size / 1e9:.1f} GB; "
-            "write ply only, or lower the scene's detail"
+            f"mesh.formats: a GLB can hold at most 4.3 GB, and the scene needs {size / 1e9:.1f} "
+            "GB; write ply only, or lower the scene's detail"
         )
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.write(struct.pack("<4sII", b"glTF", 2, size))
@@ -212,8 +212,9 @@ def _write_ply(path: Path, surface: Surface) -> None:
     face_count = sum(len(surface.meshes[placed.mesh].triangles) for placed in surface.placed)
     if sum(vertex_counts) > _MOST_PLY_VERTICES:
         raise UserError(
-            f"mesh.formats: a PLY ends at {_MOST_PLY_VERTICES:,} vertices, and the scene with all "
-            f"instances has {sum(vertex_counts):,}; write glb only, where instances share a mesh"
+            f"mesh.formats: a PLY can hold at most {_MOST_PLY_VERTICES:,} vertices, and the scene "
+            f"with all instances has {sum(vertex_counts):,}; write glb only, where "
+            "instances share a mesh"
         )
     header = (
         "ply\nformat binary_little_endian 1.0\n"

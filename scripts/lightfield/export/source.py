@@ -67,7 +67,9 @@ class SourceDataset:
         for rig, folder in self.beside.items():
             other = LightField.read(folder / name / NAME)
             if other.lens != lightfield.lens:
-                raise UserError(f"{other.path}: camera: is another than that of {lightfield.path}")
+                raise UserError(
+                    f"{other.path}: camera: is not the same as that of {lightfield.path}"
+                )
             views += [replace(view, name=f"{rig}_{view.name}") for view in other.views]
         return lightfield.changed(views=views)
 

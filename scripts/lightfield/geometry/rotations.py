@@ -69,7 +69,9 @@ def looking_at(positions: Floats, target: Floats) -> Floats:
     back = positions - target
     length = np.linalg.norm(back, axis=-1, keepdims=True)
     if not (length > 0).all():
-        raise UserError(f"look_at: a camera stands at {target.tolist()}, so it cannot look there")
+        raise UserError(
+            f"look_at: a camera is at {target.tolist()} itself, so it cannot look at that point"
+        )
     back = back / length
     right = np.cross([0.0, 0.0, 1.0], back)
     upright = np.linalg.norm(right, axis=-1) <= 1e-4

@@ -51,15 +51,17 @@ class Stage:
 class FullSize(Settings):
     """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
 
-    views: AtLeastOne = Field(description="Views of the rig.", json_schema_extra={"unit": "views"})
+    views: AtLeastOne = Field(
+        description="Number of views of the rig.", json_schema_extra={"unit": "views"}
+    )
     resolution: list[AtLeastOne] = Field(
         min_length=2,
         max_length=2,
-        description="Width and height.",
+        description="Width and height of a view.",
         json_schema_extra={"unit": "pixels"},
     )
     samples: AtLeastOne | Literal["file"] | None = Field(
-        None, description="Paths for each pixel.", json_schema_extra={"unit": "paths"}
+        None, description="Number of paths for each pixel.", json_schema_extra={"unit": "paths"}
     )
     denoise: bool | None = Field(None, description="Whether views are denoised.")
 
@@ -67,9 +69,11 @@ class FullSize(Settings):
 class CostSettings(Settings):
     """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
 
-    energy: Energy = Field(description="The key `energy` of config.yaml.")
-    full: FullSize = Field(description="The dataset at full size.")
-    reprojections: list[str] = Field([], description="Names of the reprojections.")
+    energy: Energy = Field(description="The block `energy` of config.yaml.")
+    full: FullSize = Field(
+        description="Size of the dataset at full size, for which costs are estimated."
+    )
+    reprojections: list[str] = Field([], description="Names of the dataset's reprojections.")
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,11 @@ SILHOUETTES = 1e-3
 class GpuCheckSettings(Settings):
     """The settings of scripts/gpu_check.py."""
 
-    full: dict[str, FullSize] = Field({}, description="Datasets at full size, by name.")
+    full: dict[str, FullSize] = Field(
+        {},
+        description="Sizes of the datasets at full size, whose hours are estimated, by their "
+        "names.",
+    )
 
 
 @dataclass(frozen=True)

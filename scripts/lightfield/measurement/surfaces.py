@@ -56,7 +56,9 @@ class Surface:
 def read_surface(path: Path) -> Surface:
     """Read a mesh or a point cloud. Raises `UserError` if it is neither, or not finite."""
     if path.suffix.lower() not in SUFFIXES:
-        raise UserError(f"{path}: is no surface; must end in {', '.join(SUFFIXES)}")
+        raise UserError(
+            f"{path}: is not a surface file; its name must end in {', '.join(SUFFIXES)}"
+        )
     with reading(path, "surface"):
         content = trimesh.load_scene(path, process=False)
         geometries = content.dump()

@@ -9,22 +9,36 @@ from lightfield.measurement.sampling import WINDOW_SIZE
 
 def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
     """Add the arguments of a program that renders windows. ``lightfield`` is a help text."""
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
+    parser.add_argument("--blend", required=True, type=Path, help="the scene's .blend")
+    parser.add_argument(
+        "--inventory",
+        required=True,
+        type=Path,
+        help="JSON that scripts/inventory.py wrote for the scene",
+    )
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
     parser.add_argument(
         "--size",
         type=positive,
         default=WINDOW_SIZE,
-        help="pixels of a window's sides (default: %(default)s)",
+        help="width and height of each rendered window, in pixels (default: %(default)s)",
     )
-    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
+    parser.add_argument(
+        "--device", default="auto", help="device on which Cycles renders (default: auto)"
+    )
     parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
-    parser.add_argument("--cache", required=True, type=Path, help="folder that keeps the renders")
+    parser.add_argument(
+        "--cache",
+        required=True,
+        type=Path,
+        help="folder that keeps finished renders, so that an interrupted run can continue",
+    )
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Add the argument that `trials.read_arguments` reads beside those of `add_arguments`."""
     parser.add_argument(
-        "--calibration", type=Path, help="the file of scripts/calibrate.py for a target error"
+        "--calibration",
+        type=Path,
+        help="JSON that scripts/calibrate.py wrote, for a scene with target_error",
     )

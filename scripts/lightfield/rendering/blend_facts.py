@@ -95,8 +95,9 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
         matrices[str(frame)] = [list(row) for row in camera.matrix_world.normalized()]
         if lenses[-1] != lenses[0]:
             raise UserError(
-                f"the camera {names[-1]} has another lens at frame {frame} than at frame "
-                f"{min(frames)}, and all views of a dataset have one lens; choose frames with one"
+                f"the camera {names[-1]} has a different lens at frame {frame} than at frame "
+                f"{min(frames)}, and all views of a dataset share one lens; choose frames with "
+                "the same lens"
             )
     return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": matrices}
 

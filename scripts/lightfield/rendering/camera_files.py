@@ -29,7 +29,7 @@ def write_places(
     clearance.show_what_is_rendered()
     places = clearance.free_places(rig)
     write_json(output, {"box": rig.box, "places": places.tolist()})
-    print(f"{len(places)} cameras, each with {rig.clearance:g} m around it")
+    print(f"{len(places)} cameras, each with {rig.clearance:g} m of free space around it")
 
 
 def write_clearance(blend: Path, path: Path, inventory: Path | None, output: Path) -> None:

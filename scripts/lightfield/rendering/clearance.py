@@ -178,8 +178,8 @@ def free_places(rig: Random) -> Floats:
         if free.all():
             return places
     raise UserError(
-        f"{(~free).sum()} of {rig.count} cameras find no place with {rig.clearance:g} m around it "
-        f"in {_TRIES} tries; make clearance smaller, or the box larger (size in the scene YAML)"
+        f"{(~free).sum()} of {rig.count} cameras found no place with {rig.clearance:g} m of free "
+        f"space in {_TRIES} tries; make clearance smaller, or size larger, in the scene YAML"
     )
 
 

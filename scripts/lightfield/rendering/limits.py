@@ -53,7 +53,7 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
     # Filter Glossy lets such light through, but dims it.
     if glass and small and not bpy.context.scene.cycles.blur_glossy:
         yield (
-            f"{', '.join(small[:8])}: lights without a size, whose light comes through no glass "
+            f"{', '.join(small[:8])}: lights without a size, which do not shine through glass "
             f"({', '.join(glass[:8])}): give them an angle or a radius"
         )
 

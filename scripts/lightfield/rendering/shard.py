@@ -218,8 +218,8 @@ def _render_views(
         seconds = rendered.colour.render_seconds
         if is_suspect(seconds, earlier_seconds):
             print(
-                f"warning: {folder}/{view.name}.exr took {seconds:.3g} s, and others "
-                f"some {median(earlier_seconds):.3g} s: look at it",
+                f"warning: {folder}/{view.name}.exr took {seconds:.3g} s, but other views "
+                f"about {median(earlier_seconds):.3g} s; check this view",
                 file=sys.stderr,
             )
         earlier_seconds.append(seconds)

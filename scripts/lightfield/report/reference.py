@@ -86,8 +86,8 @@ LENS_MODELS: list[type[BaseModel]] = [
 KEY_PAGES: dict[str, Page] = {
     "config-keys.md": Page(
         "The keys of config.yaml",
-        "`config.yaml` says which scenes to build, how well, and where. The command line can "
-        "replace each key: `snakemake --config preset=full`.",
+        "`config.yaml` says which scenes to build, at which quality, and into which folders. The "
+        "command line can replace each key: `snakemake --config preset=full`.",
         [
             Section("config.yaml", config.Configuration),
             Section("presets", config.Preset),
@@ -96,8 +96,9 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "scene-keys.md": Page(
         "The keys of a scene YAML",
-        "A scene YAML in `configs/scenes/` describes one scene and everything that is made of "
-        "it. Only `scene` is always required. The other blocks have pages of their own.",
+        "A scene YAML in `configs/scenes/` describes one scene and everything that is made from "
+        "it. Only `scene` is always required. Large blocks, such as `render`, have pages of their "
+        "own.",
         [
             Section("A scene YAML", config.Scene),
             Section("scene", config.SceneSource, config.ModelOptions),
@@ -134,8 +135,8 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "render-keys.md": Page(
         "The keys of `render`",
-        "`render` in a scene YAML says how Cycles renders the views. Give either `samples` or "
-        "`target_error`.",
+        "`render` in a scene YAML says how Cycles renders the views. Either `samples` or "
+        "`target_error` is required.",
         [
             Section("render", config.Render),
             Section("render: target_error", config.TargetError),
@@ -156,7 +157,9 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "rig-type-keys.md": Page(
         "The keys of each type of rig",
-        "The key `type` of a rig says which of these tables holds its keys. All rigs also have "
+        "The key `type` of a rig is the title of one of these tables, which lists its keys. All "
+        "rigs "
+        "also have "
         "[the shared keys](rig-keys.md). [Rigs](rigs.md) shows where each type places its "
         "cameras.",
         [
@@ -166,15 +169,16 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "camera-keys.md": Page(
         "The keys of a camera",
-        "`camera` describes a lens and its image, of a rig or of a reprojection. Its key "
-        "`lens` says which of these tables holds its keys. [Lenses](lenses.md) has their "
-        "equations.",
+        "`camera` describes the lens and the image of a rig or of a reprojection. Its key `lens` "
+        "is "
+        "the title of one of these tables, which lists the other keys. [Lenses](lenses.md) has "
+        "the equations.",
         [Section(_literal(model, "lens"), model) for model in LENS_MODELS],
     ),
     "reprojection-keys.md": Page(
         "The keys of a reprojection",
-        "An entry of `reprojections` in a scene YAML makes the same views again: through "
-        "another lens, or as other files.",
+        "An entry of `reprojections` in a scene YAML makes versions of the views: through another "
+        "lens, or as other files. Its name is the name of their folder.",
         [Section("A reprojection", config.Reprojection)],
     ),
     "sensor-keys.md": Page(
@@ -193,9 +197,9 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "export-keys.md": Page(
         "The keys of exports",
-        "An entry of `exports` in a scene YAML writes files for one consumer. "
-        "[Export formats](export-formats.md) says what each consumer takes. All but `instant_ngp` "
-        "and `poses_csv` are exports of pictures, and have their keys, too.",
+        "An entry of `exports` in a scene YAML writes files in one format. "
+        "[Export formats](export-formats.md) says which programs read each format. All but "
+        "`instant_ngp` and `poses_csv` are exports of pictures, so they have those keys, too.",
         [
             Section("exports", exports.Exports),
             Section("All exports", exports.Export),
@@ -209,15 +213,16 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "sequence-export-keys.md": Page(
         "The keys of exports of a sequence",
-        "These entries of `exports` in a scene YAML write one export of all frames of a rig "
-        "with `frames`. [How to train on a sequence](../how-to/train-on-a-sequence.md).",
+        "These entries of `exports` in a scene YAML need a rig with `frames`. Each writes one "
+        "export "
+        "of all frames. [Train on a sequence](../how-to/train-on-a-sequence.md) shows how.",
         [Section(name, exports.settings_of(name)) for name in SEQUENCE_EXPORTS],
     ),
     "job-keys.md": Page(
         "The keys of the programs' settings files",
         "A settings file is a JSON with everything that one job takes from the scene YAML and "
-        "config.yaml. The plan writes the file, and the program reads it with `--settings`. "
-        "You can write one by hand, too.",
+        "config.yaml. Snakemake writes these files in its plan, and the programs read them with "
+        "`--settings`. You can also write one by hand.",
         [
             Section("build_scene.py", job_settings.BuildSettings),
             Section("make_lightfield.py", LightfieldSettings),
@@ -236,8 +241,8 @@ KEY_PAGES: dict[str, Page] = {
     ),
     "measurement-keys.md": Page(
         "The keys of the settings files of measurements",
-        "These programs measure or estimate something, and read a "
-        "[settings file](job-keys.md) like the others.",
+        "These programs measure or estimate something. They read a "
+        "[settings file](job-keys.md) like the other programs.",
         [
             Section("synthesis_quality.py", job_settings.SynthesisSettings),
             Section("costs.py", CostSettings),
@@ -272,22 +277,22 @@ PROGRAM_PAGES = {
     ),
     "programs-reproject.md": (
         "Programs that reproject",
-        "These programs resample finished views through another lens.",
+        "These programs make views through another lens from finished views.",
         ["lens_map", "reproject"],
     ),
     "programs-export.md": (
         "Programs that export",
-        "These programs make other files of finished views.",
+        "These programs write finished views in other formats, and compute more from them.",
         ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     ),
     "programs-publish.md": (
         "Programs that publish and fetch",
-        "These programs pack finished datasets, or bring them here.",
+        "These programs pack finished datasets, or copy them from a storage.",
         ["publish_checksums", "package", "publish", "take_dataset", "take_views"],
     ),
     "programs-check.md": (
         "Programs that check",
-        "These programs check files, and say how far a build is.",
+        "These programs check files, or show the progress of a build.",
         ["validate", "validate_sequence", "verify", "status"],
     ),
     "programs-report.md": (
@@ -604,7 +609,10 @@ def _is_inside(value: Any) -> bool:
 def page_of_programs(title: str, text: str, names: list[str]) -> str:
     """Return a page of programs."""
     lines = [f"# {title}", "", NOTE, ""]
-    lines += [f"{text} Run each as `python scripts/NAME.py`; the rules do the same.", ""]
+    lines += [
+        f"{text} Snakemake runs them. To run one by hand: `python scripts/NAME.py`.",
+        "",
+    ]
     for name in names:
         lines += section_of_program(name)
     return "\n".join(lines)

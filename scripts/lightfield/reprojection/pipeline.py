@@ -49,7 +49,7 @@ def run(job: Job) -> None:
     if failed:
         # The run's report quotes the last line of the log.
         raise UserError(
-            f"{len(failed)} of {len(views)} views could not be reprojected, as {min(failed)}"
+            f"{len(failed)} of {len(views)} views could not be reprojected, such as {min(failed)}"
         )
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 

@@ -42,7 +42,7 @@ def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:
     """
     settings = checked(_SETTINGS, camera, "camera")
     if isinstance(settings, FileSettings):
-        raise UserError("camera: lens: is file, which only goes with a rig of type blend_camera")
+        raise UserError("camera: lens: is file, which is only for a rig of type blend_camera")
     return settings.make()
 
 

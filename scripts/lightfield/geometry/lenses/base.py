@@ -46,7 +46,7 @@ Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]
 FocalLength = Annotated[
-    Millimetres, Field(description="Focal length.", json_schema_extra={"unit": "mm"})
+    Millimetres, Field(description="Focal length of the lens.", json_schema_extra={"unit": "mm"})
 ]
 
 
@@ -62,18 +62,20 @@ class LensSettings(Settings):
 
     lens: str
     resolution: Annotated[tuple[Pixels, Pixels], as_list(2)] = Field(
-        description="Width and height.", json_schema_extra={"unit": "pixels"}
+        description="Width and height of the image.", json_schema_extra={"unit": "pixels"}
     )
     sensor_size: Millimetres | Annotated[tuple[Millimetres, Millimetres], as_list(2)] | None = (
         Field(
             None,
-            description="The sensor's width, or width and height. Without it, 36 wide.",
+            description="Width of the sensor, or its width and height. Without this key, it is 36 "
+            "mm wide, and pixels are square.",
             json_schema_extra={"unit": "mm"},
         )
     )
     principal_point: Annotated[tuple[Place, Place], as_list(2)] | None = Field(
         None,
-        description="The optical axis in the image. Without it, the centre.",
+        description="Where the optical axis meets the image, to the right and down from its top "
+        "left corner. Without this key, it is the image's centre.",
         json_schema_extra={"unit": "pixels"},
     )
 
@@ -377,7 +379,8 @@ def fov_up_to(largest: float, default: Any = ...) -> Any:
         default,
         gt=0,
         le=largest,
-        description="Full field of view.",
+        description="Full field of view: the angle from one edge of the image circle to the "
+        "opposite edge.",
         json_schema_extra={"unit": "degrees"},
     )
 

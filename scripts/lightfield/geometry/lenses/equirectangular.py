@@ -22,12 +22,12 @@ class EquirectangularSettings(LensSettings):
     lens: Literal["equirectangular"]
     longitude: Annotated[tuple[Longitude, Longitude], as_list(2)] = Field(
         (-180, 180),
-        description="Smallest and largest longitude.",
+        description="Longitudes of the image's left and right edges. 0 is straight ahead.",
         json_schema_extra={"unit": "degrees"},
     )
     latitude: Annotated[tuple[Latitude, Latitude], as_list(2)] = Field(
         (-90, 90),
-        description="Smallest and largest latitude.",
+        description="Latitudes of the image's bottom and top edges. 0 is straight ahead.",
         json_schema_extra={"unit": "degrees"},
     )
 

@@ -30,7 +30,8 @@ class KannalaBrandtSettings(FisheyeSettings):
     lens: Literal["kannala_brandt"]
     focal_length: FocalLength
     coefficients: Annotated[tuple[float, float, float, float], as_list(4)] = Field(
-        description="k1 to k4 of the radius."
+        description="The coefficients k1 to k4 of the polynomial that gives the radius from the "
+        "angle."
     )
     fov: float = fov_up_to(360, default=360)
 

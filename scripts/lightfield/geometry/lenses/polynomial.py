@@ -27,7 +27,9 @@ class PolynomialSettings(FisheyeSettings):
 
     lens: Literal["polynomial"]
     coefficients: Annotated[tuple[float, float, float, float, float], as_list(5)] = Field(
-        description="k0 to k4 of the angle.", json_schema_extra={"unit": "radians/mm^i"}
+        description="The coefficients k0 to k4 of the polynomial that gives the angle from the "
+        "radius.",
+        json_schema_extra={"unit": "radians/mm^i"},
     )
     fov: float = fov_up_to(360)
 

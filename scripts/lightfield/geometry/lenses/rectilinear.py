@@ -32,7 +32,9 @@ class RectilinearSettings(LensSettings):
         json_schema_extra={"unit": "degrees"},
     )
     focal_length: FocalLength | None = Field(
-        None, description="Focal length, instead of fov.", json_schema_extra={"unit": "mm"}
+        None,
+        description="Focal length of the lens. Give either this or fov.",
+        json_schema_extra={"unit": "mm"},
     )
 
     def optics(self) -> dict[str, Any]:

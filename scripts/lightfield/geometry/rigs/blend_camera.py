@@ -14,7 +14,7 @@ from lightfield.geometry.rotations import Floats, matrix_to_euler
 
 
 class BlendCamera(Rig):
-    """One view for each of the ``frames``, of a scene that stands still.
+    """The views of the .blend's own camera, one for each of ``frames``. The scene does not move.
 
     Three fields are not for scene YAMLs. ``file`` is the inventory of the .blend. ``rendered`` is
     the rendered frame, and None means the .blend's own. ``max_views`` is the limit of a preset.
@@ -26,8 +26,9 @@ class BlendCamera(Rig):
     type: Literal["blend_camera"]
     frames: Frames | None = Field(
         None,
-        description="The camera's path: one view from its place at each of these frames. The scene "
-        "stays at scene.frame. Without it, one view from the camera's place at scene.frame.",
+        description="Frames at which the pose of the .blend's camera is taken. Each frame gives "
+        "one view, and the scene itself stays at scene.frame. Without this key, there is one view, "
+        "with the camera's pose at scene.frame.",
     )
     file: SkipJsonSchema[str | None] = None
     rendered: SkipJsonSchema[int | None] = None

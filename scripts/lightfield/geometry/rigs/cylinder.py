@@ -19,7 +19,7 @@ class Cylinder(Grid):
 
     type: Literal["cylinder"]
     cameras: Annotated[tuple[Count, Count], as_list(2)] = Field(
-        description="Cameras round it and up."
+        description="Number of cameras around each ring, and number of rings from bottom to top."
     )
 
     def unit_poses(self) -> UnitPoses:

@@ -78,7 +78,7 @@ class Box(Grid):
     unit_volume = 1.0
 
     cameras: Annotated[tuple[Count, Count, Count], as_list(3)] = Field(
-        description="Cameras along x, y and z."
+        description="Number of cameras along x, y and z."
     )
 
     def unit_outline(self) -> list[Floats]:

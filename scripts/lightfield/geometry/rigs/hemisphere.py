@@ -16,11 +16,14 @@ class Hemisphere(Orbit):
     type: Literal["hemisphere"]
     elevation: Elevations = Field(
         (0.0, 90.0),
-        description="Elevation of the lowest and the highest camera.",
+        description="Elevation of the lowest and the highest camera above the horizontal, as seen "
+        "from the middle.",
         json_schema_extra={"unit": "degrees"},
     )
     pattern: Literal["fibonacci", "rings"] = Field(
-        "fibonacci", description="A spiral by the golden angle, or rings of equal spacing."
+        "fibonacci",
+        description="How the cameras are spread. fibonacci: a spiral with the golden angle between "
+        "cameras. rings: rings with equal distances.",
     )
 
     def directions(self) -> Floats:

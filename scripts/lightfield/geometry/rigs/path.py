@@ -16,16 +16,18 @@ _PIECES = 2000
 
 
 class Key(Settings):
-    """A pose on a path."""
+    """A pose through which the path passes."""
 
     position: Vector = Field(
-        description="Where the path goes through.", json_schema_extra={"unit": "m"}
+        description="A point that the path passes through.", json_schema_extra={"unit": "m"}
     )
     rotation: Vector | None = Field(
-        None, description="XYZ Euler angles.", json_schema_extra={"unit": "degrees"}
+        None,
+        description="Rotation of the camera at this point, as XYZ Euler angles.",
+        json_schema_extra={"unit": "degrees"},
     )
     quaternion_wxyz: Annotated[tuple[float, float, float, float], as_list(4)] | None = Field(
-        None, description="The rotation as a quaternion, w first; instead of angles."
+        None, description="Rotation as a quaternion, w first. Give either this or rotation."
     )
 
     @model_validator(mode="after")
@@ -42,16 +44,18 @@ class Key(Settings):
 
 
 class Path(CountedRig):
-    """Keys without rotations let the cameras look along the path, upright."""
+    """If the keys have no rotations, the cameras look along the path, and are upright."""
 
     shape = "PLANE"
     is_loose = True
 
     type: Literal["path"]
     keys: list[Key] = Field(
-        min_length=2, max_length=1000, description="Poses that the path goes through, in order."
+        min_length=2, max_length=1000, description="Poses that the path passes through, in order."
     )
-    closed: bool = Field(False, description="Go on from the last key to the first.")
+    closed: bool = Field(
+        False, description="Whether the path continues from the last key back to the first."
+    )
 
     @model_validator(mode="after")
     def _is_a_path(self) -> Self:
@@ -59,7 +63,7 @@ class Path(CountedRig):
             raise ValueError("keys: must all have a rotation, or none of them")
         steps = np.diff(self._places(), axis=0) * self.sides
         if (np.linalg.norm(steps, axis=-1) < 1e-9).any():
-            raise ValueError("keys: two in a row are at one place")
+            raise ValueError("keys: two consecutive keys have the same position")
         return self
 
     def is_at_one_place(self) -> bool:

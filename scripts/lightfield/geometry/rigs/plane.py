@@ -18,7 +18,7 @@ class Plane(Grid):
 
     type: Literal["plane"]
     cameras: Annotated[tuple[Count, Count], as_list(2)] = Field(
-        description="Cameras along x and z."
+        description="Number of cameras along x and along z."
     )
 
     def unit_poses(self) -> UnitPoses:

@@ -81,8 +81,9 @@ class Poses(Rig):
     type: Literal["poses"]
     file: str = Field(
         pattern=pattern(r"\.(json|csv|txt|bin)$", "a path that ends in .json, .csv, .txt or .bin"),
-        description="A lightfield.json; a CSV of name,x,y,z,rx,ry,rz in metres and radians, or of "
-        "name,x,y,z,qw,qx,qy,qz; a transforms.json; COLMAP's images.txt or images.bin.",
+        description="Path of the file with the poses: a lightfield.json, a transforms.json, "
+        "COLMAP's images.txt or images.bin, or a CSV. The CSV's header is name,x,y,z,rx,ry,rz "
+        "(metres and radians) or name,x,y,z,qw,qx,qy,qz.",
     )
     max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
@@ -258,7 +259,7 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         applied = np.eye(4)
         applied[:3] = read_numbers(key, content[key], (3, 4))
         if abs(np.linalg.det(applied)) < 1e-12:
-            raise UserError(f"{key}: cannot be undone")
+            raise UserError(f"{key}: cannot be inverted")
         undo = np.linalg.inv(applied)
     frames = []
     for index, frame in enumerate(content["frames"]):

@@ -18,7 +18,7 @@ BOX = {"count", "seed", "clearance", "size", "center", "rotation"}
 
 
 class Random(CountedRig):
-    """Each view tries its own sequence of places, so a thinned rig has the full rig's first views.
+    """Cameras at random places in free space, with at least ``clearance`` around them.
 
     ``file`` is not for scene YAMLs: scripts/free_places.py writes the free places to it. Without
     it, the poses are those of an empty scene.
@@ -28,12 +28,17 @@ class Random(CountedRig):
     unit_volume = 1.0
 
     type: Literal["random"]
-    seed: int = Field(0, ge=0, le=2**31 - 1, description="Another seed gives other places.")
+    seed: int = Field(
+        0,
+        ge=0,
+        le=2**31 - 1,
+        description="Seed of the random places. Another seed gives other places.",
+    )
     clearance: float = Field(
         0.2,
         gt=0,
         le=1000,
-        description="Least distance to the nearest surface.",
+        description="Smallest allowed distance from a camera to the nearest surface.",
         json_schema_extra={"unit": "m"},
     )
     file: SkipJsonSchema[str | None] = None

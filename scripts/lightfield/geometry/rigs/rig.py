@@ -80,9 +80,13 @@ class UnitPoses:
 class Frames(Settings):
     """A range of frames of an animation."""
 
-    first: Frame = Field(description="The first frame.")
-    last: Frame = Field(description="The last frame.")
-    step: int = Field(1, ge=1, description="Render every n-th frame.")
+    first: Frame = Field(description="First frame of the range.")
+    last: Frame = Field(
+        description="Last frame of the range, which is included if the steps reach it."
+    )
+    step: int = Field(
+        1, ge=1, description="Distance from one frame to the next: 2 takes every second frame."
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -111,13 +115,14 @@ class Stereo(Settings):
     distance: float = Field(
         gt=0,
         le=1000,
-        description="Distance between the eyes, on both sides of the position.",
+        description="Distance between the two cameras, which are on both sides of the position.",
         json_schema_extra={"unit": "m"},
     )
     omnidirectional: bool = Field(
         False,
-        description="For panoramas: each eye goes round the position and looks along its circle. "
-        "So the pair is right to all sides. Such a view has no centre.",
+        description="For panoramas: each eye moves on a circle around the position, so that the "
+        "stereo is correct in all directions. Such a view has no single centre, so it cannot have "
+        "depth, reprojections or exports.",
     )
 
 
@@ -126,7 +131,7 @@ def _require_camera(schema: dict[str, Any]) -> None:
 
 
 class Rig(Settings):
-    """The keys that all rigs share. Each type of rig adds its own keys, and places the cameras.
+    """The keys that all rigs share. Each type of rig adds its own keys.
 
     ``shape`` is the type of rig that lightfield.json names: the nearest of SILVR's four.
     """
@@ -141,41 +146,53 @@ class Rig(Settings):
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
 
-    type: str = Field(description="The type, which places the cameras.")
+    type: str = Field(description="Type of the rig, which says how the cameras are placed.")
     size: Size = Field(
         1,
-        description="Size along every axis, or along x, y and z.",
+        description="Size of the rig: one number for all axes, or one each for x, y and z.",
         json_schema_extra={"unit": "m"},
     )
     center: Vector = Field(
-        (0, 0, 0), description="The rig's middle.", json_schema_extra={"unit": "m"}
+        (0, 0, 0),
+        description="Position of the rig's middle in the world.",
+        json_schema_extra={"unit": "m"},
     )
     rotation: Vector = Field(
         (0, 0, 0),
-        description="Rotation of the whole rig: XYZ Euler angles.",
+        description="Rotation of the whole rig around its middle, as XYZ Euler angles.",
         json_schema_extra={"unit": "degrees"},
     )
-    face_inside: bool = Field(False, description="Turn every camera round.")
+    face_inside: bool = Field(
+        False,
+        description="Turn each camera by 180° about its own up axis, so that cameras that look "
+        "outward look inward.",
+    )
     look_at: Vector | None = Field(
         None,
-        description="The point that every camera looks at, in world coordinates. It replaces the "
-        "rig's own directions.",
+        description="Point in world coordinates that all cameras look at, upright. Without this "
+        "key, they look where the rig's type points them.",
         json_schema_extra={"unit": "m"},
     )
-    cube_map: bool = Field(False, description="Six 90 degree views at each position.")
-    stereo: Stereo | None = Field(None, description="A pair of views at each position.")
+    cube_map: bool = Field(
+        False, description="Render six views of 90° at each position, as the faces of a cube."
+    )
+    stereo: Stereo | None = Field(
+        None, description="Render a stereo pair of views at each position."
+    )
     frames: Frames | None = Field(
         None,
-        description="A sequence: each of these frames of the animation is a dataset of its own.",
+        description="Render a sequence. Each of these frames of the animation becomes a dataset of "
+        "its own.",
     )
     split: Split | None = Field(
         None,
-        description="Which views train, validate and test. odd: odd sequence numbers test. train, "
-        "validation or test: all views do. A mapping: every n-th position tests, or views by name.",
+        description="Which views are for training, validation and test. odd: views with odd "
+        "sequence numbers are test views. train, validation or test: all views are. A mapping "
+        "selects every n-th position, or views by name.",
     )
     # Every rig of a scene YAML has a camera. Code that needs only the places may leave it out.
     camera: CameraSettings = Field(  # type: ignore[assignment]
-        None, description="The lens and image."
+        None, description="Lens and image of each camera."
     )
 
     @model_validator(mode="after")
@@ -356,7 +373,9 @@ def ball_outline() -> list[Floats]:
 class CountedRig(Rig):
     """A rig of any number of cameras. With fewer cameras it is still a rig of its type."""
 
-    count: int = Field(ge=1, le=100000, description="Number of cameras.")
+    count: int = Field(
+        ge=1, le=100000, description="Number of cameras, or of positions with cube_map or stereo."
+    )
 
     @property
     def positions(self) -> int:

@@ -13,7 +13,9 @@ from lightfield.geometry.rotations import Floats
 class Ring(Orbit):
     type: Literal["ring"]
     elevation: Elevation = Field(
-        0.0, description="Elevation of every camera.", json_schema_extra={"unit": "degrees"}
+        0.0,
+        description="Elevation of all cameras above the horizontal, as seen from the middle.",
+        json_schema_extra={"unit": "degrees"},
     )
 
     def directions(self) -> Floats:

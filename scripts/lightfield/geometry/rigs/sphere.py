@@ -24,7 +24,8 @@ class Sphere(Rig):
     subdivisions: int = Field(
         ge=1,
         le=7,
-        description="Subdivisions of the icosphere: 1 is 12 cameras, 2 is 42, 3 is 162, 4 is 642.",
+        description="Subdivisions of the icosphere whose vertices are the cameras: 1 gives 12 "
+        "cameras, 2 gives 42, 3 gives 162, and 4 gives 642.",
     )
 
     @property

@@ -15,12 +15,13 @@ class Spiral(Orbit):
         2.0,
         gt=0,
         le=1000,
-        description="Times round the object.",
+        description="How many times the spiral goes around the object.",
         json_schema_extra={"unit": "turns"},
     )
     elevation: Elevations = Field(
         (0.0, 60.0),
-        description="Elevation of the first and the last camera.",
+        description="Elevation of the first and the last camera above the horizontal, as seen from "
+        "the middle.",
         json_schema_extra={"unit": "degrees"},
     )
 

@@ -11,11 +11,13 @@ PARTS: tuple[Part, ...] = get_args(Part)
 
 
 class Chosen(Settings):
-    """The views at each n-th position, or the views of given names. All others train."""
+    """Give `every`, or names of views. All other views are for training."""
 
-    every: int | None = Field(None, ge=2, description="Every n-th position tests, from the first.")
-    validation: list[str] = Field([], description="Names of views.")
-    test: list[str] = Field([], description="Names of views.")
+    every: int | None = Field(
+        None, ge=2, description="The views at every n-th position, from the first, are test views."
+    )
+    validation: list[str] = Field([], description="Names of the validation views.")
+    test: list[str] = Field([], description="Names of the test views.")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
