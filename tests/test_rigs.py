@@ -676,7 +676,7 @@ def test_every_rig_can_look_at_a_point():
         (pose,) = rigs.from_settings(single).poses()
         np.testing.assert_allclose(pose.matrix()[:3, 0], (1, 0, 0), atol=1e-9)
         np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
-    with pytest.raises(UserError, match="a camera stands at"):
+    with pytest.raises(UserError, match="a camera is at"):
         rigs.from_settings({**single, "look_at": single["center"]}).poses()
     with pytest.raises(UserError, match="look_at: does not go with face_inside"):
         rigs.from_settings({**plane, "face_inside": True})
