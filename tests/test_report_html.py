@@ -169,7 +169,7 @@ def test_the_page_loads_completely_from_one_file(sphere, show):
     for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h"):
         assert part in text
     assert "±" not in text
-    for part in ("180° × 180°", "Frame\n7", "Depth that is inf\n0 %", "snakemake --cores all"):
+    for part in ("180° × 180°", "Frame\n7", "Pixels without a hit\n0 %", "snakemake --cores all"):
         assert part in text
     # The result of learning is the last figure.
     assert "24.1" in text

@@ -178,7 +178,7 @@ def facts(
     parts = [view.split for view in lightfield.views]
     counts = [f"{parts.count(part)} {part}" for part in dict.fromkeys(parts) if part]
     # Imported views have no known samples.
-    samples = f"{render['samples']} a pixel" if "samples" in render else None
+    samples = f"{render['samples']} per pixel" if "samples" in render else None
     if render.get("adaptive_threshold"):
         samples = f"up to {samples}, adaptive"
     if render.get("denoise"):
@@ -195,7 +195,7 @@ def facts(
         "Frame": str(lightfield.frame),
         "Samples": samples,
         "Depth": DEPTHS.get(lightfield.depth or "", "none"),
-        "Depth that is inf": None if missed is None else f"{100 * missed:.3g} %",
+        "Pixels without a hit": None if missed is None else f"{100 * missed:.3g} %",
         "Size of the views": page.bytes_(sum(path.stat().st_size for path in exrs)),
         "Rendered by": bpy and f"Cycles in bpy {bpy}",
     }
