@@ -24,7 +24,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import ROOT
+from lightfield.dataset.names import ROOT
 from lightfield.validation.corpus_integrity import corpus_faults
 
 NAMES = ("garden", "lone_monk", "barbershop", "rooms", "object")

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.cli import run
 from lightfield.core.files import write_csv, write_text
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 
@@ -117,7 +117,7 @@ def make_scene(task: tuple[str, str, float, Path]) -> tuple[dict[str, Any], dict
 
     from lightfield.rendering import blend_file, inventory, pruning
 
-    source = config.load_scene(scene).scene
+    source = scene_yaml.load_scene(scene).scene
     blend_file.new_scene()
     builder = importlib.import_module(f"scenes.{source.builder}")
     builder.build({**source.parameters.model_dump(), "detail": detail})

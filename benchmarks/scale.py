@@ -25,10 +25,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.files import read_json, sha256, write_json, write_text
-from lightfield.dataset import config, keys, ledger
+from lightfield.dataset import configuration, keys, ledger
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import load_datasets
+from lightfield.dataset.names import ROOT
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
@@ -147,9 +148,9 @@ def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE)
 
 def chosen() -> list[Dataset]:
     """Return the datasets that the settings choose."""
-    repository = config.read_config(config.ROOT / "config.yaml")
-    build = config.read_config(Path("config.yaml"))
-    return load_datasets(config.load_config(repository | build))
+    repository = configuration.read_config(ROOT / "config.yaml")
+    build = configuration.read_config(Path("config.yaml"))
+    return load_datasets(configuration.load_config(repository | build))
 
 
 def row(label: str, *arguments: str) -> float:
@@ -157,7 +158,7 @@ def row(label: str, *arguments: str) -> float:
 
     Memory is Snakemake's own peak, without that of its jobs.
     """
-    snakefile = str(config.ROOT / "Snakefile")
+    snakefile = str(ROOT / "Snakefile")
     command = ["snakemake", "--cores", "1", "--quiet", "all", "--snakefile", snakefile]
     with Path("output.txt").open("wb") as output:
         process = subprocess.Popen([*command, *arguments], stdout=output, stderr=output)

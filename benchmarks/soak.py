@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.files import write_json, write_text
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import ROOT
+from lightfield.dataset.names import ROOT
 from lightfield.imaging import images
 
 SCENE = """

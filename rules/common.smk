@@ -30,13 +30,9 @@ from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import (
-    accept_blend,
-    load_config,
-    load_scene,
-    scene_content,
-    scene_path,
-)
+from lightfield.dataset.blend_lock import accept_blend
+from lightfield.dataset.scene_yaml import load_scene, scene_content, scene_path
+from lightfield.dataset.configuration import load_config
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of

@@ -4,7 +4,7 @@ import resource
 
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
-from lightfield.dataset.config import SensorReprojection
+from lightfield.dataset.scene_yaml import SensorReprojection
 from lightfield.dataset.unit_costs import JOB_SECONDS, START_UP_SECONDS
 from lightfield.measurement.forecast import (
     SENSOR_PHASE,

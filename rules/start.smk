@@ -3,7 +3,7 @@ import functools
 import resource
 
 from lightfield.core import live_runs
-from lightfield.dataset.config import expected_blend
+from lightfield.dataset.blend_lock import expected_blend
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9

@@ -29,15 +29,15 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from importlib.metadata import version
 
-    from lightfield.dataset import config
+    from lightfield.dataset import blend_lock, scene_yaml
 
-    source = config.load_scene(arguments.scene).scene
+    source = scene_yaml.load_scene(arguments.scene).scene
     if source.blend is None:
         raise UserError(f"--scene {arguments.scene}: does not use a .blend")
     status = arguments.blend.stat()
     digest = sha256(arguments.blend)
-    if lock := config.expected_blend(arguments.scene, arguments.blend, digest):
-        config.record_blend(arguments.blend, digest, lock)
+    if lock := blend_lock.expected_blend(arguments.scene, arguments.blend, digest):
+        blend_lock.record_blend(arguments.blend, digest, lock)
     write_json(
         arguments.output,
         {

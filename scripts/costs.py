@@ -87,8 +87,8 @@ def main() -> None:
 
     # Only now, so that --help need not wait for these.
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.config import FILE
     from lightfield.dataset.inventory import read_inventory
+    from lightfield.dataset.scene_source import FILE
     from lightfield.measurement import costs
 
     settings = read_settings(costs.CostSettings, arguments.settings)

@@ -18,12 +18,12 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset import config, download
+    from lightfield.dataset import blend_lock, download, scene_yaml
 
-    source = config.load_scene(arguments.scene).scene
+    source = scene_yaml.load_scene(arguments.scene).scene
     if source.url is None:
         raise UserError(f"configs/scenes/{arguments.scene}.yaml: scene: is missing the key url")
-    expected, origin = config.blend_sha256(arguments.scene, source)
+    expected, origin = blend_lock.blend_sha256(arguments.scene, source)
     download.fetch(source.url, arguments.output, expected, str(origin))
 
 

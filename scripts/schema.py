@@ -1,6 +1,6 @@
 """Write the JSON schemas in configs/schema/, with which editors complete and check YAML files.
 
-They are generated from the models in lightfield/dataset/config.py. Run this after a change there.
+They are generated from the models in lightfield/dataset/. Run this after a change there.
 """
 
 import argparse

@@ -32,9 +32,9 @@ def main() -> None:
 
     from lightfield import export
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.config import FILE
     from lightfield.dataset.inventory import read_inventory
     from lightfield.dataset.job_settings import MeshSettings
+    from lightfield.dataset.scene_source import FILE
     from lightfield.export import mesh
     from lightfield.rendering import blend_file, ids, pruning
     from lightfield.rendering.surface import visible_surface

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lightfield.dataset import config
+from lightfield.dataset.names import ROOT
 
 RIGHT = {
     "scene": {"builder": "room"},
@@ -777,8 +777,8 @@ SETTINGS = [
     ),
     *({"work": value} for value in ("results", "results/smoke", "./results/../results/a")),
     *({"work": "a", "results": value} for value in ("a", "./a/", "a/b", "a/../a")),
-    {"results": str(config.ROOT / "rules")},
-    {"results": str(config.ROOT / "README.md")},
+    {"results": str(ROOT / "rules")},
+    {"results": str(ROOT / "README.md")},
     *(
         {"scenes": [value]}
         for value in ("a.b", "tables", "logs", "benchmarks", "removed", *NOT_A_NAME)

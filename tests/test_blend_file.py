@@ -12,7 +12,7 @@ from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset import config, download, names
+from lightfield.dataset import blend_lock, configuration, download, names, scene_yaml
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.dataset.presence import check_presence
 
@@ -184,7 +184,7 @@ def test_a_missing_server_is_named(tmp_path):
 def scene(tmp_path, monkeypatch):
     """Return a function that writes a scene YAML with a .blend into the library's folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
 
     def write(more="", blend="brought.blend"):
         (tmp_path / "own.yaml").write_text(BLEND_SCENE.format(blend=blend, more=more))
@@ -219,7 +219,7 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
     for part in (str(blend), sha256(blend), SUM, str(lock), "--config accept_blend=true"):
         assert part in str(caught.value)
     assert json.loads(lock.read_text())["sha256"] == SUM
-    config.accept_blend("own")
+    blend_lock.accept_blend("own")
     assert check(monkeypatch, blend)["sha256"] == sha256(blend)
     lock.write_text("{}")
     with pytest.raises(UserError, match=r"own\.lock\.json: sha256: is missing"):
@@ -241,13 +241,13 @@ def test_the_yamls_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
     with pytest.raises(UserError, match=rf"{sha256(blend)}, but .*own\.yaml says {SUM}"):
         check(monkeypatch, blend)
     with pytest.raises(UserError, match=rf"own\.yaml: scene\.sha256: is {SUM}, but .* there"):
-        config.accept_blend("own")
+        blend_lock.accept_blend("own")
 
 
 def test_a_missing_file_gives_the_page_and_the_place(scene):
     scene(more=", page: 'https://example.org/scenes'", blend="blends/mine.blend")
     content = {"scenes": ["own"], "preset": "full", "presets": {"full": {}}}
-    settings = config.load_config(content)
+    settings = configuration.load_config(content)
     with pytest.raises(UserError) as caught:
         check_presence(load_datasets(settings)[0])
     assert "there is no file blends/mine.blend" in str(caught.value)
@@ -263,7 +263,7 @@ OWN = {"scene", "description", "licence", "credit"}
 
 @pytest.mark.parametrize("name", ["garden", "lone_monk", "barbershop"])
 def test_an_original_scene_has_the_rigs_of_its_builders_scene(name):
-    built, original = (config.load_scene(scene) for scene in (name, f"{name}_original"))
+    built, original = (scene_yaml.load_scene(scene) for scene in (name, f"{name}_original"))
     assert original.scene.page.startswith("https://")
     assert original.model_dump(exclude=OWN) == built.model_dump(exclude=OWN)
 

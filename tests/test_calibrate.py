@@ -8,8 +8,8 @@ import pytest
 from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
-from lightfield.dataset import config
-from lightfield.dataset.config import Preset
+from lightfield.dataset import configuration, scene_yaml
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
@@ -119,7 +119,7 @@ def test_a_preset_limits_the_choice(calibrated):
 def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
     path = tmp_path / "aimed.yaml"
     path.write_text(SCENE.format(render="target_error: {value: 0.02, denoise: never}"))
-    monkeypatch.setattr("lightfield.dataset.config.SCENES", tmp_path)
+    monkeypatch.setattr("lightfield.dataset.scene_yaml.SCENES", tmp_path)
     for preset in (None, Preset(denoise=True, samples=8)):
         (dataset,) = scene_datasets("aimed", limits=preset)
         assert dataset.render["target_error"] == 0.02
@@ -223,14 +223,14 @@ def test_views_are_rendered_with_the_choice_in_unchanged_shards(tmp_path):
     assert written["render"]["target_error"] == 0.05
 
 
-LIMITS = config.Preset(samples=12, denoise=True)
+LIMITS = configuration.Preset(samples=12, denoise=True)
 
 
 def test_a_scene_has_samples_or_a_target(tmp_path):
     def read(render):
         path = tmp_path / "scene.yaml"
         path.write_text(SCENE.format(render=render))
-        return config.read_scene(path)
+        return scene_yaml.read_scene(path)
 
     assert read("target_error: 0.01").render.target_error == 0.01
     for render, message in {
@@ -246,7 +246,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
 
 
 def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: 0.05"))
     full = scene_datasets("aimed")[0].render
     assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & set(full)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
 

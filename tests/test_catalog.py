@@ -13,7 +13,7 @@ from checkouts import ROOT, checkout
 from test_own_folder import SCENE, snakemake
 
 from lightfield.core.files import read_text
-from lightfield.dataset.config import load_config, read_config
+from lightfield.dataset.configuration import load_config, read_config
 
 # As snakedeploy writes it.
 DEPLOYED = """

@@ -12,10 +12,12 @@ import pytest
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
+from lightfield.core import yaml_files
 from lightfield.core.errors import UserError
-from lightfield.dataset import config, json_schema
-from lightfield.dataset.config import Preset
+from lightfield.dataset import configuration, json_schema, scene_yaml
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.loading import load_datasets, scene_datasets
+from lightfield.dataset.names import ROOT
 from lightfield.geometry.rigs import as_written
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
@@ -57,10 +59,10 @@ def test_flow_of_a_rig_at_one_place_is_refused(rig, refused, tmp_path, monkeypat
     file = tmp_path / "spot.yaml"
     file.write_text(yaml.safe_dump(flowing(rig, scene=source)))
     if not refused:
-        assert config.read_scene(file).flow
+        assert scene_yaml.read_scene(file).flow
         return
     with pytest.raises(UserError) as caught:
-        config.read_scene(file)
+        scene_yaml.read_scene(file)
     message = str(caught.value)
     assert message.startswith(f"{file}: flow: ")
     assert "rigs.View" in message
@@ -71,7 +73,7 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
     (tmp_path / "row.yaml").write_text(
         yaml.safe_dump(flowing({"type": "plane", "cameras": [4, 1]}))
     )
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     with pytest.raises(UserError, match=r"row\.yaml: flow: .*preset tiny .*rigs\.View"):
         scene_datasets("row", "tiny", Preset(views=1))
     assert scene_datasets("row", "tiny", Preset(views=2))[0].flow
@@ -89,7 +91,7 @@ def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
         "-0.0": 0.0,
     }
     file.write_text("".join(f"{key!r}: {key}\n" for key in numbers))
-    assert config.read_yaml(file, "numbers") == numbers
+    assert yaml_files.read_yaml(file, "numbers") == numbers
 
 
 def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
@@ -105,7 +107,7 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
         "    camera: {lens: equidistant, fov: 180, resolution: [8, 8]}\n"
         "  far: {<<: *near, size: 3}\n"
     )
-    near, far = config.read_scene(path).rigs.values()
+    near, far = scene_yaml.read_scene(path).rigs.values()
     assert (near.size, far.size) == (1, 3)
     assert near.camera == far.camera
 
@@ -116,7 +118,7 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
 )
 def test_a_folder_has_one_path_however_it_is_written(folder, path):
     content = {"scenes": "room", "preset": "full", "presets": {"full": {}}, "results": folder}
-    assert config.load_config(content).results == path
+    assert configuration.load_config(content).results == path
 
 
 def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
@@ -126,7 +128,7 @@ def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
         "rigs: {far: {camera: &far {<<: *base, size: 3}}}\n"
         "other: {<<: *far, samples: 4}\n"
     )
-    content = config.read_yaml(path, "nested")
+    content = yaml_files.read_yaml(path, "nested")
     assert content["rigs"]["far"]["camera"] == {"size": 3, "samples": 2}
     assert content["other"] == {"size": 3, "samples": 4}
 
@@ -137,16 +139,16 @@ def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     content["exports"]["colmap"] = {"sources": ["same"]}
     path = tmp_path / "one.yaml"
     path.write_text(yaml.safe_dump(content))
-    assert config.read_scene(path).exports.colmap
+    assert scene_yaml.read_scene(path).exports.colmap
     content["exports"]["colmap"] = {"sources": ["views"], "depth": True}
     path.write_text(yaml.safe_dump(content))
     with pytest.raises(UserError, match="views is a panorama, for which COLMAP has no depth maps"):
-        config.read_scene(path)
+        scene_yaml.read_scene(path)
 
 
 def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(RIGHT, sort_keys=False))
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     full = scene_datasets("right")
     assert [(d.scene_folder, d.rig_folder, d.view_count) for d in full] == [
         ("right", "LFSphere", 642),
@@ -177,7 +179,7 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
     camera["principal_point"] = [1515, 970]
     content = changed("rigs.LFSphere.camera", camera)
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     without_preset = (Preset(), (36, 24), (3000, 2000))
     for limits, size, resolution in (without_preset, (Preset(resolution=65), 36, (64, 42))):
         datasets = scene_datasets("right", limits=limits)
@@ -198,8 +200,8 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     faces = {"camera": {"lens": "rectilinear", "fov": 90, "resolution": [64, 64]}}
     content = changed("reprojections.faces", faces | {"cube_map": True})
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
-    monkeypatch.setattr(config, "SCENES", tmp_path)
-    dataset = scene_datasets("right", limits=config.Preset(resolution=32, views=20))[0]
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    dataset = scene_datasets("right", limits=configuration.Preset(resolution=32, views=20))[0]
     assert dataset.reprojections["faces"].settings.as_json() == {
         "camera": {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
         "cube_map": True,
@@ -222,24 +224,24 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
         expected = "camera: must be rectilinear with fov 90|square with cube_map"
         (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(content))
         with pytest.raises(UserError, match=expected):
-            config.load_scene("wrong")
+            scene_yaml.load_scene("wrong")
         faces["camera"]["fov"] = 90
 
 
 def test_every_scene_of_the_repository_is_right():
-    for path in config.SCENES.glob("*.yaml"):
-        config.read_scene(path)
+    for path in scene_yaml.SCENES.glob("*.yaml"):
+        scene_yaml.read_scene(path)
 
 
 @pytest.mark.parametrize("name", json_schema.MODELS)
 def test_the_schemas_for_editors_match_the_models(name):
-    path = config.ROOT / "configs/schema" / f"{name}.schema.json"
+    path = ROOT / "configs/schema" / f"{name}.schema.json"
     assert path.read_text() == json_schema.schema(name), "run scripts/schema.py"
 
 
 def test_the_schemas_accept_every_scene_and_find_its_mistakes():
     validator = jsonschema.Draft202012Validator(json.loads(json_schema.schema("scene")))
-    for path in config.SCENES.glob("*.yaml"):
+    for path in scene_yaml.SCENES.glob("*.yaml"):
         validator.validate(yaml.safe_load(path.read_text()))
     for path, value in (
         ("render.sample", 4),
@@ -253,9 +255,9 @@ def test_the_schemas_accept_every_scene_and_find_its_mistakes():
 
 def test_a_single_word_becomes_a_list():
     content = {"preset": "full", "presets": {"full": {}}, "scenes": "artist"}
-    assert config.load_config(content).scenes == ["artist"]
-    assert config.load_config(content).rigs == "all"
-    assert config.load_config({**content, "rigs": "LFSphere"}).rigs == ["LFSphere"]
+    assert configuration.load_config(content).scenes == ["artist"]
+    assert configuration.load_config(content).rigs == "all"
+    assert configuration.load_config({**content, "rigs": "LFSphere"}).rigs == ["LFSphere"]
 
 
 @pytest.mark.parametrize(
@@ -271,7 +273,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
     plan = forks.run_snakemake(
         ["--cores", "1", "--dry-run", "--quiet", "host", "--config", *folders, *arguments],
-        config.ROOT,
+        ROOT,
     )
     assert plan.returncode == 0, plan.stderr
     assert set(re.findall(r"Placing the cameras of \w+/(\w+)", plan.stdout + plan.stderr)) == rigs
@@ -289,7 +291,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
 )
 @pytest.mark.slow
 def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
-    result = forks.run_snakemake(["--cores", "1", "--config", *arguments], config.ROOT)
+    result = forks.run_snakemake(["--cores", "1", "--config", *arguments], ROOT)
     assert result.returncode != 0
     errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]
     assert len(errors) == 1
@@ -299,14 +301,14 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
 
 
 def test_no_two_scenes_may_share_a_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     for name in ("room", "room_tiny"):
         (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(RIGHT))
 
     def chosen(scene, preset):
         presets = {"tiny": {}, "full": {}}
         content = {"scenes": [scene], "preset": preset, "presets": presets}
-        return load_datasets(config.load_config(content))
+        return load_datasets(configuration.load_config(content))
 
     assert chosen("room", "full") and chosen("room_tiny", "tiny")
     for scene, preset in (("room", "tiny"), ("room_tiny", "full")):

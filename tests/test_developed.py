@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lightfield.core.files import write_json
-from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.export import nerf_synthetic
 from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from lightfield.core.settings import checked
-from lightfield.dataset.config import Scene
+from lightfield.dataset.scene_yaml import Scene
 
 # isort: split
 from pydantic import TypeAdapter

@@ -19,10 +19,10 @@ from sphere import LENSES, RADIUS, colour_of, look, write_views
 from lightfield import export
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import Exports, settings_of
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.names import EXPORTS
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.export import disparity
 from lightfield.export.points import evenly
 from lightfield.export.source import SourceDataset, Surface

@@ -14,9 +14,9 @@ from faults import FAULTS
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import size_and_time
-from lightfield.dataset.config import check_member
 from lightfield.dataset.family import Family, Member, drawn, member_content, outdated_members
 from lightfield.dataset.job_settings import BatchSettings
+from lightfield.dataset.scene_yaml import check_member
 from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.imaging.images import write_png
 

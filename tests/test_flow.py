@@ -11,8 +11,8 @@ from checkouts import checkout, snakemake
 from sphere import RADIUS, colour_of, look, write_views
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow, in_frame
 from lightfield.imaging import images

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.geometry import lenses
@@ -229,7 +229,7 @@ rigs:
 
 def test_the_frames_of_a_scene_are_those_of_all_its_rigs(tmp_path, monkeypatch):
     (tmp_path / "moving.yaml").write_text(SEQUENCE)
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     assert rendered_frames(scene_datasets("moving")) == [1, 5, 9]
     own_scene = SEQUENCE.replace("builder: garden, frame: 5", "blend: a.blend, frame: file")
     (tmp_path / "moving.yaml").write_text(own_scene)

@@ -26,14 +26,16 @@ from sphere import write_views
 from lightfield import export
 from lightfield.core.errors import UserError
 from lightfield.dataset import (
-    config,
+    blend_lock,
     journal,
     ledger,
     published,
     records,
+    scene_yaml,
     shard_counts,
     shard_files,
 )
+from lightfield.dataset.configuration import load_config
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
@@ -425,7 +427,7 @@ def scene(_):
 
 
 def read_scene(path, _):
-    config.read_scene(path)
+    scene_yaml.read_scene(path)
     scene_datasets(path.stem)
 
 
@@ -447,7 +449,7 @@ def read_configuration(path, _):
     # Snakemake reads the YAML itself.
     with contextlib.suppress(yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError):
         content = yaml.safe_load(path.read_bytes())
-        config.load_config(content if isinstance(content, dict) else {})
+        load_config(content if isinstance(content, dict) else {})
 
 
 def lock(_):
@@ -456,7 +458,7 @@ def lock(_):
 
 def read_lock(_, dataset):
     scene_datasets("own")
-    config.expected_blend(dataset.scene_name, Path(dataset.source.blend), "0" * 64)
+    blend_lock.expected_blend(dataset.scene_name, Path(dataset.source.blend), "0" * 64)
 
 
 def read_published(path, _):
@@ -527,7 +529,7 @@ def home(tmp_path, monkeypatch):
     (tmp_path / "own.yaml").write_text(OWN)
     (tmp_path / "own.blend").write_bytes(b"a scene")
     (tmp_path / "a.png").write_bytes(b"a texture")
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     return tmp_path
 
 

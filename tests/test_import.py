@@ -18,11 +18,11 @@ from sphere import write_views
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
-from lightfield.dataset.config import Scene
 from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.presence import outgrown_records
 from lightfield.dataset.published import lightfields
 from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 

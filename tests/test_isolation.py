@@ -208,7 +208,9 @@ def test_a_reprojected_view_has_the_same_bytes_without_numbas_compiler(reproject
     assert reproject("hostile", NUMBA_DISABLE_JIT="1") == reproject("clean")
 
 
-@pytest.mark.parametrize("first_import", ["lightfield.dataset.config", "lightfield.imaging.halves"])
+@pytest.mark.parametrize(
+    "first_import", ["lightfield.dataset.scene_yaml", "lightfield.imaging.halves"]
+)
 def test_numbas_options_in_the_current_folder_are_not_read(run_program, tmp_path, first_import):
     written(tmp_path / ".numba_config.yaml", "disable_jit: 1")
     (tmp_path / "kernel.py").write_text(f"import {first_import}\n{KERNEL}")

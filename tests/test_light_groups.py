@@ -13,10 +13,11 @@ from light_group_views import LENSES
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import Preset, Scene
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.light_groups import names_in, resolved
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb

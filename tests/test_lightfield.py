@@ -13,9 +13,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.loading import scene_datasets
+from lightfield.dataset.scene_source import SceneSource
 from lightfield.geometry import lenses, rigs, rotations
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})

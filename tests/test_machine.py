@@ -9,7 +9,7 @@ import pytest
 from lightfield.core import machine
 from lightfield.core.files import write_json
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import Preset
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
 from lightfield.imaging import images

@@ -8,7 +8,7 @@ from checkouts import ROOT
 from lightfield.core import memory as machine
 from lightfield.core.errors import UserError
 from lightfield.dataset import memory
-from lightfield.dataset.config import load_config, read_config
+from lightfield.dataset.configuration import load_config, read_config
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses

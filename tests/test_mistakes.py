@@ -13,10 +13,11 @@ from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import read_settings
-from lightfield.dataset import config
+from lightfield.dataset import configuration, scene_yaml
 from lightfield.dataset.exports import ExportSettings, settings_of
 from lightfield.dataset.job_settings import ImportSettings, MeshSettings
 from lightfield.dataset.loading import load_datasets
+from lightfield.dataset.names import ROOT
 from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.geometry.rigs import from_settings
 from lightfield.measurement.costs import CostSettings
@@ -40,12 +41,12 @@ def read_with_mistake(mistake, file):
     if file.name == "scene.yaml":
         if mistake.key:
             file.write_text(yaml.safe_dump(changed(mistake.key, value)))
-        config.read_scene(file)
+        scene_yaml.read_scene(file)
     elif file.name == "config.yaml":
         if not mistake.key:
-            config.read_config(file)
+            configuration.read_config(file)
         content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}}
-        load_datasets(config.load_config(content | value))
+        load_datasets(configuration.load_config(content | value))
     elif file.name in SETTINGS:
         file.write_text(json.dumps(value))
         read_settings(SETTINGS[file.name], file)
@@ -103,7 +104,7 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(
     (tmp_path / "configs/scenes").mkdir(parents=True)
     (tmp_path / "configs/scenes/hostile.yaml").write_text(text)
     (tmp_path / "config.yaml").write_text(config_text)
-    command_line = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
+    command_line = ("-n", "--cores", "1", "--snakefile", ROOT / "Snakefile")
     command = [SNAKEMAKE, *command_line, *(["--config", *arguments] if arguments else [])]
     run = subprocess.run(
         [sys.executable, "-c", MEASURED, *map(str, command)],

@@ -12,9 +12,9 @@ from sphere import write_views
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset.config import load_scene
 from lightfield.dataset.exports import Exports
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_yaml import load_scene
 from lightfield.export import transforms
 from lightfield.report import package
 from lightfield.validation.integrity import Integrity

@@ -19,9 +19,9 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset import passes
-from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images

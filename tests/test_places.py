@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lightfield.dataset import keys, names
-from lightfield.dataset.config import SceneSource
 from lightfield.dataset.job_settings import BuildSettings
 from lightfield.dataset.keys import scene_fingerprint
+from lightfield.dataset.scene_source import SceneSource
 from scenes.barbershop.plan import SIZES
 from scenes.library.variation import Draw
 

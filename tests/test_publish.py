@@ -14,9 +14,9 @@ from sphere import LENSES, write_views
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.publication import DOCUMENTS
+from lightfield.dataset.scene_yaml import Credits
 from lightfield.dataset.view_store import VARIABLE
 from lightfield.imaging import images
 from lightfield.report.publish import publish

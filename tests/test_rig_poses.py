@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs import from_settings
@@ -170,7 +170,7 @@ def test_a_random_rigs_places_are_a_file_of_its_dataset(tmp_path, monkeypatch):
     rigs = {"somewhere": RANDOM | {"camera": camera}}
     content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": rigs}
     (tmp_path / "somewhere.yaml").write_text(json.dumps(content))
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     monkeypatch.chdir(tmp_path)
     (dataset,) = scene_datasets("somewhere")
     assert dataset.places == "work/somewhere/somewhere/places.json"

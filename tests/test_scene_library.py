@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightfield.dataset import keys, names
-from lightfield.dataset.config import SceneSource
+from lightfield.dataset.scene_source import SceneSource
 from scenes.library.architecture import cut
 from scenes.library.points import evenly, lattice, mirrored, noise, polar, smoothstep
 from scenes.library.scene import Model, Scene

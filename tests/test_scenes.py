@@ -11,7 +11,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from scene_fingerprint import fingerprint
 
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from scenes.barbershop.place import drawn as drawn_barbershop
 
 pytestmark = pytest.mark.slow
@@ -103,7 +103,7 @@ def size():
 
 def cameras(scene):
     """Return the places (n, 3) of the cameras of all the scene's rigs."""
-    written = config.load_scene(SCENES[scene])
+    written = scene_yaml.load_scene(SCENES[scene])
     return np.concatenate([[p.position for p in rig.poses()] for rig in written.rigs.values()])
 
 

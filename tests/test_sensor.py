@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from scipy.stats import chi2
 
 from lightfield.core.files import write_json
-from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.dataset.sensors import SensorSettings
 from lightfield.geometry import lenses
 from lightfield.imaging import images

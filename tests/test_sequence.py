@@ -9,7 +9,7 @@ import yaml
 from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
-from lightfield.dataset import config
+from lightfield.dataset import configuration, scene_yaml
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.imaging import images
 
@@ -37,7 +37,7 @@ FRAMES = ["LFSequence/f00001", "LFSequence/f00009", "LFSequence/f00017"]
 @pytest.fixture
 def moving(tmp_path, monkeypatch):
     (tmp_path / "moving.yaml").write_text(SCENE)
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     return tmp_path / "moving.yaml"
 
 
@@ -49,7 +49,7 @@ def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
     ]
     assert {dataset.rig_name for dataset in datasets} == {"LFStill", "LFSequence"}
     settings = {"scenes": ["moving"], "preset": "full", "presets": {"full": {}}}
-    chosen = load_datasets(config.load_config({**settings, "rigs": ["LFSequence"]}))
+    chosen = load_datasets(configuration.load_config({**settings, "rigs": ["LFSequence"]}))
     assert [dataset.rig_folder for dataset in chosen] == FRAMES
 
 
@@ -70,14 +70,14 @@ def test_a_wrong_sequence_is_refused(change, expected, moving):
     content["rigs"]["LFSequence"] |= change
     moving.write_text(yaml.safe_dump(content))
     with pytest.raises(UserError) as caught:
-        config.read_scene(moving)
+        scene_yaml.read_scene(moving)
     assert expected in str(caught.value)
 
 
 def test_a_reprojection_cannot_have_a_frames_folder(moving):
     moving.write_text(SCENE.replace("perspective:", "f00001:"))
     with pytest.raises(UserError, match=r"reprojections\.f00001: the name f00001 is taken"):
-        config.read_scene(moving)
+        scene_yaml.read_scene(moving)
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from lightfield import export
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.settings import checked
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
@@ -95,13 +95,13 @@ def test_an_invalid_split_is_refused(path, value, expected):
         part = part[key]
     part[last] = value
     with pytest.raises(UserError, match=expected):
-        checked(TypeAdapter(config.Scene), content, "scene.yaml")
+        checked(TypeAdapter(scene_yaml.Scene), content, "scene.yaml")
 
 
 @pytest.mark.slow
 def test_a_rig_that_tests_is_exported_with_the_trained_one(tmp_path, monkeypatch):
     (tmp_path / "two.yaml").write_text(json.dumps(SCENE))
-    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     around, along = scene_datasets("two")
     assert (around.tested_by, along.trained_by) == (("along",), "around")
     assert [name for name, _ in around.exports] == [name for name, _ in along.exports]

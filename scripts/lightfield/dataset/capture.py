@@ -10,20 +10,21 @@ from pydantic import Field, PlainSerializer
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
 from lightfield.core.settings import Settings
-from lightfield.dataset import blend, config
-from lightfield.dataset.config import FILE, AtLeastOne, SceneSource
+from lightfield.dataset import blend, blend_lock, scene_source
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL
+from lightfield.dataset.scene_source import FILE, SceneSource
+from lightfield.dataset.setting_types import AtLeastOne
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
 SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
 # The same for a model.
-MODEL_SOURCE_KEYS = {"frame", *config.MODEL_KEYS}
+MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
 # The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
-CAPTURED_KEYS = SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *config.MODEL_KEYS}
+CAPTURED_KEYS = SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *scene_source.MODEL_KEYS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +156,7 @@ def _without_locked_sha256(capture: Capture) -> SceneSource:
     if source.blend is None:
         return source
     unlocked = source.model_copy(update={"sha256": None})
-    locked_sha256, _ = config.blend_sha256(capture.scene_name, unlocked)
+    locked_sha256, _ = blend_lock.blend_sha256(capture.scene_name, unlocked)
     return unlocked if source.sha256 == locked_sha256 else source
 
 
@@ -210,7 +211,7 @@ class LightfieldSettings(Settings):
         """The capture that these settings describe, with the recorded SHA-256 of a .blend."""
         source = self.source
         if source.blend:
-            sha256, _ = config.blend_sha256(self.scene, source)
+            sha256, _ = blend_lock.blend_sha256(self.scene, source)
             source = source.model_copy(update={"sha256": sha256})
         return Capture(scene_name=self.scene, source=source, render=self.render, rig=self.rig)
 

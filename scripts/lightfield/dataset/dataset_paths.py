@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightfield.dataset import passes
-from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.reprojections import LIGHT_GROUPS
+from lightfield.dataset.scene_source import FILE
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.capture import Capture
-from lightfield.dataset.config import Preset
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.exports import Exports
 
 
@@ -30,9 +30,9 @@ class Description(Capture):
     preset: str
     rig_name: str
     rig_folder: str
-    reprojections: dict[str, config.Reprojection]
-    flow: config.Flow | None
-    mesh: config.MeshFiles | None
+    reprojections: dict[str, scene_yaml.Reprojection]
+    flow: scene_yaml.Flow | None
+    mesh: scene_yaml.MeshFiles | None
     exports: Exports
     # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool

@@ -9,9 +9,10 @@ from statistics import fmean
 
 from lightfield.core.files import DAMAGE
 from lightfield.dataset import light_groups, memory, passes
-from lightfield.dataset.config import FILE, Reprojection, SensorReprojection
 from lightfield.dataset.dataset_paths import DatasetPaths
 from lightfield.dataset.reprojections import LIGHT_GROUPS
+from lightfield.dataset.scene_source import FILE
+from lightfield.dataset.scene_yaml import Reprojection, SensorReprojection
 from lightfield.dataset.unit_costs import (
     BRACKET_SECONDS,
     CAMERA_MOTION_PART,

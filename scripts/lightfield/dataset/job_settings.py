@@ -12,22 +12,21 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 
 from lightfield.core.settings import Settings, read_settings
-from lightfield.dataset.config import (
-    FILE,
-    MODEL_KEYS,
-    AtLeastOne,
-    Credits,
-    ModelOptions,
-    ModelPath,
-    Parameters,
-    Preset,
-    SceneSource,
-    check_model,
-    load_scene,
-)
+from lightfield.dataset.configuration import Preset
 from lightfield.dataset.family import Draw, Member
 from lightfield.dataset.keys import model_version
 from lightfield.dataset.names import builders
+from lightfield.dataset.scene_source import (
+    FILE,
+    MODEL_KEYS,
+    ModelOptions,
+    ModelPath,
+    Parameters,
+    SceneSource,
+    check_model,
+)
+from lightfield.dataset.scene_yaml import Credits, load_scene
+from lightfield.dataset.setting_types import AtLeastOne
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 

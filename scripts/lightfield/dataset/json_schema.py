@@ -6,7 +6,8 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
-from lightfield.dataset.config import Configuration, Scene
+from lightfield.dataset.configuration import Configuration
+from lightfield.dataset.scene_yaml import Scene
 
 MODELS: dict[str, type[BaseModel]] = {"config": Configuration, "scene": Scene}
 

@@ -18,9 +18,9 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import published
-from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import MACHINE, LightField, View
 from lightfield.dataset.names import BUILDERS, SOFTBOXES
+from lightfield.dataset.scene_source import SceneSource
 
 # Raise these when rendering, or the computation of flow, writes other files for equal settings.
 RENDER_VERSION = 4

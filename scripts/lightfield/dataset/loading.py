@@ -5,20 +5,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lightfield.core.errors import UserError
-from lightfield.dataset import config, published
-from lightfield.dataset.config import (
-    CHOSEN,
-    FILE,
-    Configuration,
-    Preset,
-    Render,
-    TargetError,
-)
+from lightfield.dataset import blend_lock, published, scene_yaml
+from lightfield.dataset.configuration import Configuration, Preset
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import Exports
 from lightfield.dataset.family import Family
 from lightfield.dataset.names import VIEWS
+from lightfield.dataset.render_settings import CHOSEN, Render, TargetError
+from lightfield.dataset.scene_source import FILE
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
@@ -40,7 +35,7 @@ def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> li
     scenes = []
     for scene in settings.scenes:
         _check_scene_folder(scene, settings)
-        if config.family_of(scene) is None:
+        if scene_yaml.family_of(scene) is None:
             scenes.append(scene)
             datasets += scene_datasets(scene, settings.preset, limits, settings, cluster)
     if settings.rigs == "all":
@@ -56,7 +51,7 @@ def chosen_families(settings: Configuration) -> dict[str, Family]:
     """
     families = {}
     for scene in settings.scenes:
-        if family := config.family_of(scene):
+        if family := scene_yaml.family_of(scene):
             if settings.rigs != "all":
                 raise UserError(
                     f"config.yaml: rigs: must be all with {scene}, which is a family: all members "
@@ -81,7 +76,7 @@ def _check_scene_folder(scene: str, settings: Configuration) -> None:
     base, _, preset = folder.rpartition("_")
     other_scene = base if is_full else folder
     has_preset_suffix = preset in settings.presets.keys() - {"full"}
-    if has_preset_suffix and config.scene_path(other_scene).is_file():
+    if has_preset_suffix and scene_yaml.scene_path(other_scene).is_file():
         raise UserError(
             f"config.yaml: scenes: {folder} would be the folder of both {base} with "
             f"preset={preset} and {folder}; give one of these scene YAMLs another name"
@@ -120,14 +115,14 @@ def scene_datasets(
 
     Uses the folders and the length of shards of ``settings``. ``cluster`` renders the datasets.
     """
-    written = config.load_scene(scene)
+    written = scene_yaml.load_scene(scene)
     places = _folders_and_shards(settings) | {"cluster": cluster}
     return datasets_of(scene, written, preset, limits or Preset(), places)
 
 
 def datasets_of(
     scene: str,
-    written: config.Scene,
+    written: scene_yaml.Scene,
     preset: str,
     limits: Preset,
     places: Mapping[str, Any],
@@ -138,7 +133,7 @@ def datasets_of(
     """
     source = written.scene
     if source.blend:
-        checksum, _ = config.blend_sha256(scene, source)
+        checksum, _ = blend_lock.blend_sha256(scene, source)
         source = source.model_copy(update={"sha256": checksum})
     datasets = []
     for name, rig in written.rigs.items():
@@ -175,24 +170,24 @@ def rig_dataset(scene: str, rig: str | None) -> Dataset:
     return dataset
 
 
-def _rig_of(scene: str, name: str, written: config.Scene, preset: str, limits: Preset) -> Rig:
+def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limits: Preset) -> Rig:
     """Return a rig under a preset's ``limits``. Raises `UserError` if too few views remain."""
-    file = f"{config.OWN_SCENES}/{scene}.yaml"
+    file = f"{scene_yaml.OWN_SCENES}/{scene}.yaml"
     try:
         rig = _limited_rig(written.rigs[name], limits, written.render is not None)
     except UserError as error:
         raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more") from None
     if written.flow and rig.is_at_one_place():
         raise UserError(
-            f"{file}: flow: {config.FLOW_PLACES}, but the preset "
+            f"{file}: flow: {scene_yaml.FLOW_PLACES}, but the preset "
             f"{preset} leaves one of rigs.{name}; let the preset have more views"
         )
     return rig
 
 
 def _reprojections_of(
-    name: str, written: config.Scene, limits: Preset
-) -> dict[str, config.Reprojection]:
+    name: str, written: scene_yaml.Scene, limits: Preset
+) -> dict[str, scene_yaml.Reprojection]:
     """Return the reprojections of a rig's views."""
     reprojections = {}
     for key, reprojection in written.developments.items():
@@ -205,7 +200,7 @@ def _reprojections_of(
 
 
 def _exports_of(
-    rig: Rig, written: config.Scene, reprojections: dict[str, config.Reprojection]
+    rig: Rig, written: scene_yaml.Scene, reprojections: dict[str, scene_yaml.Reprojection]
 ) -> Exports:
     """Return the exports of a rig's views and ``reprojections``.
 
@@ -221,18 +216,18 @@ def _exports_of(
     return written.exports.model_copy(update=exports)
 
 
-def _mesh_of(name: str, written: config.Scene) -> config.MeshFiles | None:
+def _mesh_of(name: str, written: scene_yaml.Scene) -> scene_yaml.MeshFiles | None:
     """Return which meshes a rig's dataset holds, if any."""
     mesh = written.mesh
     return mesh if mesh and name in (mesh.rigs or written.rigs) else None
 
 
-def _has_panorama(rig: Rig, written: config.Scene) -> bool:
+def _has_panorama(rig: Rig, written: scene_yaml.Scene) -> bool:
     panorama = written.report.panorama
     return sees_all_round(rig) if panorama == "auto" else panorama
 
 
-def _split_partners(rig: Rig, written: config.Scene, frame_folder: str) -> dict[str, Any]:
+def _split_partners(rig: Rig, written: scene_yaml.Scene, frame_folder: str) -> dict[str, Any]:
     """Return `Description.tested_by` of a rig that trains, or `trained_by` of one that tests."""
     split_of_rig = {name: other_rig.split for name, other_rig in written.rigs.items()}
     if rig.split == "train":

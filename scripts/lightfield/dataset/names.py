@@ -50,7 +50,9 @@ LIGHTS = (
     "sunset",
 )
 
-BUILDERS = Path(__file__).resolve().parents[2] / "scenes"
+# The folder of the repository.
+ROOT = Path(__file__).resolve().parents[3]
+BUILDERS = ROOT / "scripts" / "scenes"
 
 
 def builders() -> list[str]:

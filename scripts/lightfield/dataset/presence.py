@@ -8,7 +8,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, is_outdated, size_and_time, unreadable
-from lightfield.dataset import config, shard_files
+from lightfield.dataset import scene_yaml, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.view_store import ViewStore
 
@@ -111,13 +111,13 @@ def check_presence(dataset: Dataset) -> None:
     source = dataset.source
     if source.model and not Path(source.model).is_file():
         raise UserError(
-            f"{config.OWN_SCENES}/{dataset.scene_name}.yaml: scene.model: "
+            f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.model: "
             f"there is no file {source.model}; put it there"
         )
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
         raise UserError(
-            f"{config.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
+            f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
             f"there is no file {source.blend}; {page}put it there"
         )
 

@@ -16,13 +16,13 @@ from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import DAMAGE, listed, read_json, sha256, size_and_time, write_json
-from lightfield.dataset import config
-from lightfield.dataset.config import Scene
+from lightfield.dataset import scene_yaml
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
 from lightfield.dataset.job_settings import BatchSettings
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import datasets_of
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.dataset.splits_file import SPLITS, splits_content
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
@@ -52,15 +52,15 @@ class MemberBuild:
 
     def _written(self) -> Scene:
         """Return the member's scene YAML as settings. Raises `UserError` for a wrong value."""
-        file = f"{config.OWN_SCENES}/{self.settings.family}.yaml: member {self.member.name}"
-        return config.check_member(self.content, file)
+        file = f"{scene_yaml.OWN_SCENES}/{self.settings.family}.yaml: member {self.member.name}"
+        return scene_yaml.check_member(self.content, file)
 
     def _datasets(self, written: Scene) -> list[Dataset]:
         places = {
             "results_root": self.settings.results,
             "work_root": self.settings.work,
             # One shard has all views.
-            "views_per_shard": config.MOST_VIEWS,
+            "views_per_shard": scene_yaml.MOST_VIEWS,
             "member": self.member.name,
         }
         settings = self.settings

@@ -16,7 +16,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import lightfield_file
 from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.config import Scene
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.exports import Export, InstantNgp, export_settings_of
 from lightfield.dataset.family import SOURCES
@@ -28,6 +27,7 @@ from lightfield.dataset.job_settings import (
 )
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.names import VIEWS
+from lightfield.dataset.scene_yaml import Scene
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, instant_ngp
 from lightfield.rendering import (

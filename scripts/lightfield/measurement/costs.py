@@ -14,9 +14,10 @@ from pydantic import Field
 
 from lightfield.core.settings import Settings
 from lightfield.dataset import journal
-from lightfield.dataset.config import AtLeastOne, Energy
+from lightfield.dataset.configuration import Energy
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES
+from lightfield.dataset.setting_types import AtLeastOne
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement.sampling import cost_in_samples, standard_error

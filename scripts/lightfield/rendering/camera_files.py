@@ -8,10 +8,10 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.config import FILE
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.job_settings import FreePlacesSettings
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.scene_source import FILE
 from lightfield.rendering import blend_file, clearance, drawings
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings

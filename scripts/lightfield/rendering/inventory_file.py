@@ -10,7 +10,7 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset import blend, config
+from lightfield.dataset import blend, scene_yaml
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.light_groups import resolved
 from lightfield.dataset.loading import rendered_frames, scene_datasets
@@ -35,13 +35,13 @@ def write(path: Path, scene: str | None, output: Path) -> None:
     ``scene`` names a file in configs/scenes/ that uses it. Raises `UserError` for a scene that
     cannot be rendered.
     """
-    written = config.load_scene(scene) if scene else None
+    written = scene_yaml.load_scene(scene) if scene else None
     write_of_datasets(path, written, scene_datasets(scene) if scene else [], output)
 
 
 def write_of_datasets(
     path: Path,
-    written: config.Scene | None,
+    written: scene_yaml.Scene | None,
     datasets: Sequence[Dataset],
     output: Path,
     measures_memory: bool = True,

@@ -17,11 +17,11 @@ import jinja2
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import Credits
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.names import SEQUENCE_EXPORTS
 from lightfield.dataset.passes import PASSES, group_pass
+from lightfield.dataset.scene_yaml import Credits
 from lightfield.export import transforms
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
+from lightfield.dataset.scene_yaml import Credits
 from lightfield.dataset.view_store import ViewStore
 from lightfield.report import croissant, datacite, hugging_face, package, ro_crate, shards
 from lightfield.report.published import Published

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
-from lightfield.dataset.config import Credits
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.publication import Creator, Publication
+from lightfield.dataset.scene_yaml import Credits
 
 
 @dataclass(frozen=True)

@@ -15,18 +15,21 @@ from pydantic import BaseModel, TypeAdapter
 
 from lightfield.core.settings import MEANINGS
 from lightfield.dataset import (
-    config,
+    configuration,
     corpus,
     exports,
     family,
     job_settings,
     publication,
+    render_settings,
     reprojections,
+    scene_source,
+    scene_yaml,
     sensors,
 )
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.json_schema import Generator
-from lightfield.dataset.names import SEQUENCE_EXPORTS
+from lightfield.dataset.names import ROOT, SEQUENCE_EXPORTS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
@@ -34,7 +37,7 @@ from lightfield.geometry.rigs import path, rig, split_setting
 from lightfield.measurement.costs import CostSettings, FullSize
 from lightfield.measurement.gpu_check import GpuCheckSettings
 
-PROGRAMS = config.ROOT / "scripts"
+PROGRAMS = ROOT / "scripts"
 NOTE = "<!-- Written by scripts/reference.py. Change the models or the programs instead. -->"
 
 
@@ -89,9 +92,9 @@ KEY_PAGES: dict[str, Page] = {
         "`config.yaml` says which scenes to build, at which quality, and into which folders. The "
         "command line can replace each key: `snakemake --config preset=full`.",
         [
-            Section("config.yaml", config.Configuration),
-            Section("presets", config.Preset),
-            Section("energy", config.Energy),
+            Section("config.yaml", configuration.Configuration),
+            Section("presets", configuration.Preset),
+            Section("energy", configuration.Energy),
         ],
     ),
     "scene-keys.md": Page(
@@ -100,20 +103,20 @@ KEY_PAGES: dict[str, Page] = {
         "it. Only `scene` is always required. Large blocks, such as `render`, have pages of their "
         "own.",
         [
-            Section("A scene YAML", config.Scene),
-            Section("scene", config.SceneSource, config.ModelOptions),
-            Section("scene: of a model", config.ModelOptions),
-            Section("scene: parameters", config.Parameters),
-            Section("flow", config.Flow),
-            Section("mesh", config.MeshFiles),
-            Section("report", config.Report),
+            Section("A scene YAML", scene_yaml.Scene),
+            Section("scene", scene_source.SceneSource, scene_source.ModelOptions),
+            Section("scene: of a model", scene_source.ModelOptions),
+            Section("scene: parameters", scene_source.Parameters),
+            Section("flow", scene_yaml.Flow),
+            Section("mesh", scene_yaml.MeshFiles),
+            Section("report", scene_yaml.Report),
             Section("publish", publication.Publication),
             Section("publish: a creator", publication.Creator),
             # The other programs' settings files fill a page of their own.
             Section(
                 "The settings file of import_model.py",
                 job_settings.ImportSettings,
-                config.ModelOptions,
+                scene_source.ModelOptions,
             ),
         ],
     ),
@@ -138,9 +141,9 @@ KEY_PAGES: dict[str, Page] = {
         "`render` in a scene YAML says how Cycles renders the views. Either `samples` or "
         "`target_error` is required.",
         [
-            Section("render", config.Render),
-            Section("render: target_error", config.TargetError),
-            Section("render: camera_motion", config.CameraMotion),
+            Section("render", render_settings.Render),
+            Section("render: target_error", render_settings.TargetError),
+            Section("render: camera_motion", render_settings.CameraMotion),
         ],
     ),
     "rig-keys.md": Page(
@@ -179,7 +182,7 @@ KEY_PAGES: dict[str, Page] = {
         "The keys of a reprojection",
         "An entry of `reprojections` in a scene YAML makes versions of the views: through another "
         "lens, or as other files. Its name is the name of their folder.",
-        [Section("A reprojection", config.Reprojection)],
+        [Section("A reprojection", scene_yaml.Reprojection)],
     ),
     "sensor-keys.md": Page(
         "The keys of `sensor`",
@@ -233,7 +236,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("validate.py", job_settings.ValidationSettings),
             Section("validate_sequence.py", job_settings.SequenceValidationSettings),
             Section("package.py and publish.py", job_settings.PackSettings),
-            Section("package.py and publish.py: scene", config.Credits),
+            Section("package.py and publish.py: scene", scene_yaml.Credits),
             Section("report_figures.py", job_settings.FiguresSettings),
             Section("report_html.py", job_settings.PageSettings),
             Section("report_html.py: measurements", job_settings.Measurement),
@@ -585,7 +588,7 @@ def row_of(action: argparse.Action) -> str:
     value = action.default
     has_default = isinstance(value, str | int | float | Path) and value is not False
     if not is_required and has_default and value != argparse.SUPPRESS:
-        shown = value.relative_to(config.ROOT) if _is_inside(value) else value
+        shown = value.relative_to(ROOT) if _is_inside(value) else value
         default = f"`{shown}`"
     values = action.choices if action.choices is not None else []
     metavar = action.metavar if action.metavar is not None else action.dest.upper()
@@ -603,7 +606,7 @@ def row_of(action: argparse.Action) -> str:
 
 
 def _is_inside(value: Any) -> bool:
-    return isinstance(value, Path) and value.is_relative_to(config.ROOT)
+    return isinstance(value, Path) and value.is_relative_to(ROOT)
 
 
 def page_of_programs(title: str, text: str, names: list[str]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.dataset import config
+from lightfield.dataset import scene_yaml
 from lightfield.geometry import rigs
 from lightfield.geometry.interpolation_volume import (
     interpolation_volume,
@@ -91,7 +91,7 @@ def read_setups(scenes: Sequence[Path]) -> list[Setup]:
     return [
         _setup(path.stem, name, rig)
         for path in scenes
-        for name, rig in config.read_scene(path).rigs.items()
+        for name, rig in scene_yaml.read_scene(path).rigs.items()
     ]
 
 

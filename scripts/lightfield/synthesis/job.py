@@ -9,7 +9,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import read_yaml
+from lightfield.core.yaml_files import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits

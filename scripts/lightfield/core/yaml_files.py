@@ -1,0 +1,144 @@
+"""Reads YAML files of settings: safely, with a limit of size, and with no key given twice."""
+
+import math
+import re
+from collections.abc import Mapping
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from lightfield.core.errors import UserError
+
+# Bytes. A scene YAML has some thousand.
+LARGEST_YAML = 2**16
+# A YAML's nodes, with each alias counted as the nodes that it repeats.
+MOST_NODES = 20_000
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Safe YAML in which a key given twice is an error, not a silent overwrite."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._merged_nodes: set[yaml.MappingNode] = set()
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Replace `<<: *other` by the keys of the other mapping. Keys beside it take precedence.
+
+        Afterwards the node has the replaced keys twice. So this checks each node only before that.
+        """
+        if node not in self._merged_nodes:
+            self._merged_nodes.add(node)
+            self._check_keys(node)
+            super().flatten_mapping(node)
+
+    def _check_keys(self, node: yaml.MappingNode) -> None:
+        keys: set[Any] = set()
+        for key_node, _ in node.value:
+            if key_node.tag == "tag:yaml.org,2002:merge":
+                continue
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str):
+                problem = f"the key {key!r} is not a text; put it in quotes"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            if key in keys:
+                problem = f"the key {key!r} is given twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            keys.add(key)
+
+
+# YAML 1.1 reads 12:30 as 750, 0123 as 83 and 0b11 as 3. Here they stay texts, so that messages show
+# them as written. YAML 1.1 reads 1e-3 as a text. Here it is a number.
+_UniqueKeyLoader.yaml_implicit_resolvers = {
+    first: [(tag, form) for tag, form in resolvers if not tag.endswith((":int", ":float"))]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:int",
+    re.compile(r"[-+]?(?:0|[1-9][0-9_]*|0x[0-9a-fA-F_]+)$"),
+    list("-+0123456789"),
+)
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(
+        r"[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+][0-9]+)?$"
+        r"|[-+]?[0-9]+[eE][-+]?[0-9]+$"
+        r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
+    ),
+    list("-+0123456789."),
+)
+
+
+def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
+    """Replace Snakemake's reading of a file, ``content``, by this module's reading, ``written``."""
+    for key, value in written.items():
+        if isinstance(value, Mapping) and isinstance(content.get(key), dict):
+            as_written(content[key], value)
+        else:
+            content[key] = value
+
+
+def read_yaml(path: Path, file: str) -> Any:
+    """Read a YAML file. Errors call it ``file``.
+
+    Raises `UserError` if it is not YAML, or too large. Repeated aliases count, too.
+    """
+    return parse_yaml(read_settings_text(path, file), file)
+
+
+def read_settings_text(path: Path, file: str) -> str:
+    """Return a YAML file's text. Raises `UserError` if it is not text, or too large."""
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST_YAML + 1)
+        if len(content) <= LARGEST_YAML:
+            return content.decode()
+    except (OSError, ValueError) as error:
+        raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+    raise UserError(
+        f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
+    )
+
+
+def parse_yaml(text: str, file: str) -> Any:
+    """Return what a YAML file's text says. Raises `UserError` as `read_yaml` does."""
+    try:
+        loader = _UniqueKeyLoader(text)
+        node = loader.get_single_node()
+        if _size(node, {}) > MOST_NODES:
+            raise UserError(
+                f"{file}: its aliases (*name) repeat too much, so it is not a settings file"
+            )
+        return loader.construct_document(node) if node else None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        problem = error.problem
+        if mark and _is_indented_by_tabs(text, mark.line):
+            problem = "is indented with a tab; use spaces"
+        raise UserError(f"{file}: {where}{problem}") from None
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+
+
+def _is_indented_by_tabs(text: str, line: int) -> bool:
+    """Return whether a line's indentation has a tab. Lines count from 0."""
+    line_text = dict(enumerate(text.splitlines())).get(line, "")
+    return "\t" in line_text[: len(line_text) - len(line_text.lstrip())]
+
+
+def _size(node: yaml.Node | None, sizes: dict[int, float]) -> float:
+    """Return the number of nodes below a node. Each alias counts as the nodes that it repeats.
+
+    The size of a node that contains itself is infinite.
+    """
+    if node is None or isinstance(node.value, str):
+        return 1
+    if id(node) not in sizes:
+        sizes[id(node)] = math.inf
+        is_mapping = isinstance(node, yaml.MappingNode)
+        children = chain.from_iterable(node.value) if is_mapping else node.value
+        sizes[id(node)] = 1 + sum(_size(child, sizes) for child in children)
+    return sizes[id(node)]

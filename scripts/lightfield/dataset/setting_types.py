@@ -1,0 +1,42 @@
+"""Types that the values of several settings have: folders, numbers and lists of names."""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from lightfield.core.settings import pattern
+
+
+def _plain_path(folder: str) -> str:
+    """Return a path without ``./`` and without a slash at its end: Snakemake compares texts.
+
+    A path such as ``./-x`` keeps them, because programs would take ``-x`` for a flag.
+    """
+    path = str(Path(folder))
+    return path if re.match(r"[\w./]", path) else folder
+
+
+# The rules write this path into commands with {wildcards}.
+Folder = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            r"^[\w./][\w./+=@-]*$", "a path of letters, digits and . _ / + = @ - without blanks"
+        ),
+        max_length=1000,
+    ),
+    AfterValidator(_plain_path),
+]
+# The characters of a path that the rules quote in commands.
+QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
+AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
+Auto = Literal["auto"]
+DenoisePrefilter = Literal["accurate", "fast", "none"]
+
+
+def unique_names(names: list[str]) -> list[str]:
+    if not names or len(set(names)) < len(names):
+        raise ValueError("must be a list of one or more names, each once")
+    return names
