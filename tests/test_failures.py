@@ -24,6 +24,19 @@ from lightfield.imaging import images
 from lightfield.reprojection import lens_map
 
 ROOT = Path(__file__).parents[1]
+# Submits jobs to a stand-in for a cluster, submit.sh.
+ON_A_CLUSTER = [
+    "--executor",
+    "cluster-generic",
+    "--jobs",
+    "1",
+    "--cluster-generic-status-cmd",
+    "echo",
+    "--cluster-generic-submit-cmd",
+    "bash submit.sh",
+    "--seconds-between-status-checks",
+    "1",
+]
 # A scene that needs more than the smoke scene does: a download, a calibration, and free places.
 BROUGHT = """
 scene:
@@ -258,19 +271,7 @@ def test_every_job_that_failed_is_named_at_the_end(failing):
 def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
-    options = [
-        "--executor",
-        "cluster-generic",
-        "--jobs",
-        "1",
-        "--cluster-generic-status-cmd",
-        "echo",
-        "--cluster-generic-submit-cmd",
-        "bash submit.sh",
-        "--seconds-between-status-checks",
-        "1",
-        *groups,
-    ]
+    options = [*ON_A_CLUSTER, *groups]
     terminal = failing.fail("render", options=options)
     assert terminal.endswith(last_words(failing, "render")), terminal
 
@@ -464,18 +465,7 @@ def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing)
     shutil.copy(ROOT / "scripts/check_device.py", program)
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
-    options = [
-        "--executor",
-        "cluster-generic",
-        "--jobs",
-        "1",
-        "--cluster-generic-status-cmd",
-        "echo",
-        "--cluster-generic-submit-cmd",
-        "bash submit.sh",
-        "--seconds-between-status-checks",
-        "1",
-    ]
+    options = ON_A_CLUSTER
     try:
         terminal = failing.fail("render", options=options, config=["device=metal"])
     finally:

@@ -15,6 +15,7 @@ from lightfield.core.errors import UserError
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation.depth_questions import converted
+from lightfield.validation.development import toned
 from lightfield.validation.exported_cameras import SetExport
 from lightfield.validation.files import ImageSet
 from lightfield.validation.readers.contents import FLOAT32, Picture
@@ -193,12 +194,7 @@ class _ShownView:
         light = self.image.colour.astype(np.float64)
         if picture.kind != "luma":
             light /= np.where(self.alpha > 0, self.alpha, 1)[..., None]
-        exposure, white = picture.development
-        brighter = np.maximum(light, 0) * np.exp2(exposure)
-        # A white of 1 changes nothing. Source: Reinhard et al. 2002, equation 4.
-        with np.errstate(all="ignore"):
-            toned = brighter * (1 + brighter / white / white) / (1 + brighter)
-        return np.asarray(encode_srgb(toned))
+        return np.asarray(encode_srgb(toned(light, *picture.development)))
 
     def _wrong_colours(self, picture: Picture) -> Bools:
         shown = np.stack([self._channel(picture, name) for name in "RGB"], axis=-1)

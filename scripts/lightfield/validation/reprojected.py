@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging.images import Image
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.validation.development import toned
 from lightfield.validation.files import ImageSet
 
 Floats = NDArray[np.float64]
@@ -128,16 +129,10 @@ def _wrong_colours(
 
 
 def _developed(light: Floats, target: ImageSet, is_encoded: bool) -> Floats:
-    """Return ``light`` after the exposure and the tone mapping of a reprojection, which both grow.
-
-    Source of the curve: Reinhard et al. 2002, equation 4.
-    """
+    """Return ``light`` after the exposure and the tone mapping of a reprojection."""
     settings = target.lightfield.content["reprojection"]
-    white = settings.get("reinhard", 1)
-    brighter = np.maximum(light, 0) * 2.0 ** settings.get("exposure", 0)
-    # A white of 1 changes nothing.
-    toned = brighter * (1 + brighter / white**2) / (1 + brighter)
-    return np.asarray(encode_srgb(toned) if is_encoded else toned, np.float64)
+    shown = toned(light, settings.get("exposure", 0), settings.get("reinhard", 1))
+    return np.asarray(encode_srgb(shown) if is_encoded else shown, np.float64)
 
 
 def _depth_faults(
