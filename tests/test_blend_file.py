@@ -36,6 +36,7 @@ class Server:
     def __init__(self):
         self.content = CONTENT
         self.ranges = True
+        self.shift = 0  # A part begins this many bytes after what was asked for.
         self.cut_after = []  # Each of the next transfers breaks off after this many bytes.
         self.asked = []  # The Range header of each request.
         owner = self
@@ -64,6 +65,7 @@ class Server:
                 request.end_headers()
                 return
             request.send_response(206)
+            start += self.shift
             last = len(self.content) - 1
             request.send_header("Content-Range", f"bytes {start}-{last}/{len(self.content)}")
         else:
@@ -134,6 +136,16 @@ def test_a_server_without_ranges_sends_the_file_from_the_start(server, tmp_path)
     server.cut_after = [1_000_000]
     download.fetch(server.url, target, SUM, "the test")
     assert target.read_bytes() == CONTENT
+
+
+def test_a_part_from_another_place_of_the_file_is_not_taken(server, tmp_path):
+    """Such parts come from some caches. Without a SHA-256, nothing else would notice."""
+    target = tmp_path / "scene.blend"
+    server.cut_after = [1_000_000]
+    server.shift = 4
+    download.fetch(server.url, target, None, "the test")
+    assert target.read_bytes() == CONTENT
+    assert server.asked == [None, "bytes=1000000-", None]
 
 
 def test_a_file_that_changed_meanwhile_is_downloaded_anew(server, tmp_path):

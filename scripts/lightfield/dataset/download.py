@@ -8,6 +8,7 @@ partial file, Range and If-Range, and the answers 206 and 416. It would save abo
 
 import http.client
 import math
+import re
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -65,7 +66,9 @@ def _attempt(url: str, part: Path) -> str | None:
         with urllib.request.urlopen(request, timeout=_TIMEOUT_SECONDS) as answer:
             if answer.status != http.HTTPStatus.PARTIAL_CONTENT:
                 return _receive(answer, part, 0)
-            if _version(answer) == version:
+            if not version:
+                return "the server answers with a part, but the whole file was requested"
+            if _version(answer) == version and _first_byte(answer) == received:
                 return _receive(answer, part, received)
             part.unlink()
             return _attempt(url, part)
@@ -98,6 +101,12 @@ def _receive(answer: Any, part: Path, received: int) -> str | None:
     if total is not None and _size(part) < total:
         return f"the transfer broke off at {gigabytes(_size(part))} of {gigabytes(total)}"
     return None
+
+
+def _first_byte(answer: Any) -> int | None:
+    """Return the position in the file of a partial answer's first byte. None if it is not said."""
+    match = re.match(r"bytes (\d+)-", answer.headers.get("Content-Range") or "")
+    return int(match[1]) if match else None
 
 
 def _version(answer: Any) -> str | None:
