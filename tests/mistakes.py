@@ -137,6 +137,10 @@ EXPLAINED_TEXTS = [
     ("render: {samples: 4\n", "line 2, column 1"),
     ("render: {samples: 4}\nrender: {samples: 5}\n", "the key 'render' is given twice"),
     ("render: {<<: {samples: 4, samples: 5}}\n", "the key 'samples' is given twice"),
+    (
+        "a: &a {samples: 4}\nrender: {<<: *a, <<: {samples: 5}}\n",
+        "the key '<<' is given twice",
+    ),
     ("1: 2\n", "the key 1 is not a text"),
     ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
     ("scene:\n\tbuilder: room\n", "line 2, column 1: is indented with a tab; use spaces"),
