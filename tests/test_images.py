@@ -193,8 +193,9 @@ def test_a_missing_file_or_channel_is_named(tmp_path, channels):
 def test_16_bits_are_shown_as_the_nearest_8(tmp_path):
     values = np.linspace(0, 65535, 37 * 53 * 3).astype(np.uint16).reshape(37, 53, 3)
     write_png(tmp_path / "a.png", values)
-    shown = read_image(tmp_path / "a.png").srgb
-    assert np.abs(shown - values / 65535 * 255).max() < 0.5
+    image = read_image(tmp_path / "a.png")
+    assert np.abs(image.srgb - values / 65535 * 255).max() < 0.5
+    np.testing.assert_array_equal(image.encoded * 65535, values)
 
 
 class DamagingWriter:

@@ -137,7 +137,7 @@ class SourceDataset:
     def encoded(self, view: View) -> Floats:
         """Return a view's sRGB-encoded colour (height, width, 3), 0 to 1, not rounded."""
         if self.suffix == ".png":
-            return self.colour(view) / 255
+            return self._image(view).encoded
         from lightfield.imaging.tonemap import encode_srgb, tone_map
 
         developed = tone_map(self._image(view).colour, self.exposure, self.reinhard)

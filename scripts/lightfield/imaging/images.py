@@ -74,6 +74,12 @@ class Image:
         return to_rec_709(colour, self.chromaticities)
 
     @property
+    def encoded(self) -> np.ndarray[Any, Any]:
+        """R, G and B of a picture of whole numbers as (height, width, 3) float64, 0 to 1."""
+        pixels = np.stack([self.channels[name] for name in "RGB"], axis=-1)
+        return np.asarray(pixels / np.iinfo(pixels.dtype).max)
+
+    @property
     def srgb(self) -> np.ndarray[Any, Any]:
         """R, G and B of an 8-bit or 16-bit picture as (height, width, 3) uint8."""
         pixels = np.stack([self.channels[name] for name in "RGB"], axis=-1)

@@ -113,7 +113,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
         # In views that are not transparent, alpha marks where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
         if alpha is not None and source.suffix == ".png":
-            light = decode_srgb(_encoded(image)) * alpha[..., np.newaxis]
+            light = decode_srgb(image.encoded) * alpha[..., np.newaxis]
             colour = encode_srgb(_with_background(light, alpha, background))
         else:
             colour = _developed(image, alpha, source, background)
@@ -155,19 +155,13 @@ def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, F
     check_size(source.path(view), source.lightfield, image.channels["R"])
     alpha = _alpha(image) if transparent else None
     if image.channels["R"].dtype.kind == "u":
-        return _encoded(image), alpha
+        return image.encoded, alpha
     light = image.colour
     if alpha is not None:
         alpha = np.rint(alpha * largest) / largest
         covered = image.channels["A"][..., np.newaxis].astype(np.float32)
         light = light / np.where(covered > 0, covered, 1)
     return to_16_bit(tone_map(light, source.exposure, source.reinhard)) / largest, alpha
-
-
-def _encoded(image: images.Image) -> Floats:
-    """Return the colour (h, w, 3) of a picture of whole numbers, 0 to 1."""
-    pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
-    return pixels / np.iinfo(pixels.dtype).max
 
 
 def _alpha(image: images.Image) -> Floats | None:
@@ -189,7 +183,7 @@ def _developed(
     """
     if image.channels["R"].dtype.kind == "u":
         largest = np.iinfo(image.channels["R"].dtype).max
-        return _on_background(_encoded(image), alpha, background, largest)
+        return _on_background(image.encoded, alpha, background, largest)
     light = tone_map(image.colour, source.exposure, source.reinhard)
     if alpha is not None:
         light = _with_background(light, alpha, background)
