@@ -250,8 +250,7 @@ def run_program(folder):
         sys.executable = f"{folder}/python"
         importlib.import_module("snakemake.cli").main()
         return
-    # As a program does that starts itself anew, isolated from the user's environment.
-    sys._xoptions["isolated"] = True
+    # As a program does itself, to be isolated from the user's environment.
     os.environ["BLENDER_USER_RESOURCES"] = str(folder)
     sys.path.insert(0, str(Path(program).resolve().parent))
     runpy.run_path(program, run_name="__main__")

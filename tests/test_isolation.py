@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -260,6 +261,14 @@ def test_a_program_is_isolated_before_it_imports_any_other_package(program):
     packages = [name.partition(".")[0] for name in imports]
     others = [name for name in packages if name not in sys.stdlib_module_names]
     assert others[0] == "lightfield"
+
+
+@pytest.mark.parametrize("variables, times", [({}, 1), ({"OCIO": "/a"}, 2)])
+def test_a_program_starts_anew_only_if_its_environment_may_change_a_byte(variables, times):
+    command = [sys.executable, "-X", "importtime", SCRIPTS / "lens_map.py", "--help"]
+    environment = cleaned(os.environ) | variables
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert len(re.findall(r"\| site$", result.stderr, re.M)) == times
 
 
 def test_needed_environment_variables_are_kept():

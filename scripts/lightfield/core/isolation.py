@@ -1,11 +1,12 @@
 """Isolates programs from the user's environment, so that it changes no byte of their output.
 
 Some variables act when Python starts, and some when a library is loaded. Blender reads colours,
-start-up scripts and add-ons from the user's home. So a program first starts itself anew in an
-environment without all that. It keeps its process and its arguments.
+start-up scripts and add-ons from the user's home. So a program that finds any of that first starts
+itself anew in an environment without it. It keeps its process and its arguments.
 """
 
 import os
+import site
 import sys
 import sysconfig
 from collections.abc import Mapping
@@ -49,23 +50,26 @@ _HARMLESS = {
     "PYTHONUTF8",
     "NUMBA_CACHE_DIR",
 }
-# This option on Python's command line marks an isolated program.
-_MARK = "isolated"
 
 
 def isolate() -> None:
-    """Start this program anew in a cleaned environment, if it is not isolated yet.
+    """Start this program anew in a cleaned environment, unless its environment is clean.
 
     Does nothing in other processes, such as Snakemake or a test.
     """
-    if _MARK not in sys._xoptions and _is_program():
-        # -s also excludes the packages in the user's home.
-        command = [sys.executable, "-s", "-X", _MARK, *sys.orig_argv[1:]]
-        own_variables = {
-            "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
-            "PYDANTIC_DISABLE_PLUGINS": "__all__",
-        }
-        os.execve(sys.executable, command, cleaned(os.environ) | own_variables)
+    if not _is_program():
+        return
+    own_variables = {
+        "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
+        "PYDANTIC_DISABLE_PLUGINS": "__all__",
+    }
+    environment = cleaned(os.environ) | own_variables
+    if environment == os.environ | own_variables and not site.ENABLE_USER_SITE:
+        # Only libraries read these two, and none is loaded yet.
+        os.environ.update(own_variables)
+        return
+    # -s excludes the packages in the user's home.
+    os.execve(sys.executable, [sys.executable, "-s", *sys.orig_argv[1:]], environment)
 
 
 def _is_program() -> bool:
