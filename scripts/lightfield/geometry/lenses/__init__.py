@@ -13,7 +13,15 @@ from lightfield.core.settings import checked
 from lightfield.geometry.lenses.base import LENSES, Array, Lens, LensSettings, pair
 from lightfield.geometry.lenses.rectilinear import FileSettings
 
-__all__ = ["LENSES", "Array", "CameraSettings", "Lens", "from_camera", "from_lightfield"]
+__all__ = [
+    "LENSES",
+    "Array",
+    "CameraSettings",
+    "Lens",
+    "build_settings",
+    "from_camera",
+    "from_lightfield",
+]
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
@@ -31,6 +39,18 @@ else:
 _SETTINGS: TypeAdapter[LensSettings] = TypeAdapter(
     CameraSettings, config=ConfigDict(defer_build=True)
 )
+
+
+def build_settings() -> None:
+    """Build the validators of all lenses' settings now, not when the first is used.
+
+    Models that contain lenses many times take these as parts of their own. Otherwise each of them
+    would build the lenses again.
+    """
+    for lens in LENSES.values():
+        if lens.Settings:
+            lens.Settings.model_rebuild()
+    FileSettings.model_rebuild()
 
 
 def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:

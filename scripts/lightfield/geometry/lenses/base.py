@@ -27,7 +27,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import Settings, as_list
@@ -56,9 +56,6 @@ class LensSettings(Settings):
     The lens itself checks what the schema cannot express. Its errors have the form
     ``key: what is wrong``.
     """
-
-    # Many models contain lenses. Built once, the lenses' validators are parts of all of theirs.
-    model_config = ConfigDict(defer_build=False)
 
     lens: str
     resolution: Annotated[tuple[Pixels, Pixels], as_list(2)] = Field(

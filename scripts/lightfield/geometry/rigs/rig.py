@@ -16,7 +16,7 @@ from typing_extensions import TypeAliasType
 from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.frames import ONE_PLACE
-from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.lenses import CameraSettings, build_settings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
 from lightfield.geometry.rigs.split_setting import Chosen, Part, Split, part_of
 from lightfield.geometry.rotations import (
@@ -25,6 +25,9 @@ from lightfield.geometry.rotations import (
     looking_at,
     matrix_to_euler,
 )
+
+# Each type of rig contains all lenses.
+build_settings()
 
 Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
