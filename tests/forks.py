@@ -1,9 +1,9 @@
 """Runs Snakemake and the programs in forks of one process, which has imported their libraries.
 
-Most of the time of a short run are imports, of libraries and of the project's own modules. A fork
-reads the Snakefile anew, and the modules too, if a test has changed them. Blender's library is
-loaded here, and counts the processors. Blender is imported in the fork, because its import starts
-threads, which a fork lacks.
+Most of the time of a short run are imports of libraries. Each fork reads the Snakefile and the
+project's own code anew, as a process of its own does. Blender's library is loaded here, and counts
+the processors. Blender is imported in the fork, because its import starts threads, which a fork
+lacks.
 """
 
 import atexit
@@ -27,8 +27,6 @@ import tempfile
 import traceback
 from contextlib import suppress
 from pathlib import Path
-
-from preloaded import Preloaded
 
 PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
 LIBRARIES = (
@@ -133,7 +131,6 @@ def serve(folder):
         with suppress(ModuleNotFoundError):
             importlib.import_module(name)
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
-    sys.meta_path.insert(0, Preloaded())
     # Otherwise the collector would copy the memory of each fork. Most end before it is needed.
     gc.freeze()
     gc.set_threshold(20_000)
