@@ -54,11 +54,6 @@ def checkout(folder, **scenes):
     return folder
 
 
-def copy_tree(folder, copy):
-    """Copy a folder with its files' times, so that the copy is up to date. Faster than shutil."""
-    subprocess.run(["cp", "-a", folder, copy], check=True)
-
-
 def with_consumers(folder):
     """Put a stand-in for the consumers' environment into a checkout."""
     environment = folder / ".venv-consumers"

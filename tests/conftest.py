@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import forks
 import pytest
-from checkouts import checkout, copy_tree, snakemake
+from checkouts import checkout, snakemake
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -142,7 +142,8 @@ def built_once(build, name, config, tmp_path_factory):
             build(folder)
             finished.symlink_to(folder)
     copy = tmp_path_factory.mktemp(name) / "plenoforge"
-    copy_tree(finished.resolve(), copy)
+    # copytree keeps the files' times, so the copy stays up to date.
+    shutil.copytree(finished.resolve(), copy, symlinks=True)
     return copy
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
-from checkouts import checkout, copy_tree, jobs_on, snakemake, with_consumers
+from checkouts import checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
 from lightfield.dataset import ledger
@@ -259,7 +259,7 @@ def pristine(tmp_path_factory):
 @pytest.fixture
 def build(pristine):
     """A fresh clone in place of the old folders of results and work."""
-    copy_tree(pristine.folder.with_name("pristine"), pristine.folder)
+    shutil.copytree(pristine.folder.with_name("pristine"), pristine.folder)
     yield pristine
     shutil.rmtree(pristine.folder)
 
@@ -664,7 +664,7 @@ def test_planned_jobs_are_made_from_present_inputs(pristine, build):
     waiting = list(ROUNDS)
     while waiting:
         shutil.rmtree(build.folder)
-        copy_tree(pristine.folder.with_name("pristine"), build.folder)
+        shutil.copytree(pristine.folder.with_name("pristine"), build.folder)
         # A round waits if another one has replaced the same text.
         together = [name for name in waiting if edit(build, ROUNDS[name])]
         jobs = build.prepare()
@@ -677,7 +677,7 @@ def test_every_setting_of_every_job_is_changed_above(pristine, build):
     settings = build.settings()
     for name in ROUNDS.keys() - CHANGED.keys():
         shutil.rmtree(build.folder)
-        copy_tree(pristine.folder.with_name("pristine"), build.folder)
+        shutil.copytree(pristine.folder.with_name("pristine"), build.folder)
         _, CHANGED[name] = apply(build, ROUNDS[name])
     changed = set().union(*CHANGED.values())
     # Compare by the file's name, not for each scene.
