@@ -24,19 +24,6 @@ from lightfield.imaging import images
 from lightfield.reprojection import lens_map
 
 ROOT = Path(__file__).parents[1]
-# Submits jobs to a stand-in for a cluster, submit.sh.
-ON_A_CLUSTER = [
-    "--executor",
-    "cluster-generic",
-    "--jobs",
-    "1",
-    "--cluster-generic-status-cmd",
-    "echo",
-    "--cluster-generic-submit-cmd",
-    "bash submit.sh",
-    "--seconds-between-status-checks",
-    "1",
-]
 # A scene that needs more than the smoke scene does: a download, a calibration, and free places.
 BROUGHT = """
 scene:
@@ -224,6 +211,22 @@ class Failing:
         return run.stdout
 
 
+def on_a_cluster(submit="bash submit.sh"):
+    """Return options that submit jobs to a stand-in for a cluster."""
+    return [
+        "--executor",
+        "cluster-generic",
+        "--jobs",
+        "1",
+        "--cluster-generic-status-cmd",
+        "echo",
+        "--cluster-generic-submit-cmd",
+        submit,
+        "--seconds-between-status-checks",
+        "1",
+    ]
+
+
 @pytest.fixture(scope="session")
 def failing(tmp_path_factory):
     return Failing(tmp_path_factory.mktemp("failing"))
@@ -271,7 +274,7 @@ def test_every_job_that_failed_is_named_at_the_end(failing):
 def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
-    options = [*ON_A_CLUSTER, *groups]
+    options = [*on_a_cluster(), *groups]
     terminal = failing.fail("render", options=options)
     assert terminal.endswith(last_words(failing, "render")), terminal
 
@@ -288,19 +291,7 @@ def test_the_batch_systems_log_is_named_for_a_job_that_never_began(failing, grou
     earlier.parent.mkdir(parents=True, exist_ok=True)
     earlier.write_text("error: of an earlier run\n")
     os.utime(earlier, (WHEN, WHEN))
-    options = [
-        "--executor",
-        "cluster-generic",
-        "--jobs",
-        "1",
-        "--cluster-generic-status-cmd",
-        "echo",
-        "--cluster-generic-submit-cmd",
-        "bash submit.sh {name}",
-        "--seconds-between-status-checks",
-        "1",
-        *groups,
-    ]
+    options = [*on_a_cluster("bash submit.sh {name}"), *groups]
     terminal = failing.fail("render", options=options)
     log = Path(f".snakemake/{name}-17.log")
     assert terminal.endswith(f"render failed: {said}\n  log: {log}\n"), terminal
@@ -465,7 +456,7 @@ def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing)
     shutil.copy(ROOT / "scripts/check_device.py", program)
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
-    options = ON_A_CLUSTER
+    options = on_a_cluster()
     try:
         terminal = failing.fail("render", options=options, config=["device=metal"])
     finally:
