@@ -82,8 +82,7 @@ class Image:
     @property
     def srgb(self) -> np.ndarray[Any, Any]:
         """R, G and B of an 8-bit or 16-bit picture as (height, width, 3) uint8."""
-        pixels = np.stack([self.channels[name] for name in "RGB"], axis=-1)
-        return np.asarray(np.rint(pixels / (np.iinfo(pixels.dtype).max // 255)), np.uint8)
+        return np.asarray(np.rint(self.encoded * 255), np.uint8)
 
 
 @dataclass(frozen=True)

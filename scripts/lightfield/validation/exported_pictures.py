@@ -189,8 +189,7 @@ class _ShownView:
         Video has no alpha. There a transparent view is in front of black.
         """
         if self.is_encoded:
-            planes = [self.image.channels[name] for name in "RGB"]
-            return np.stack(planes, axis=-1) / np.iinfo(planes[0].dtype).max
+            return self.image.encoded
         light = self.image.colour.astype(np.float64)
         if picture.kind != "luma":
             light /= np.where(self.alpha > 0, self.alpha, 1)[..., None]
