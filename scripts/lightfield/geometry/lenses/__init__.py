@@ -26,10 +26,13 @@ __all__ = [
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
+_MODELS: tuple[type[LensSettings], ...] = (
+    *(lens.Settings for lens in LENSES.values() if lens.Settings),
+    FileSettings,
+)
 if TYPE_CHECKING:
     CameraSettings = LensSettings
 else:
-    _MODELS = (*(lens.Settings for lens in LENSES.values() if lens.Settings), FileSettings)
     # Named, so that the JSON schema has it once.
     CameraSettings = TypeAliasType(
         "CameraSettings",
@@ -47,10 +50,8 @@ def build_settings() -> None:
     Models that contain lenses many times take these as parts of their own. Otherwise each of them
     would build the lenses again.
     """
-    for lens in LENSES.values():
-        if lens.Settings:
-            lens.Settings.model_rebuild()
-    FileSettings.model_rebuild()
+    for model in _MODELS:
+        model.model_rebuild()
 
 
 def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:
