@@ -11,6 +11,7 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.dataset.sensors import SensorSettings
+from lightfield.dataset.setting_types import Primaries
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 
@@ -116,7 +117,7 @@ class ReprojectionSettings(ReprojectionOptions):
         description="Light of the images: strengths of light groups, as in relight of the scene "
         "YAML.",
     )
-    primaries: Literal["rec709", "acescg"] | None = Field(
+    primaries: Primaries | None = Field(
         None,
         description="Colour space of EXR images, which the files name in their attribute "
         "chromaticities.",

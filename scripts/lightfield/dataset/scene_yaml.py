@@ -35,7 +35,7 @@ from lightfield.dataset.reprojections import (
 )
 from lightfield.dataset.scene_source import FILE, SceneSource
 from lightfield.dataset.sensors import Sensor, SensorSettings
-from lightfield.dataset.setting_types import Auto, unique_names
+from lightfield.dataset.setting_types import Auto, Primaries, unique_names
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -104,7 +104,7 @@ class Reprojection(ReprojectionOptions):
         description="Light of the images, if it is not the rendered one: the name of an entry of "
         "relight, or strengths as in such an entry.",
     )
-    primaries: Literal["rec709", "acescg"] | None = Field(
+    primaries: Primaries | None = Field(
         None,
         description="Colour space of EXR images, which the files name in their attribute "
         "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",

@@ -34,6 +34,7 @@ QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Auto = Literal["auto"]
 DenoisePrefilter = Literal["accurate", "fast", "none"]
+Primaries = Literal["rec709", "acescg"]
 
 
 def unique_names(names: list[str]) -> list[str]:
