@@ -1,6 +1,6 @@
 # make             sets up the environment and builds the default dataset
 # make test        sets up and runs the checks and tests
-# make test-other  runs the tests that are not slow with the other supported Python and its own lock
+# make test-other  runs mypy, and the tests that are not slow, with the other supported Python
 # make consumers   reads exports with the consumers' own code, in an environment of its own
 # make learn       learns radiance fields from exported files, in the same environment
 # make docs        builds the documents as a site with a search, in site/
@@ -30,6 +30,8 @@ test: check
 
 test-other: export PATH := $(CURDIR)/.venv-other/bin:$(PATH)
 test-other: .venv-other/complete
+	@# Its numpy has other types.
+	mypy scripts/lightfield
 	python -m pytest -n $(CORES) -m "not slow"
 
 # Style, types, and Snakemake's own advice.

@@ -60,4 +60,5 @@ def _motion(frame: SourceDataset, view: View, direction: str) -> Floats:
     channels = [f"{direction}.{axis}" for axis in "XY"]
     path = MOTION.path(frame.dataset / frame.name, view.name)
     image = images.read_image(path, channels)
-    return np.stack([image.channels[name] for name in channels], axis=-1).astype(np.float64)
+    planes = [image.channels[name] for name in channels]
+    return np.stack(planes, axis=-1, dtype=np.float64)

@@ -47,10 +47,13 @@ def shrunk(colour: Array, width: int, height: int) -> Array:
     planes = np.moveaxis(np.asarray(colour, np.float32), -1, 0)
     size = (width, height)
     small = [
-        Image.fromarray(np.ascontiguousarray(plane)).resize(size, Image.Resampling.LANCZOS)
+        np.asarray(
+            Image.fromarray(np.ascontiguousarray(plane)).resize(size, Image.Resampling.LANCZOS)
+        )
         for plane in planes
     ]
-    return np.stack(small, axis=-1).clip(min=0)
+    smaller: Array = np.stack(small, axis=-1).clip(min=0)
+    return smaller
 
 
 def shrunk_8_bit(pixels: Array, width: int, height: int) -> Array:

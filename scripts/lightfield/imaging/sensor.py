@@ -166,7 +166,7 @@ def sense(light: NDArray[Any], parameters: Parameters, with_weights: bool = True
     """Develop scene-linear ``light`` (h, w, 3). NaN counts as 0."""
     height, width = light.shape[:2]
     dtype = np.uint8 if parameters.stored_largest == 255 else np.uint16
-    pixels = np.empty((height, width, 3), dtype)
+    pixels: NDArray[np.uint8 | np.uint16] = np.empty((height, width, 3), dtype)
     clipped = np.empty((height, width, 3), np.uint8)
     weights = np.empty((height, width, 3), np.float32) if with_weights else None
     random = np.random.Generator(np.random.Philox(key=parameters.seed))

@@ -192,7 +192,8 @@ def _developed(
 
 def _with_background(light: Floats, alpha: Floats, background: Floats) -> Floats:
     """Return light (h, w, 3), premultiplied by ``alpha`` (h, w), over an sRGB background."""
-    return light + (1 - alpha[..., np.newaxis]) * np.asarray(decode_srgb(background))
+    shown: Floats = light + (1 - alpha[..., np.newaxis]) * np.asarray(decode_srgb(background))
+    return shown
 
 
 def _on_background(

@@ -155,7 +155,8 @@ def thinned(points: Points, spacing: float) -> Points:
             if stays[index]:
                 stays[neighbours] = False
                 stays[index] = True
-    return shuffled[stays]
+    kept: Points = shuffled[stays]
+    return kept
 
 
 def voxel_means(points: Points, size: float) -> Points:

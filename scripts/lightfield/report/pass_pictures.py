@@ -46,6 +46,7 @@ def collect(
 
 def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
     """Return a pass's pixels (height, width, channels) as 8-bit sRGB (height, width, 3)."""
+    colours: Array
     match view_pass.kind:
         case "light" if view_pass.name in ("albedo", "base_colour"):
             # These lie between 0 and 1, so they need no exposure.

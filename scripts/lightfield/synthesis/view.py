@@ -336,7 +336,8 @@ def farther(here: apparent.Picture, others: Sequence[apparent.Picture], lens: Le
     steps = apparent.farther(here, others, small, _links(here.inverse, small)[2])
     row = np.arange(lens.height) * height // lens.height
     column = np.arange(lens.width) * width // lens.width
-    return steps[np.ix_(row, column)]
+    enlarged: Array = steps[np.ix_(row, column)]
+    return enlarged
 
 
 def seeming_farther(lens: Lens, colours: Array, distances: Array, matrices: Array) -> Array:

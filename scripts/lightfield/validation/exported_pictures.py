@@ -169,9 +169,9 @@ class _ShownView:
         if not self.image_set.name:
             return valid
         if "A" in self.image.channels and not self.lightfield.transparent:
-            return valid & (self.image.channels["A"] > 0)
-        if "Z" in self.image.channels:
-            return valid & ~np.isnan(self.image.channels["Z"])
+            valid &= self.image.channels["A"] > 0
+        elif "Z" in self.image.channels:
+            valid &= ~np.isnan(self.image.channels["Z"])
         return valid
 
     @property

@@ -435,7 +435,8 @@ def _is_projected_elsewhere(image: Image, model: Model, places: Ints, rows: Ints
     with np.errstate(over="ignore", invalid="ignore"):
         local = (model.points.positions[rows] @ image.rotation.T + image.translation) @ _FLIP
         offsets = np.abs(camera.pixels(local) - image.pixels[places]).max(axis=-1)
-    return ~(offsets <= FLOAT32 * max(camera.width, camera.height))
+    elsewhere: NDArray[Any] = ~(offsets <= FLOAT32 * max(camera.width, camera.height))
+    return elsewhere
 
 
 def _check_depth_map(path: Path, size: tuple[int, int], exported: Exported) -> None:
