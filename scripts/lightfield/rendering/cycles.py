@@ -88,6 +88,7 @@ def set_up(
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
     drawings.set_up(view_layer(scene), scene.camera.data.type, bool(groups))
+    _hide_empty_point_clouds()
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:
@@ -102,6 +103,13 @@ def set_up(
     pruning.leave_out(left_out)
     moving_camera.set_up(lightfield.render.get("camera_motion"))
     return str(scene.cycles.device)
+
+
+def _hide_empty_point_clouds() -> None:
+    """Hide point clouds without points. They show nothing, but Cycles of Blender 5.0 crashes."""
+    for obj in bpy.data.objects:
+        if obj.type == "POINTCLOUD" and not obj.data.points and not obj.modifiers:
+            obj.hide_render = True
 
 
 def _set_quality(settings: Mapping[str, Any]) -> None:
