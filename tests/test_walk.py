@@ -474,6 +474,30 @@ def test_a_phone_shows_the_walk(tab):
     assert opened.evaluate("document.documentElement.scrollWidth") <= 390
 
 
+def test_two_fingers_that_part_zoom_without_walking(tab):
+    opened = tab(width=390, has_touch=True, is_mobile=True)
+    opened.evaluate("walk.overlay.scrollIntoView({ block: 'center' })")
+    box = opened.locator("#walk-overlay").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    touch = opened.context.new_cdp_session(opened)
+
+    def send(kind, *places):
+        points = [{"x": x + place, "y": y, "id": id} for id, place in enumerate(places)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    before = opened.evaluate("[walk.zoom, ...walk.at]")
+    send("touchStart", -30, 30)
+    for part in range(31, 91):
+        send("touchMove", -part, part)
+    send("touchEnd")
+    zoom, *at = opened.evaluate("[walk.zoom, ...walk.at]")
+    # The browser needs a few pixels to tell a touch from a drag.
+    assert zoom == pytest.approx(3, rel=0.1)
+    assert at == pytest.approx(before[1:], abs=1e-6)
+    assert opened.locator(".for-fingers").is_visible()
+    assert not opened.locator(".for-keys").is_visible()
+
+
 @pytest.mark.parametrize("width", accessibility.WIDTHS)
 def test_axe_finds_no_fault_in_a_page_with_a_walk(tab, width):
     assert accessibility.faults(tab(width=width)) == []

@@ -8,7 +8,9 @@ import { goHome, placeHash, showMode } from "./home.js";
 import { TURNING, WALKING, ZOOMING, keepMoving, moveEye, turnEye, zoomBy } from "./motion.js";
 import { MODES, walk } from "./state.js";
 
-// One finger turns the eye, two fingers move it.
+const spanOf = ([[x, y], [u, v]]) => Math.hypot(u - x, v - y);
+
+// One finger turns the eye. Two fingers move it, and zoom as they part.
 function listenToPointers(overlay) {
   const pointers = new Map();
   overlay.addEventListener("pointerdown", (event) => {
@@ -22,11 +24,16 @@ function listenToPointers(overlay) {
     const last = pointers.get(event.pointerId);
     if (!last) return;
     const offset = [event.clientX - last[0], event.clientY - last[1]];
+    const before = [...pointers.values()];
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     const side = Math.max(overlay.clientWidth, overlay.clientHeight);
     const wide = fieldOfView(...walk.size) / walk.zoom;
-    if (pointers.size === 1) turnEye(...offset.map((value) => (-value * wide) / side));
-    else moveEye((0.5 * offset[1]) / side, (-0.5 * offset[0]) / side, 0);
+    if (pointers.size === 1) {
+      turnEye(...offset.map((value) => (-value * wide) / side));
+      return;
+    }
+    moveEye((0.5 * offset[1]) / side, (-0.5 * offset[0]) / side, 0);
+    if (pointers.size === 2) zoomBy(Math.max(spanOf([...pointers.values()]), 1) / Math.max(spanOf(before), 1));
   });
   for (const name of ["pointerup", "pointercancel"]) {
     overlay.addEventListener(name, (event) => pointers.delete(event.pointerId));
