@@ -95,6 +95,14 @@ def test_the_end_shows_the_forecast_beside_what_the_run_took(run):
     assert run.display.summary(300) == "4 jobs in 1 min 40 s, 5 min 00 s of CPU time"
 
 
+def test_a_run_that_ends_early_counts_what_it_did(run):
+    run.shown(running=["a"])
+    run.shown(100, finished=["a"])
+    assert run.display.summary(90) == (
+        "1 of 4 jobs in 1 min 40 s, 90 s of CPU time; the forecast was 1 min 40 s"
+    )
+
+
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
 def test_a_measurement_takes_the_time_that_its_log_tells(run):
     run.tasks = {"error": run.task("error", "measurement")}

@@ -142,21 +142,21 @@ class RunDisplay:
             self.clear()
 
     def summary(self, cpu_seconds: float | None) -> str:
-        """Return what the run did and took, and its forecast, if these are known."""
-        text = f"{_count(len(self._tasks), 'job')} in {duration(time.time() - self._began)}"
+        """Return what the run did and took, and its forecast, if these are known.
+
+        With Snakemake's ``--until`` a run ends before all tasks have run.
+        """
+        ended = [task for task in self._tasks.values() if task.ended is not None]
+        jobs = _count(len(self._tasks), "job")
+        if len(ended) < len(self._tasks):
+            jobs = f"{len(ended)} of {jobs}"
+        text = f"{jobs} in {duration(time.time() - self._began)}"
         if cpu_seconds is None:
             return text
         text += f", {duration(cpu_seconds)} of CPU time"
-        if any(task.seconds is None for task in self._tasks.values()):
+        if any(task.seconds is None for task in ended):
             return text
-        return f"{text}; the forecast was {duration(self._expected_seconds())}"
-
-    def _expected_seconds(self) -> float:
-        """Return the estimated CPU seconds of the run, without the work of earlier runs."""
-        return sum(
-            (task.seconds or 0.0) * (1 - task.already / (task.total or 1))
-            for task in self._tasks.values()
-        )
+        return f"{text}; the forecast was {duration(_expected_seconds(ended))}"
 
     def clear(self) -> None:
         """Remove the line of progress from the terminal, so that other text can be written."""
@@ -286,6 +286,11 @@ class RunDisplay:
     def _write(self, text: str) -> None:
         self._stream.write(text)
         self._stream.flush()
+
+
+def _expected_seconds(tasks: Iterable[Task]) -> float:
+    """Return the estimated CPU seconds of tasks, without the work of earlier runs."""
+    return sum((task.seconds or 0.0) * (1 - task.already / (task.total or 1)) for task in tasks)
 
 
 def _count(count: int, name: str) -> str:
