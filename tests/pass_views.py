@@ -71,6 +71,7 @@ def add(name, kind, surface, **settings):
 
 
 def build():
+    bpy.context.scene.render.views["right"].name = "the artist's own name"
     upright = (np.pi / 2, 0, 0)
     add("floor", "plane", material("grey"), size=40)
     wall = add("wall", "plane", material("red", Base_Color=(0.8, 0.1, 0.1, 1)), size=40)

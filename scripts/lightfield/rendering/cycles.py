@@ -338,7 +338,12 @@ def _set_eyes(scene: Any, distance: float) -> None:
     """Make the camera a stereo pair for omnidirectional stereo, ``distance`` metres apart."""
     scene.render.use_multiview = True
     scene.render.views_format = "STEREO_3D"
-    scene.render.views["right"].use = False
+    views = scene.render.views
+    for eye in EYES:
+        # The artist may have renamed it.
+        if eye not in views:
+            views.new(eye)
+    views["right"].use = False
     eyes = scene.camera.data.stereo
     eyes.use_spherical_stereo = True
     eyes.use_pole_merge = False
