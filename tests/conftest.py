@@ -173,16 +173,29 @@ def browser():
         browser.close()
 
 
+# Takes WebGL 2 away from a page.
+WITHOUT_WEBGL_2 = """
+HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {
+    return kind === "webgl2" ? null : get.call(this, kind, ...more);
+})(HTMLCanvasElement.prototype.getContext);
+"""
+
+
 @pytest.fixture
 def show(browser):
-    """Open pages. At the end of the test no page may have had an error."""
+    """Open pages. At the end of the test no page may have had an error.
+
+    Software draws the walk, so a page opens in half the time without it, or in a narrow window.
+    """
     log = SimpleNamespace(errors=[], requests=[])
     contexts = []
 
-    def show(path, width=1280, **options):
+    def show(path, width=600, has_walk=False, **options):
         size = {"width": width, "height": 900}
         context = browser.new_context(viewport=size, **options)
         contexts.append(context)
+        if not has_walk:
+            context.add_init_script(WITHOUT_WEBGL_2)
         tab = context.new_page()
         tab.on("console", lambda message: log.errors.append(message.text))
         tab.on("pageerror", lambda error: log.errors.append(str(error)))

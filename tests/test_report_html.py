@@ -157,7 +157,7 @@ def frame_of(tab, canvas):
 
 
 def test_the_page_loads_completely_from_one_file(sphere, show):
-    tab = show(sphere.page)
+    tab = show(sphere.page, width=1280, has_walk=True)
     pixels(tab, "viewer")
     widths = tab.eval_on_selector_all("img", "all => all.map((image) => image.naturalWidth)")
     assert len(widths) == 4
@@ -302,7 +302,7 @@ def test_the_rig_turns_and_its_cameras_open_their_views(sphere, show):
 
 
 def test_the_epipolar_image_is_drawn_and_pointed_at(sphere, show):
-    tab = show(sphere.page)
+    tab = show(sphere.page, width=1280)
     level = pixels(tab, "epi")
     tab.click("#epi-depth")
     assert (pixels(tab, "epi") != level).any()
@@ -312,7 +312,7 @@ def test_the_epipolar_image_is_drawn_and_pointed_at(sphere, show):
 
 @pytest.mark.parametrize("width", [320, 390])
 def test_a_phone_does_not_scroll_sideways(sphere, show, width):
-    tab = show(sphere.page, width)
+    tab = show(sphere.page, width, has_walk=True)
     pixels(tab, "viewer")
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
     # A part that scrolls by itself cannot be reached with keys, and shows half a line.
@@ -326,7 +326,7 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
 
 @pytest.mark.parametrize("width", accessibility.WIDTHS)
 def test_axe_finds_no_fault_in_a_page(sphere, show, width):
-    tab = show(sphere.page, width)
+    tab = show(sphere.page, width, has_walk=True)
     pixels(tab, "viewer")
     assert accessibility.faults(tab) == []
 

@@ -4,6 +4,7 @@ import base64
 import io
 import math
 import shutil
+from functools import partial
 
 import accessibility
 import numpy as np
@@ -39,6 +40,12 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("walk") / "dataset"
     written_page(folder, SMALL_CAMERA, SMALL_RIG, look_at_ball)
     return folder
+
+
+@pytest.fixture
+def show(show):
+    """Open pages with their walks, as `show` of conftest.py does."""
+    return partial(show, has_walk=True)
 
 
 @pytest.fixture
@@ -297,12 +304,7 @@ def test_the_walk_goes_on_after_the_graphics_card_was_lost(tab):
 
 
 def test_a_browser_without_webgl_2_says_so(small, show):
-    page = small / "without_webgl.html"
-    without = "<script>HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more)"
-    without += " { return kind === 'webgl2' ? null : get.call(this, kind, ...more); })"
-    without += "(HTMLCanvasElement.prototype.getContext);</script>"
-    page.write_text((small / "index.html").read_text().replace("<body>", "<body>" + without))
-    opened = show(page)
+    opened = show(small / "index.html", has_walk=False)
     assert "WebGL 2" in opened.locator("#walk-status").inner_text()
     assert opened.locator("#walk-controls").is_hidden()
 
