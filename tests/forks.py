@@ -241,10 +241,10 @@ def become(request, descriptors):
 def run_program(folder):
     """Run the program of the command line, which may be Snakemake."""
     program = sys.argv[0]
+    # The programs that it starts run in forks, too.
+    sys.executable = f"{folder}/python"
     if program == "snakemake.py":
         sys.argv[0] = "snakemake"
-        # Its jobs run in forks, too.
-        sys.executable = f"{folder}/python"
         importlib.import_module("snakemake.cli").main()
         return
     # As a program does itself, to be isolated from the user's environment.
