@@ -15,6 +15,8 @@ import pytest
 from checkouts import checkout, snakemake
 from playwright.sync_api import sync_playwright
 
+from lightfield.core.files import locked_folder
+
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
 
@@ -32,8 +34,9 @@ def pytest_sessionstart(session):
         compileall.compile_dir(SCRIPTS, quiet=2)
 
 
-# Each of these files takes more than a minute.
-LONG = ("slurm", "every_rule", "workflow", "damage", "failures", "storage", "soak", "provenance")
+# Each of these files takes more than a minute. The first four begin at once. One of them makes the
+# smoke dataset, whose kernels the later ones need.
+LONG = ("slurm", "every_rule", "workflow", "failures", "damage", "storage", "soak", "provenance")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -48,9 +51,10 @@ def pytest_collection_modifyitems(items):
         if SLOW & set(item.fixturenames):
             item.add_marker("slow")
         tests[item.path].append(item.get_closest_marker("slow") is not None)
-    long = [f"test_{name}.py" for name in LONG]
+    places = {f"test_{name}.py": place for place, name in enumerate(LONG)}
     order = {
-        path: (path.name not in long, not any(slow), len(slow)) for path, slow in tests.items()
+        path: (places.get(path.name, len(places)), not any(slow), len(slow))
+        for path, slow in tests.items()
     }
     items.sort(key=lambda item: order[item.path])
 
@@ -147,11 +151,27 @@ def built_once(build, name, config, tmp_path_factory):
     return copy
 
 
+def keep_kernels(folder):
+    """Copy the kernels that a checkout has compiled to the repository. Later checkouts copy them.
+
+    A kernel's index, .nbi, names its machine code, .nbc, so it comes last.
+    """
+    for path in sorted((folder / "scripts").rglob("*.nb[ci]")):
+        kept = ROOT / path.relative_to(folder)
+        kept.parent.mkdir(exist_ok=True)
+        with locked_folder(kept.parent):
+            if not kept.exists():
+                unfinished = kept.with_name(f"{kept.name}.tmp")
+                shutil.copy2(path, unfinished)
+                unfinished.rename(kept)
+
+
 def build_smoke(folder):
     """Build the smoke dataset in a checkout."""
     checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
+    keep_kernels(folder)
 
 
 @pytest.fixture(scope="session")
