@@ -346,6 +346,16 @@ UNREAD_TEXTURE = json.dumps(
         ],
     }
 )
+HIDDEN_NODE = json.dumps(
+    {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_node_visibility"],
+        "nodes": [
+            {"name": "shown"},
+            {"name": "spare", "extensions": {"KHR_node_visibility": {"visible": False}}},
+        ],
+    }
+)
 # Broken models: the file, its content, and what the message says.
 BROKEN = [
     *((f"a.{name}", b"", "is empty") for name in FORMATS),
@@ -362,6 +372,7 @@ BROKEN = [
     ("a.stl", STL + STL.replace("solid a", "solid b")[:-20], "cut short"),
     ("a.gltf", UNREAD_TEXTURE, "does not read"),
     ("a.gltf", json.dumps({"asset": {"version": "2.0"}}), "has no faces"),
+    ("a.gltf", HIDDEN_NODE, "hides the node spare"),
     ("a.gltf", GLTF_TEXT, "missing"),
     ("a.gltf", json.dumps({"asset": {"version": "9.0"}}), "cannot import it"),
     ("a.gltf", json.dumps({"asset": {"version": "2.0"}, "nodes": 7}), "cannot import it"),

@@ -37,6 +37,11 @@ def check(path: Path) -> None:
                 f"{path}: is not a glTF file: it begins with neither glTF nor {{; give it the "
                 "suffix of its format, or export it again"
             )
+        case ".glb" | ".gltf" if hidden := _hidden_node(path):
+            raise UserError(
+                f"{path}: hides the node {hidden} by KHR_node_visibility, but Blender would show "
+                "it; export the model without hidden nodes"
+            )
         case ".stl" if head.lstrip().startswith(b"solid") and b"facet" in head + tail:
             # A text may have several solids, each with its own end.
             if not re.search(rb"endsolid[^\r\n]*\s*$", tail):
@@ -112,8 +117,8 @@ def referred(path: Path) -> list[Path]:
     return sorted({Path(os.path.normpath(file)) for file in files})
 
 
-def _of_gltf(path: Path) -> Iterator[Path]:
-    """Yield the buffers and images that a glTF file has outside of itself."""
+def _gltf_document(path: Path) -> Any:
+    """Return the JSON of a glTF file. Raises `UserError` if it has none."""
     with path.open("rb") as file:
         # A binary one has a head of 12 bytes, and then the JSON with its length and type.
         head = file.read(20)
@@ -121,10 +126,31 @@ def _of_gltf(path: Path) -> Iterator[Path]:
         length = int.from_bytes(head[12:16], "little")
         content = file.read(length) if is_binary else head + file.read()
     try:
-        document = json.loads(content)
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"{path}: is cut short, or not a glTF file: {error}") from None
+
+
+def _hidden_node(path: Path) -> str:
+    """Return the name of a node that a glTF file hides, or its number. "" if it hides none."""
+    try:
+        for number, node in enumerate(_gltf_document(path).get("nodes", ())):
+            visibility = node.get("extensions", {}).get("KHR_node_visibility", {})
+            if not visibility.get("visible", True):
+                return str(node.get("name", number))
+    except (TypeError, AttributeError):
+        # Blender refuses such a file.
+        pass
+    return ""
+
+
+def _of_gltf(path: Path) -> Iterator[Path]:
+    """Yield the buffers and images that a glTF file has outside of itself."""
+    document = _gltf_document(path)
+    try:
         entries: list[Any] = [*document.get("buffers", ()), *document.get("images", ())]
         addresses = [entry["uri"] for entry in entries if "uri" in entry]
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+    except (TypeError, AttributeError) as error:
         raise UserError(f"{path}: is cut short, or not a glTF file: {error}") from None
     for address in addresses:
         if not address.startswith("data:"):
