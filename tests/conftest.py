@@ -36,7 +36,7 @@ def pytest_sessionstart(session):
 
 # Each of these files takes more than a minute. The first four begin at once. One of them makes the
 # smoke dataset, whose kernels the later ones need.
-LONG = ("slurm", "every_rule", "workflow", "failures", "damage", "storage", "soak", "provenance")
+LONG = ("slurm", "every_rule", "provenance", "failures", "storage", "soak", "workflow", "damage")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -131,7 +131,7 @@ def room(tmp_path_factory, run_program):
 
 
 def built_once(build, name, config, tmp_path_factory):
-    """Return a worker's own copy of a folder that ``build(folder)`` builds once for all workers.
+    """Return a copy of a folder that ``build(folder)`` builds once for all workers.
 
     The first worker builds it, and the others wait. If a build fails, the next worker tries.
     """
@@ -174,9 +174,9 @@ def build_smoke(folder):
     keep_kernels(folder)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def smoke(tmp_path_factory, request):
-    """A checkout in which the smoke dataset has been built."""
+    """A checkout in which the smoke dataset has been built. Each file's tests have their own."""
     return built_once(build_smoke, "smoke", request.config, tmp_path_factory)
 
 
