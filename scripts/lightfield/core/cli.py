@@ -15,13 +15,17 @@ from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_problem
 
+# Imports make many objects that are never garbage. To go through them takes a tenth of the time of
+# --help. So Python rarely looks for garbage from here on, and not once more before it ends.
+gc.set_threshold(100_000)
+atexit.register(gc.freeze)
+
 
 def run(main: Callable[[], None]) -> None:
     """Run ``main``. Print a `UserError` as ``error: …`` on standard error, and exit with status 1.
 
     Do the same if memory runs out, or if the system refuses access to a file or folder.
     """
-    _expect_little_garbage()
     sys.argv[1:] = map(_as_value, sys.argv[1:])
     guarded(main)
 
@@ -42,16 +46,6 @@ def guarded(main: Callable[[], None]) -> None:
         sys.exit(1)
     except OSError as error:
         sys.exit(f"error: {_refusal(error)}")
-
-
-def _expect_little_garbage() -> None:
-    """Let Python look for garbage rarely, and not once more before it ends.
-
-    Imports make many objects that are never garbage. To go through them takes longer than all that
-    --help does.
-    """
-    gc.set_threshold(100_000)
-    atexit.register(gc.freeze)
 
 
 def _refusal(error: OSError) -> str:
