@@ -15,8 +15,6 @@ import pytest
 from checkouts import checkout, snakemake
 from playwright.sync_api import sync_playwright
 
-from lightfield.core.files import locked_folder
-
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
 
@@ -151,27 +149,11 @@ def built_once(build, name, config, tmp_path_factory):
     return copy
 
 
-def keep_kernels(folder):
-    """Copy the kernels that a checkout has compiled to the repository. Later checkouts copy them.
-
-    A kernel's index, .nbi, names its machine code, .nbc, so it comes last.
-    """
-    for path in sorted((folder / "scripts").rglob("*.nb[ci]")):
-        kept = ROOT / path.relative_to(folder)
-        kept.parent.mkdir(exist_ok=True)
-        with locked_folder(kept.parent):
-            if not kept.exists():
-                unfinished = kept.with_name(f"{kept.name}.tmp")
-                shutil.copy2(path, unfinished)
-                unfinished.rename(kept)
-
-
 def build_smoke(folder):
     """Build the smoke dataset in a checkout."""
     checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
-    keep_kernels(folder)
 
 
 @pytest.fixture(scope="module")

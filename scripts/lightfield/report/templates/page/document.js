@@ -45,3 +45,9 @@ export function chooseDepth(light, depth, show) {
 export function polyline(context, points) {
   points.forEach(([x, y], place) => (place ? context.lineTo(x, y) : context.moveTo(x, y)));
 }
+
+// Return the distance between two fingers.
+export const distanceOfTwo = (pointers) => {
+  const [first, second] = [...pointers.values()];
+  return Math.hypot(first.x - second.x, first.y - second.y);
+};

@@ -1,6 +1,6 @@
 // Lets the user turn the rig in 3D, and point at its cameras.
 
-import { element } from "./document.js";
+import { distanceOfTwo, element } from "./document.js";
 import { drawRig, measureRig, scenePoints } from "./rig_drawing.js";
 import { HOME, rig, viewer } from "./state.js";
 import { clamp } from "./vectors.js";
@@ -18,12 +18,6 @@ function cameraAt(event) {
   });
   return best.number;
 }
-
-// Return the distance between two fingers.
-const distanceOfTwo = (pointers) => {
-  const [first, second] = [...pointers.values()];
-  return Math.hypot(first.x - second.x, first.y - second.y);
-};
 
 const zoomTo = (value) => {
   rig.zoom = clamp(value, 0.05, 20);

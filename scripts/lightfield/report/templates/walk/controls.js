@@ -1,14 +1,12 @@
 // Listens to the walk's buttons, keys and pointers.
 
-import { element } from "../page/document.js";
+import { distanceOfTwo, element } from "../page/document.js";
 import { drawWalkSoon } from "./drawing.js";
 import { fieldOfView } from "./eye.js";
 import { listenForHeadset } from "./headset.js";
 import { goHome, placeHash, showMode } from "./home.js";
 import { TURNING, WALKING, ZOOMING, keepMoving, moveEye, turnEye, zoomBy } from "./motion.js";
 import { MODES, walk } from "./state.js";
-
-const spanOf = ([[x, y], [u, v]]) => Math.hypot(u - x, v - y);
 
 // One finger turns the eye. Two fingers move it, and zoom as they part.
 function listenToPointers(overlay) {
@@ -17,23 +15,20 @@ function listenToPointers(overlay) {
     // A right button opens a menu, which may swallow the button's release.
     if (event.button !== 0) return;
     overlay.setPointerCapture(event.pointerId);
-    pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     overlay.focus({ preventScroll: true });
   });
   overlay.addEventListener("pointermove", (event) => {
     const last = pointers.get(event.pointerId);
     if (!last) return;
-    const offset = [event.clientX - last[0], event.clientY - last[1]];
-    const before = [...pointers.values()];
-    pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    const before = pointers.size === 2 ? distanceOfTwo(pointers) : 0;
+    const [x, y] = [event.clientX - last.x, event.clientY - last.y];
+    pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
     const side = Math.max(overlay.clientWidth, overlay.clientHeight);
     const wide = fieldOfView(...walk.size) / walk.zoom;
-    if (pointers.size === 1) {
-      turnEye(...offset.map((value) => (-value * wide) / side));
-      return;
-    }
-    moveEye((0.5 * offset[1]) / side, (-0.5 * offset[0]) / side, 0);
-    if (pointers.size === 2) zoomBy(Math.max(spanOf([...pointers.values()]), 1) / Math.max(spanOf(before), 1));
+    if (pointers.size === 1) turnEye((-x * wide) / side, (-y * wide) / side);
+    else moveEye((0.5 * y) / side, (-0.5 * x) / side, 0);
+    if (before) zoomBy(distanceOfTwo(pointers) / before);
   });
   for (const name of ["pointerup", "pointercancel"]) {
     overlay.addEventListener(name, (event) => pointers.delete(event.pointerId));
