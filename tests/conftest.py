@@ -187,35 +187,59 @@ HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {
 """
 
 
+# Draws an eighth of the walk's pixels, across and down.
+SMALL_WALK = 0.125
+
+
+@pytest.fixture(scope="session")
+def tabs():
+    """The tabs that no test uses, by their options. A page loads faster in a tab that is open."""
+    return {}
+
+
 @pytest.fixture
-def show(browser):
+def show(browser, tabs):
     """Open pages. At the end of the test no page may have had an error.
 
-    Software draws the walk, so a page opens in half the time without it, or in a narrow window.
+    The walk has ``walk_scale`` pixels for each pixel of the page, across and down. With 0, the page
+    has no walk. Software draws it, so a page opens in half the time without it or with a small one.
     """
     log = SimpleNamespace(errors=[], requests=[])
-    contexts = []
+    shown = []
 
     def note(message):
         if READ_BACK not in message.text:
             log.errors.append(message.text)
 
-    def show(path, width=600, has_walk=False, **options):
-        size = {"width": width, "height": 900}
-        context = browser.new_context(viewport=size, **options)
-        contexts.append(context)
-        if not has_walk:
-            context.add_init_script(WITHOUT_WEBGL_2)
-        tab = context.new_page()
-        tab.on("console", note)
-        tab.on("pageerror", lambda error: log.errors.append(str(error)))
-        tab.on("request", lambda request: log.requests.append(request.url))
+    listeners = {
+        "console": note,
+        "pageerror": lambda error: log.errors.append(str(error)),
+        "request": lambda request: log.requests.append(request.url),
+    }
+
+    def show(path, width=600, walk_scale=0.0, **options):
+        kind = walk_scale, *options.items()
+        if kind not in tabs:
+            context = browser.new_context(**options)
+            script = f"devicePixelRatio = {walk_scale}" if walk_scale else WITHOUT_WEBGL_2
+            context.add_init_script(script)
+            tabs[kind] = context.new_page()
+        tab = tabs.pop(kind)
+        shown.append((kind, tab))
+        tab.set_viewport_size({"width": width, "height": 900})
+        for event, listener in listeners.items():
+            tab.on(event, listener)
         tab.goto(path.as_uri())
         return tab
 
     yield show
-    for context in contexts:
-        context.close()
+    for kind, tab in shown:
+        for event, listener in listeners.items():
+            tab.remove_listener(event, listener)
+        # The next page is not under the mouse.
+        tab.mouse.move(0, 0)
+        tab.goto("about:blank")
+        tabs[kind] = tab
     assert not log.errors
     assert log.requests
     assert all(url.startswith(("file:", "data:")) for url in log.requests)

@@ -1,6 +1,7 @@
-"""Prints the SHA-256 of everything that a builder makes, and on request that of a small render.
+"""Prints the SHA-256 of everything that builders make, and on request that of a small render.
 
-Run as `python scene_fingerprint.py BUILDER SEED [pixels]`.
+Run as `python scene_fingerprint.py BUILDER SEED WITH_PIXELS ...`, with three words for each scene.
+WITH_PIXELS is 0 or 1. One process builds all scenes, because a start of Blender takes long.
 """
 
 import hashlib
@@ -14,16 +15,21 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def fingerprint(builder, seed, hash_seed, pixels=False):
-    """Build in a new process, which hashes sets and dictionaries with ``hash_seed``."""
+def fingerprints(scenes, hash_seed):
+    """Build scenes in a new process, which hashes sets and dictionaries with ``hash_seed``.
+
+    Each scene is (builder, seed, whether to render it). Return the fingerprints in the same order.
+    """
+    words = [word for builder, seed, pixels in scenes for word in (builder, seed, int(pixels))]
     result = subprocess.run(
-        [sys.executable, __file__, builder, str(seed), *(["pixels"] if pixels else [])],
+        [sys.executable, __file__, *map(str, words)],
         capture_output=True,
         text=True,
         check=True,
         env=os.environ | {"PYTHONPATH": str(ROOT / "scripts"), "PYTHONHASHSEED": hash_seed},
     )
-    return result.stdout.split("fingerprint ")[1].splitlines()[0].split()
+    lines = result.stdout.splitlines()
+    return [line.split()[1:] for line in lines if line.startswith("fingerprint ")]
 
 
 def rendered():
@@ -47,7 +53,8 @@ def rendered():
         return np.array(bpy.data.images.load(scene.render.filepath).pixels[:], np.float32).tobytes()
 
 
-def main():
+def print_fingerprint(builder, seed, with_pixels):
+    """Build a scene in place of the last one, and print its fingerprint."""
     import bpy
     import numpy as np
 
@@ -56,9 +63,8 @@ def main():
         collection.foreach_get(name, array)
         return array.tobytes()
 
-    builder, seed, *pixels = sys.argv[1:]
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    importlib.import_module(f"scenes.{builder}").build({"seed": int(seed), "detail": 0.05})
+    importlib.import_module(f"scenes.{builder}").build({"seed": seed, "detail": 0.05})
     digest = hashlib.sha256()
     for obj in sorted(bpy.data.objects, key=lambda each: each.name):
         digest.update(obj.name.encode() + np.array(obj.matrix_world).tobytes())
@@ -69,9 +75,15 @@ def main():
         elif obj.type == "CURVES":
             digest.update(values(obj.data.points, "position", 3, np.float32))
     digests = [digest.hexdigest()]
-    if pixels:
+    if with_pixels:
         digests.append(hashlib.sha256(rendered()).hexdigest())
     print("fingerprint", *digests)
+
+
+def main():
+    words = sys.argv[1:]
+    for builder, seed, pixels in zip(words[::3], words[1::3], words[2::3], strict=True):
+        print_fingerprint(builder, int(seed), pixels == "1")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import accessibility
 import numpy as np
 import pytest
+from conftest import SMALL_WALK
 from PIL import Image
 from sphere import RADIUS, colour_of, look
 
@@ -157,7 +158,7 @@ def frame_of(tab, canvas):
 
 
 def test_the_page_loads_completely_from_one_file(sphere, show):
-    tab = show(sphere.page, width=1280, has_walk=True)
+    tab = show(sphere.page, width=1280, walk_scale=1)
     pixels(tab, "viewer")
     widths = tab.eval_on_selector_all("img", "all => all.map((image) => image.naturalWidth)")
     assert len(widths) == 4
@@ -312,7 +313,7 @@ def test_the_epipolar_image_is_drawn_and_pointed_at(sphere, show):
 
 @pytest.mark.parametrize("width", [320, 390])
 def test_a_phone_does_not_scroll_sideways(sphere, show, width):
-    tab = show(sphere.page, width, has_walk=True)
+    tab = show(sphere.page, width, walk_scale=SMALL_WALK)
     pixels(tab, "viewer")
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
     # A part that scrolls by itself cannot be reached with keys, and shows half a line.
@@ -326,7 +327,7 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
 
 @pytest.mark.parametrize("width", accessibility.WIDTHS)
 def test_axe_finds_no_fault_in_a_page(sphere, show, width):
-    tab = show(sphere.page, width, has_walk=True)
+    tab = show(sphere.page, width, walk_scale=SMALL_WALK)
     pixels(tab, "viewer")
     assert accessibility.faults(tab) == []
 

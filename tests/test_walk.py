@@ -9,6 +9,7 @@ from functools import partial
 import accessibility
 import numpy as np
 import pytest
+from conftest import SMALL_WALK
 from PIL import Image
 from sphere import BALL, RADIUS, RED, look, look_at_ball, write_views
 
@@ -45,7 +46,7 @@ def small(tmp_path_factory):
 @pytest.fixture
 def show(show):
     """Open pages with their walks, as `show` of conftest.py does."""
-    return partial(show, has_walk=True)
+    return partial(show, walk_scale=SMALL_WALK)
 
 
 @pytest.fixture
@@ -304,7 +305,7 @@ def test_the_walk_goes_on_after_the_graphics_card_was_lost(tab):
 
 
 def test_a_browser_without_webgl_2_says_so(small, show):
-    opened = show(small / "index.html", has_walk=False)
+    opened = show(small / "index.html", walk_scale=0)
     assert "WebGL 2" in opened.locator("#walk-status").inner_text()
     assert opened.locator("#walk-controls").is_hidden()
 
