@@ -2,7 +2,6 @@
 
 import filecmp
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -74,10 +73,7 @@ def start_snakemake(folder, *arguments, **options):
 
 def snakemake(folder, *arguments):
     """Run Snakemake in a checkout. Return its CompletedProcess."""
-    # The folder of the logger plugin follows the test's own folders.
-    folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
-    path = os.pathsep.join(filter(None, folders))
-    result = forks.run_snakemake(["--cores", "1", *arguments], folder, {"PYTHONPATH": path})
+    result = forks.run_snakemake(["--cores", "1", *arguments], folder)
     keep_kernels(Path(folder))
     return result
 

@@ -14,7 +14,6 @@ import importlib.util
 import marshal
 import multiprocessing.process
 import os
-import pkgutil
 import resource
 import runpy
 import select
@@ -28,7 +27,6 @@ import traceback
 from contextlib import suppress
 from pathlib import Path
 
-PLUGINS = ("snakemake_executor_plugin_", "snakemake_logger_plugin_", "snakemake_storage_plugin_")
 LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
     "snakemake.report",
@@ -120,13 +118,12 @@ def serve(folder):
     """Fork for each request on the socket in a folder. Return in each fork, after its program."""
     # The first function that is registered is called last.
     atexit.register(leave)
-    # The folder of this file is not on the path of other programs.
-    sys.path.remove(str(Path(__file__).parent))
-    for module in pkgutil.iter_modules():
-        if module.name.startswith(PLUGINS):
-            importlib.import_module(module.name)
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
+    # Finds and imports the plugins, also that of this folder. Snakemake searches once in a process.
+    sys.modules["snakemake.cli"].get_argument_parser()
+    # The folder of this file is not on the path of other programs.
+    sys.path.remove(str(Path(__file__).parent))
     for name in BLENDER_LIBRARIES:
         with suppress(ModuleNotFoundError):
             importlib.import_module(name)

@@ -91,6 +91,12 @@ def curtains():
         add("plane", 10 + number, kind, size=0.9, location=where, rotation=(np.pi / 2, 0, 0))
 
 
+def render_volumes_quickly():
+    """Take long steps through volumes, whose colour need not be exact."""
+    bpy.context.scene.cycles.volume_biased = True
+    bpy.context.scene.cycles.volume_step_rate = 20
+
+
 def mesh_fog():
     known_surfaces()
     add("cube", 9, volume("fog"), size=8)
@@ -111,9 +117,7 @@ def volume_object():
     modifier.object, modifier.interior_band_width, modifier.voxel_amount = shape, 10, 8
     # A volume object shows where its material reads a grid.
     cloud.data.materials.append(volume("cloud", shader="ShaderNodeVolumePrincipled"))
-    # Its colour need not be exact. Render it quickly.
-    bpy.context.scene.cycles.volume_biased = True
-    bpy.context.scene.cycles.volume_step_rate = 20
+    render_volumes_quickly()
 
 
 def nodes_fog():
@@ -123,6 +127,7 @@ def nodes_fog():
         host = add("cube", 9, material("replaced"))
         host.hide_viewport = True
         by_nodes(host, volume("cloud", shader="ShaderNodeVolumePrincipled"), kind)
+    render_volumes_quickly()
 
 
 def world_fog():
