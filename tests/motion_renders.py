@@ -98,8 +98,11 @@ for name, camera in WIDE.items():
     pictures[f"{name}_still"] = red(np.eye(4))
     pictures[f"{name}_sub_frames"] = sub_frames(TILT)
     times = row_times(len(pictures[f"{name}_still"]), 0.01)
-    poses = [pose_at(np.eye(4), TILT["travel"], TILT["turn"], time) for time in times]
-    pictures[f"{name}_rows"] = np.stack([red(pose)[row] for row, pose in enumerate(poses)])
+    rows = []
+    for row, moment in enumerate(times):
+        cycles.set_window(0, row, SIZE, 1)
+        rows.append(red(pose_at(np.eye(4), TILT["travel"], TILT["turn"], moment)))
+    pictures[f"{name}_rows"] = np.concatenate(rows)
     set_up(camera, **TILT)
     pictures[name] = red(np.eye(4))
     set_up(camera, **TILT, rolling=0.01)
