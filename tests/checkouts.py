@@ -71,9 +71,9 @@ def start_snakemake(folder, *arguments, **options):
     )
 
 
-def snakemake(folder, *arguments):
-    """Run Snakemake in a checkout. Return its CompletedProcess."""
-    result = forks.run_snakemake(["--cores", "1", *arguments], folder)
+def snakemake(folder, *arguments, env=None):
+    """Run Snakemake in a checkout. Return its CompletedProcess. ``env`` adds to the environment."""
+    result = forks.run_snakemake(["--cores", "1", *arguments], folder, env)
     keep_kernels(Path(folder))
     return result
 
@@ -92,14 +92,17 @@ def keep_kernels(folder):
                     (cache / f"{path.name}.tmp").replace(cache / path.name)
 
 
-def wait_until(condition, process, seconds=600, log=None):
-    """Wait until a condition holds. Fails, with the ``log``, if the process ends before that."""
+def wait_until(condition, process, seconds=600, log=None, pause=0.02):
+    """Wait until a condition holds. Fails, with the ``log``, if the process ends before that.
+
+    ``pause`` is the time between two looks, in seconds.
+    """
     end = time.monotonic() + seconds
     while not condition():
         assert process.poll() is None, log.read_text() if log else f"{process.args} has ended"
         if time.monotonic() > end:
             raise TimeoutError(f"{process.args}: what was waited for is not there yet")
-        time.sleep(0.02)
+        time.sleep(pause)
 
 
 def planned(folder, *arguments):

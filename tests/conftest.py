@@ -169,6 +169,8 @@ def browser():
         pytest.fail("these tests need Chromium: sudo apt-get install chromium")
     arguments = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
     arguments += ["--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
+    # Otherwise the browser rounds the memory that a page uses.
+    arguments += ["--enable-precise-memory-info"]
     # Without a graphics card, the processor puts a page together faster than SwiftShader does.
     arguments += ["--disable-gpu-compositing"]
     with sync_playwright() as playwright:

@@ -1,8 +1,8 @@
 """Kernels: their machine code is kept for the next process, whatever others save meanwhile."""
 
 import subprocess
-import sys
 
+import forks
 import pytest
 from conftest import ROOT
 
@@ -32,7 +32,7 @@ def test_processes_that_compile_a_kernel_at_the_same_time_keep_it_for_all_types(
 
     def start(*types):
         return subprocess.Popen(
-            [sys.executable, program, *types],
+            [forks.python(), program, *types],
             env={"PYTHONPATH": str(ROOT / "scripts")},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

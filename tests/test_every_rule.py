@@ -13,6 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import forks
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, jobs_on, snakemake, with_consumers
@@ -145,20 +146,24 @@ WITHOUT_OUTPUT = {
 # Stands in for every program. It writes what identifies its job, in a form that rules can read.
 STAND_IN = f"""#!{sys.executable}
 import hashlib, json, os, sys
-from pathlib import Path
-work = json.loads(Path("work_to_do.json").read_text())
+def read(name):
+    with open(name, "rb") as file:
+        return file.read()
+work = json.loads(read("work_to_do.json"))
 (job,) = (
     job for log, job in work.items()
     if os.path.exists(log) and os.path.samestat(os.stat(log), os.fstat(2))
 )
-inputs = {{name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in job["input"]}}
+inputs = {{name: hashlib.sha256(read(name)).hexdigest() for name in job["input"]}}
 content = {{"frames": [], "external_files": [], "cost_samples": 4, "inputs": inputs}}
 content |= {{"sources": {{}}, "members": {{}}}}
 content["command"] = sys.argv
 listing = {{"files": {{}}}}
 for name in job["output"]:
-    is_list = Path(name).name == "export.json" or "-" in Path(name).stem
-    Path(name).write_text(json.dumps(content | {{"name": name}} | (listing if is_list else {{}})))
+    last = os.path.basename(name)
+    is_list = last == "export.json" or "-" in last.rpartition(".")[0]
+    with open(name, "w") as file:
+        json.dump(content | {{"name": name}} | (listing if is_list else {{}}), file)
 """
 # Options that say how a job runs, not what it makes.
 MACHINE = {"--threads", "--processes", "--cores", "--device", "--stall"}
@@ -187,12 +192,12 @@ class Build:
     def start(self, *arguments):
         """Start a process of its own that makes everything."""
         return subprocess.Popen(
-            [sys.executable, "-m", "snakemake", *self.command_line(*arguments)],
+            [forks.python(), "snakemake.py", *self.command_line(*arguments)],
             cwd=self.folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+            env=os.environ | {forks.PYTHON_OF_JOBS: sys.executable},
         )
 
     def command_line(self, *arguments):
@@ -200,7 +205,8 @@ class Build:
 
     def snakemake(self, *arguments):
         """Run everything. Return the terminal's stderr."""
-        result = snakemake(self.folder, *self.command_line(*arguments))
+        env = {forks.PYTHON_OF_JOBS: sys.executable}
+        result = snakemake(self.folder, *self.command_line(*arguments), env=env)
         assert result.returncode == 0, result.stdout + result.stderr
         return result.stderr
 

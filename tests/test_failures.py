@@ -155,7 +155,6 @@ class Failing:
         """Run Snakemake. ``work`` maps each job's log to what the job writes."""
         env = {
             "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
-            "PYTHONPATH": str(Path(__file__).parent),
             "WORK_TO_DO": json.dumps(work or {}),
         }
         arguments = ("--cores", "1", *arguments)

@@ -4,9 +4,9 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
+import forks
 import numpy as np
 import pytest
 from checkouts import checkout, snakemake
@@ -258,7 +258,7 @@ def count(folder, *states):
     settings = {"family": "rooms", "records": [str(folder / "record.json")]}
     (folder / "settings.json").write_text(json.dumps(settings))
     paths = {name: str(folder / name) for name in ("settings.json", "failed.txt", "members.json")}
-    command = [sys.executable, str(ROOT / "scripts/count_members.py")]
+    command = [forks.python(), ROOT / "scripts/count_members.py"]
     command += ["--settings", paths["settings.json"], "--failed", paths["failed.txt"]]
     return subprocess.run(
         [*command, "--output", paths["members.json"]], capture_output=True, text=True, check=False
@@ -348,7 +348,7 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     view = members / "0001/LFPlane/exr/view_0000f.exr"
     content = view.read_bytes()
     view.write_bytes(content[:-1])
-    verify = [sys.executable, ROOT / "scripts/verify.py", "results/rooms"]
+    verify = [forks.python(), ROOT / "scripts/verify.py", "results/rooms"]
     found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
     assert found.returncode == 1
     assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in found.stdout

@@ -5,7 +5,6 @@ import math
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import forks
@@ -38,7 +37,7 @@ exports:
   instant_ngp: {sources: [perspective], depth: true}
 """
 
-# Runs Snakemake with another Python for its jobs, then writes how often it listed each folder.
+# Runs Snakemake, then writes how often it listed each folder.
 COUNTING = """
 import atexit, collections, json, os, sys
 listings = collections.Counter()
@@ -47,7 +46,6 @@ def count(event, arguments):
         listings[os.path.relpath(os.fsdecode(arguments[0] or "."))] += 1
 sys.addaudithook(count)
 atexit.register(lambda: json.dump(listings, open("listings.json", "w")))
-sys.executable = sys.argv.pop(1)
 from snakemake.cli import main
 main(sys.argv[1:])
 """
@@ -65,7 +63,6 @@ class Timer(threading.Timer):
         waiting -= 1
 threading.Timer = Timer
 atexit.register(lambda: json.dump(most, open("timers.json", "w")))
-sys.executable = sys.argv.pop(1)
 from snakemake.cli import main
 main(sys.argv[1:])
 """
@@ -221,16 +218,18 @@ def test_nothing_is_rendered_for_imported_views(published, tmp_path):
     assert again[1].sum() == pytest.approx(again[0].sum() / 2, rel=0.01)
 
 
-def run_of_theirs(script):
+def run_of_theirs(folder, script):
     """Return a command that builds the imported views by a script that runs Snakemake."""
-    command = [sys.executable, "-c", script, forks.python(), "--cores", "1"]
+    program = folder / "run.py"
+    program.write_text(script)
+    command = [forks.python(), program, "--cores", "1"]
     return [*command, "--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full"]
 
 
 @pytest.mark.slow
 def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
     """Thousands of shards share a folder of many thousand files."""
-    command = run_of_theirs(COUNTING)
+    command = run_of_theirs(tmp_path, COUNTING)
     of_views_and_records = []
     for views_per_shard in (4, 1):
         arguments = [*command, f"views_per_shard={views_per_shard}"]
@@ -251,7 +250,7 @@ def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
 @pytest.mark.slow
 def test_waiting_for_jobs_costs_the_same_for_any_number_of_finished_jobs(published, tmp_path):
     """With a timer for each of hundreds of jobs, Snakemake would check jobs without a pause."""
-    command = [*run_of_theirs(TIMING), "views_per_shard=1"]
+    command = [*run_of_theirs(tmp_path, TIMING), "views_per_shard=1"]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     assert json.loads((tmp_path / "timers.json").read_text()) <= 2
 

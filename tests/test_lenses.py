@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import forks
 import mpmath
 import numpy as np
 import pytest
@@ -133,7 +134,7 @@ def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
     ]
     program = Path(__file__).with_name("cycles_positions.py")
     subprocess.run(
-        [sys.executable, program, output],
+        [forks.python(), program, output],
         input=json.dumps(cases),
         text=True,
         check=True,

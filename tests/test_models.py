@@ -6,10 +6,10 @@ import os
 import shutil
 import struct
 import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import forks
 import numpy as np
 import pytest
 from checkouts import checkout, jobs_on, snakemake
@@ -33,7 +33,7 @@ def renders(tmp_path_factory):
     program = Path(__file__).with_name("exported_models.py")
     environment = os.environ | {"PYTHONPATH": f"{SCRIPTS}{os.pathsep}{program.parent}"}
     result = subprocess.run(
-        [sys.executable, program, folder], capture_output=True, text=True, env=environment
+        [forks.python(), program, folder], capture_output=True, text=True, env=environment
     )
     assert result.returncode == 0, result.stderr
     with np.load(folder / "pictures.npz") as pictures:

@@ -9,8 +9,8 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 
+import forks
 import pytest
 from checkouts import checkout, planned, snakemake
 
@@ -142,7 +142,7 @@ def test_damage_is_found_before_its_checksum_is_published(folder):
     transforms = folder / f"results/smoke/{CUBOID}/perspective/transforms.json"
     text = transforms.read_text()
     transforms.write_text(text.replace("0.", "1.", 1))
-    validate = [sys.executable, "scripts/validate.py", f"results/smoke/{CUBOID}"]
+    validate = [forks.python(), "scripts/validate.py", f"results/smoke/{CUBOID}"]
     paths = ["--ledger", "work/ledger.txt", "--output", "v.json", "--sums", "sums.txt"]
     sets = ["--reprojection", "perspective", "perspective_hdr"]
     subprocess.run([*validate, *paths, *sets], cwd=folder, check=True)

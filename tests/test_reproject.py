@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import forks
 import numpy as np
 import pytest
 
@@ -745,7 +746,7 @@ def renders(tmp_path_factory):
     ]
     program = Path(__file__).parent / "render_lenses.py"
     result = subprocess.run(
-        [sys.executable, program, path],
+        [forks.python(), program, path],
         input=json.dumps(cases),
         capture_output=True,
         text=True,

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import forks
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -136,7 +137,7 @@ def free_places(blend, rig, output):
     settings.write_text(json.dumps({"rig": rig}))
     arguments = ["--blend", blend, "--settings", settings, "--output", output]
     return subprocess.run(
-        [sys.executable, SCRIPTS / "free_places.py", *arguments],
+        [forks.python(), SCRIPTS / "free_places.py", *arguments],
         capture_output=True,
         text=True,
         check=False,

@@ -7,11 +7,13 @@ import resource
 import shutil
 import signal
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import psutil
 import pytest
-from checkouts import checkout, rendered, snakemake, start_snakemake, wait_until
+from checkouts import checkout, rendered, snakemake, start_snakemake
+from checkouts import wait_until as wait_until_soon
 from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
@@ -38,6 +40,8 @@ WORDS = [
     *(f"work/{CUBOID}/perspective/{shard}.json" for shard in SHARDS),
     f"work/{CUBOID}/panorama/exr/view_0000f.exr",
 ]
+# Slurm takes minutes, in which many looks would take time from other tests.
+wait_until = partial(wait_until_soon, pause=0.1)
 IMPATIENT = Path(__file__).with_name("impatient")
 pytestmark = [
     pytest.mark.slow,
@@ -64,7 +68,7 @@ OF_ROOMS = ["--config", "scenes=rooms", "rigs=all", "preset=full"]
 def slower_checkout(folder: Path) -> Path:
     """Return a checkout whose views take seconds, so that a test can stop a shard between them."""
     path = checkout(folder) / "configs/scenes/smoke.yaml"
-    path.write_text(path.read_text().replace("samples: 4\n", "samples: 120\n"))
+    path.write_text(path.read_text().replace("samples: 4\n", "samples: 60\n"))
     return folder
 
 
