@@ -32,9 +32,19 @@ def pytest_sessionstart(session):
         compileall.compile_dir(SCRIPTS, quiet=2)
 
 
-# Each of these files takes more than a minute. The first four begin at once. One of them makes the
-# smoke dataset, whose kernels the later ones need.
-LONG = ("slurm", "every_rule", "provenance", "failures", "storage", "soak", "workflow", "damage")
+# Each of these files takes more than half a minute. The first four begin at once. Of these, only
+# provenance compiles kernels, for the smoke dataset. The later files use the compiled kernels.
+LONG = (
+    "every_rule",
+    "provenance",
+    "failures",
+    "frames",
+    "slurm",
+    "storage",
+    "soak",
+    "workflow",
+    "damage",
+)
 
 
 @pytest.hookimpl(tryfirst=True)
