@@ -149,11 +149,13 @@ import hashlib, json, os, sys
 def read(name):
     with open(name, "rb") as file:
         return file.read()
-work = json.loads(read("work_to_do.json"))
-(job,) = (
-    job for log, job in work.items()
-    if os.path.exists(log) and os.path.samestat(os.stat(log), os.fstat(2))
-)
+def is_own(log):
+    # Snakemake removes the old log of each job that it starts meanwhile.
+    try:
+        return os.path.samestat(os.stat(log), os.fstat(2))
+    except FileNotFoundError:
+        return False
+(job,) = (job for log, job in json.loads(read("work_to_do.json")).items() if is_own(log))
 inputs = {{name: hashlib.sha256(read(name)).hexdigest() for name in job["input"]}}
 content = {{"frames": [], "external_files": [], "cost_samples": 4, "inputs": inputs}}
 content |= {{"sources": {{}}, "members": {{}}}}
