@@ -1,11 +1,12 @@
 """Prints the SHA-256 of everything that builders make, and on request that of a small render.
 
-Run as `python scene_fingerprint.py BUILDER SEED WITH_PIXELS ...`, with three words for each scene.
-WITH_PIXELS is 0 or 1. One process builds all scenes, because a start of Blender takes long.
+Run as `python scene_fingerprint.py SCENES`. SCENES is JSON: [builder, seed, with_pixels] of each
+scene. One process builds all scenes, because a start of Blender takes long.
 """
 
 import hashlib
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -20,9 +21,8 @@ def fingerprints(scenes, hash_seed):
 
     Each scene is (builder, seed, whether to render it). Return the fingerprints in the same order.
     """
-    words = [word for builder, seed, pixels in scenes for word in (builder, seed, int(pixels))]
     result = subprocess.run(
-        [sys.executable, __file__, *map(str, words)],
+        [sys.executable, __file__, json.dumps(scenes)],
         capture_output=True,
         text=True,
         check=True,
@@ -81,9 +81,8 @@ def print_fingerprint(builder, seed, with_pixels):
 
 
 def main():
-    words = sys.argv[1:]
-    for builder, seed, pixels in zip(words[::3], words[1::3], words[2::3], strict=True):
-        print_fingerprint(builder, int(seed), pixels == "1")
+    for builder, seed, with_pixels in json.loads(sys.argv[1]):
+        print_fingerprint(builder, seed, with_pixels)
 
 
 if __name__ == "__main__":

@@ -167,6 +167,8 @@ for name in job["output"]:
     with open(name, "w") as file:
         json.dump(content | {{"name": name}} | (listing if is_list else {{}}), file)
 """
+# Stand-ins import little, so they start faster in processes of their own.
+ENVIRONMENT = {forks.PYTHON_OF_JOBS: sys.executable}
 # Options that say how a job runs, not what it makes.
 MACHINE = {"--threads", "--processes", "--cores", "--device", "--stall"}
 
@@ -199,7 +201,7 @@ class Build:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {forks.PYTHON_OF_JOBS: sys.executable},
+            env=os.environ | ENVIRONMENT,
         )
 
     def command_line(self, *arguments):
@@ -207,8 +209,7 @@ class Build:
 
     def snakemake(self, *arguments):
         """Run everything. Return the terminal's stderr."""
-        env = {forks.PYTHON_OF_JOBS: sys.executable}
-        result = snakemake(self.folder, *self.command_line(*arguments), env=env)
+        result = snakemake(self.folder, *self.command_line(*arguments), env=ENVIRONMENT)
         assert result.returncode == 0, result.stdout + result.stderr
         return result.stderr
 

@@ -46,8 +46,8 @@ export function polyline(context, points) {
   points.forEach(([x, y], place) => (place ? context.lineTo(x, y) : context.moveTo(x, y)));
 }
 
-// Return the distance between two fingers.
+// Return the distance between two fingers, at least a pixel. The zoom follows from a quotient.
 export const distanceOfTwo = (pointers) => {
   const [first, second] = [...pointers.values()];
-  return Math.hypot(first.x - second.x, first.y - second.y);
+  return Math.max(Math.hypot(first.x - second.x, first.y - second.y), 1);
 };
