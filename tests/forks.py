@@ -1,9 +1,9 @@
-"""Runs Snakemake and the programs in forks of one process, which has imported their libraries.
+"""Runs Snakemake and the programs in forks of processes that have imported what these need.
 
-Most of the time of a short run are imports of libraries. Each fork reads the Snakefile and the
-project's own code anew, as a process of its own does. Blender's library is loaded here, and counts
-the processors. Blender is imported in the fork, because its import starts threads, which a fork
-lacks.
+Most of the time of a short run are imports. A server imports the libraries. It starts a process for
+each folder with the project's code, such as a test's checkout, which imports that code and forks.
+Blender's library is loaded by the server, and counts the processors. Blender is imported in the
+fork, because its import starts threads, which a fork lacks.
 """
 
 import atexit
@@ -31,26 +31,51 @@ LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
     "snakemake.report",
     "snakemake.report.html_reporter",
+    "snakemake.storage",
+    "graphlib",
     "smart_open",
     # What the programs import.
     "numba",
+    "numba.cpython.numbers",
+    "numba.np.linalg",
     "OpenEXR",
     "OpenImageIO",
     "PIL.Image",
-    "pydantic",
+    "PIL.ImageOps",
+    "pydantic.functional_serializers",
     "psutil",
+    "statistics",
+    "tomllib",
     "yaml",
     "scipy.ndimage",
     "scipy.optimize",
     "scipy.spatial",
     "scipy.stats",
+    "skimage.exposure",
     "skimage.metrics",
+    "skimage.util",
     "matplotlib.pyplot",
     "matplotlib.style",
     "matplotlib.backends.backend_svg",
 )
 # What Blender imports. Not every version needs, and brings, all of it.
 BLENDER_LIBRARIES = ("cattrs.preconf.json", "requests")
+# What many programs import of the project's code. None of it imports Blender.
+CODE = (
+    "lightfield.core.failures",
+    "lightfield.core.leftovers",
+    "lightfield.core.run_display",
+    "lightfield.dataset.job_settings",
+    "lightfield.dataset.loading",
+    "lightfield.dataset.shard_files",
+    "lightfield.export.instant_ngp",
+    "lightfield.measurement.forecast",
+    "lightfield.report.page",
+    "lightfield.reprojection.job",
+    "lightfield.validation.consistency",
+)
+# Tests use few folders at a time, and a process for each takes memory.
+MOST_IMPORTERS = 4
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
 # Stands for python. It starts forks for programs and Snakemake, and processes for all else.
@@ -69,6 +94,8 @@ exec {python} -IS {client} {socket} snakemake.py "$@"
 PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
 # The exit status of a fork, once its program has ended.
 STATUS = []
+# The states of the files with the project's code, when it was imported.
+STATES = {}
 # The folders of the servers of this test process, by the command that starts them.
 _FOLDERS = {}
 
@@ -118,9 +145,46 @@ def python(prefix=()):
 
 
 def serve(folder):
-    """Fork for each request on the socket in a folder. Return in each fork, after its program."""
+    """Take requests on the socket in a folder. Return in each fork, after its program."""
     # The first function that is registered is called last.
     atexit.register(leave)
+    import_libraries()
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.bind(f"{folder}/socket")
+    listener.listen(64)
+    print("listening", flush=True)
+    # The connections to the processes that fork, by the folder of the code that each has imported.
+    importers = {}
+    while True:
+        client, _ = listener.accept()
+        message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
+        # A client that was killed sends nothing.
+        if message:
+            code = find_code(marshal.loads(message))
+            if code in importers:
+                # The last one is the one that was used last.
+                importers[code] = importers.pop(code)
+            else:
+                importers[code], requests = socket.socketpair(type=socket.SOCK_SEQPACKET)
+                if not os.fork():
+                    for connection in (listener, client, *importers.values()):
+                        connection.close()
+                    for descriptor in descriptors:
+                        os.close(descriptor)
+                    import_code(code)
+                    fork_for(requests, folder)
+                    return
+                requests.close()
+            socket.send_fds(importers[code], [message], [*descriptors, client.fileno()])
+            if len(importers) > MOST_IMPORTERS:
+                importers.pop(next(iter(importers))).close()
+        client.close()
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+
+def import_libraries():
+    """Import what Snakemake and many programs import."""
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
     # Finds and imports the plugins, also that of this folder. Snakemake searches once in a process.
@@ -130,44 +194,94 @@ def serve(folder):
     for name in BLENDER_LIBRARIES:
         with suppress(ModuleNotFoundError):
             importlib.import_module(name)
+    # These libraries import most of themselves at the first model and at the first image.
+    pydantic = sys.modules["pydantic"]
+    pydantic.TypeAdapter(pydantic.create_model("First", value=int)).json_schema()
+    sys.modules["PIL.Image"].init()
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
-    # Otherwise the collector would copy the memory of each fork. Most end before it is needed.
+    # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()
-    gc.set_threshold(20_000)
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listener.bind(f"{folder}/socket")
-    listener.listen(64)
-    print("listening", flush=True)
+    gc.disable()
+
+
+def find_code(request):
+    """Return the folder from which a request would import the project's code, or None."""
+    program = request["arguments"][0]
+    # The Snakefile and a program import from the folder of the programs first.
+    own_folder = "scripts" if program == "snakemake.py" else Path(program).parent
+    for name in (own_folder, *request["env"].get("PYTHONPATH", "").split(os.pathsep)):
+        folder = Path(request["folder"], name)
+        if (folder / "lightfield").is_dir():
+            return folder
+    return None
+
+
+def import_code(folder):
+    """Import what many programs import of the project's code in a folder, if there is one."""
+    if folder is None:
+        return
+    sys.path.insert(0, str(folder))
+    for name in CODE:
+        # A test may have broken the code. Its program then fails by itself.
+        with suppress(Exception):
+            importlib.import_module(name)
+    sys.path.remove(str(folder))
+    STATES.update({file: state_of(file) for file in (folder / "lightfield").rglob("*.py")})
+    gc.freeze()
+
+
+def state_of(file):
+    """Return what changes if a file is written. None if the file is missing."""
+    with suppress(FileNotFoundError):
+        status = file.stat()
+        return status.st_mtime_ns, status.st_size
+    return None
+
+
+def forget_changed_code():
+    """Let a fork import the project's code anew, if a test has changed it since its import."""
+    own_names = [name for name in sys.modules if name.partition(".")[0] == "lightfield"]
+    files = [Path(sys.modules[name].__file__) for name in own_names]
+    if any(state_of(file) != STATES[file] for file in files):
+        for name in own_names:
+            del sys.modules[name]
+
+
+def fork_for(requests, folder):
+    """Fork for each request on a connection. Return in each fork, after its program.
+
+    Also return once the connection is closed and all forks have ended.
+    """
     forks = []
-    while True:
+    is_open = True
+    while is_open or forks:
         watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
-        ready, _, _ = select.select([listener, *watched], [], [])
+        ready, _, _ = select.select([requests, *watched] if is_open else watched, [], [])
         for fork in [*forks]:
             if fork.ended in ready:
                 fork.pass_status()
                 forks.remove(fork)
             elif fork.client in ready:
                 fork.pass_signal()
-        if listener not in ready:
+        if requests not in ready:
             continue
-        client, _ = listener.accept()
-        message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
+        message, descriptors, _, _ = socket.recv_fds(requests, MOST_BYTES, 4)
         if not message:
-            # The client was killed.
-            client.close()
+            is_open = False
             continue
+        *standard, client = descriptors
         process = os.fork()
         if not process:
-            listener.close()
-            client.close()
+            requests.close()
+            os.close(client)
             for fork in forks:
                 fork.close()
-            run(marshal.loads(message), descriptors, folder)
+            run(marshal.loads(message), standard, folder)
             return
-        for descriptor in descriptors:
+        for descriptor in standard:
             os.close(descriptor)
         os.setpgid(process, process)
-        forks.append(Fork(process, client))
+        forks.append(Fork(process, socket.socket(fileno=client)))
 
 
 class Fork:
@@ -204,6 +318,7 @@ class Fork:
 def run(request, descriptors, folder):
     """Turn a fork into the process of a request, and run its program until it ends."""
     try:
+        forget_changed_code()
         become(request, descriptors)
         run_program(folder)
     except SystemExit as end:
