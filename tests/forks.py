@@ -155,12 +155,17 @@ def serve(folder):
     print("listening", flush=True)
     # The connections to the processes that fork, by the folder of the code that each has imported.
     importers = {}
+    requested = set()
     while True:
         client, _ = listener.accept()
         message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
         # A client that was killed sends nothing.
         if message:
             code = find_code(marshal.loads(message))
+            if code not in requested:
+                # The import only pays if another program needs it, too.
+                requested.add(code)
+                code = None
             if code in importers:
                 # The last one is the one that was used last.
                 importers[code] = importers.pop(code)
@@ -226,8 +231,18 @@ def import_code(folder):
         with suppress(Exception):
             importlib.import_module(name)
     sys.path.remove(str(folder))
-    STATES.update({file: state_of(file) for file in (folder / "lightfield").rglob("*.py")})
+    STATES.update({file: state_of(file) for file in map(file_of, own_names())})
     gc.freeze()
+
+
+def own_names():
+    """Return the names of the project's modules that are imported."""
+    return [name for name in sys.modules if name.partition(".")[0] == "lightfield"]
+
+
+def file_of(name):
+    """Return the file of an imported module."""
+    return Path(sys.modules[name].__file__)
 
 
 def state_of(file):
@@ -240,10 +255,8 @@ def state_of(file):
 
 def forget_changed_code():
     """Let a fork import the project's code anew, if a test has changed it since its import."""
-    own_names = [name for name in sys.modules if name.partition(".")[0] == "lightfield"]
-    files = [Path(sys.modules[name].__file__) for name in own_names]
-    if any(state_of(file) != STATES[file] for file in files):
-        for name in own_names:
+    if any(state_of(file) != state for file, state in STATES.items()):
+        for name in own_names():
             del sys.modules[name]
 
 

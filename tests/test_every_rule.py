@@ -266,24 +266,35 @@ def pristine(tmp_path_factory):
     return build
 
 
+def states(folder):
+    """Return the size and the time of each file below a folder. A folder has None, and is first."""
+    sizes_and_times = {}
+    for entry in os.scandir(folder):
+        if entry.is_dir():
+            sizes_and_times[entry.path] = None
+            sizes_and_times |= states(entry.path)
+        else:
+            status = entry.stat()
+            sizes_and_times[entry.path] = (status.st_size, status.st_mtime_ns)
+    return sizes_and_times
+
+
 def restore(build):
     """Undo all changes in a build's folder. Copies what differs, because there are many files."""
-    pristine = build.folder.with_name("pristine")
-    # The content of a folder comes before the folder.
-    for path in sorted(build.folder.rglob("*"), reverse=True):
-        if not (pristine / path.relative_to(build.folder)).exists():
-            path.rmdir() if path.is_dir() else path.unlink()
-    for original in sorted(pristine.rglob("*")):
-        path = build.folder / original.relative_to(pristine)
-        if original.is_dir():
-            path.mkdir(exist_ok=True)
-        elif not path.exists() or size_and_time(path) != size_and_time(original):
-            shutil.copy2(original, path)
-
-
-def size_and_time(path):
-    status = path.stat()
-    return status.st_size, status.st_mtime_ns
+    folder = str(build.folder)
+    pristine = str(build.folder.with_name("pristine"))
+    wanted = {
+        folder + path.removeprefix(pristine): state for path, state in states(pristine).items()
+    }
+    present = states(folder)
+    for path in reversed(present):
+        if path not in wanted:
+            Path(path).rmdir() if present[path] is None else Path(path).unlink()
+    for path, state in wanted.items():
+        if state is None:
+            Path(path).mkdir(exist_ok=True)
+        elif present.get(path) != state:
+            shutil.copy2(pristine + path.removeprefix(folder), path)
 
 
 @pytest.fixture

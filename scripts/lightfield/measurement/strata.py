@@ -121,4 +121,7 @@ def _around(
             by_noise.append((float(noisy[row, column]), Window(view, x, y, side, side)))
     by_noise.sort(key=lambda entry: entry[0])
     windows = [window for _, window in by_noise]
-    return [w for w in windows if maker.mask(w).mean() >= FULL_ENOUGH] or windows
+    # The views have windows at the same places.
+    places = {(w.x, w.y): w for w in windows}
+    full = {place for place, w in places.items() if maker.mask(w).mean() >= FULL_ENOUGH}
+    return [w for w in windows if (w.x, w.y) in full] or windows
