@@ -27,9 +27,11 @@ SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "rend
 
 
 def pytest_sessionstart(session):
-    """Compile the programs once, before workers start. Each checkout copies the compiled files."""
+    """Do once what all workers need. Each checkout copies the compiled files."""
     if not hasattr(session.config, "workerinput"):
         compileall.compile_dir(SCRIPTS, quiet=2)
+        if session.config.getoption("numprocesses", None):
+            forks.share_server()
 
 
 # Each of these files takes more than half a minute. The first four begin at once. Of these, only

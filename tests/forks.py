@@ -24,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 LIBRARIES = (
@@ -75,7 +75,7 @@ CODE = (
     "lightfield.validation.consistency",
 )
 # Tests use few folders at a time, and a process for each takes memory.
-MOST_IMPORTERS = 4
+MOST_IMPORTERS = 12
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
 # Stands for python. It starts forks for programs and Snakemake, and processes for all else.
@@ -96,7 +96,9 @@ PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
 STATUS = []
 # The states of the files with the project's code, when it was imported.
 STATES = {}
-# The folders of the servers of this test process, by the command that starts them.
+# Names the folder of the server that all test processes share.
+SHARED = "SERVER_OF_FORKS"
+# The folders of the servers that this test process uses, by the command that starts them.
 _FOLDERS = {}
 
 
@@ -119,73 +121,106 @@ def run_snakemake(arguments, folder, env=None, merge_outputs=False, prefix=()):
 
 
 def python(prefix=()):
-    """Return the path of a ``python`` that runs programs in forks. Starts their server.
+    """Return the path of a ``python`` that runs programs in forks. Starts their server if need be.
 
     A ``snakemake`` is beside it.
     """
     prefix = tuple(map(str, prefix))
     if prefix not in _FOLDERS:
-        home = tempfile.TemporaryDirectory(prefix="forks")
-        atexit.register(home.cleanup)
-        folder = Path(home.name)
-        names = {"python": sys.executable, "client": Path(__file__).with_name("fork_client.py")}
-        names |= {"socket": folder / "socket", "snakemake": folder / "snakemake"}
-        quoted = {name: shlex.quote(str(path)) for name, path in names.items()}
-        for name, script in (("python", PYTHON), ("snakemake", SNAKEMAKE)):
-            (folder / name).write_text(script.format(**quoted))
-            (folder / name).chmod(0o755)
-        server = subprocess.Popen(
-            [*prefix, sys.executable, Path(__file__), folder], stdout=subprocess.PIPE
-        )
-        atexit.register(server.kill)
-        # It writes a line when it listens.
-        server.stdout.readline()
-        _FOLDERS[prefix] = folder
+        shared = None if prefix else os.environ.get(SHARED)
+        _FOLDERS[prefix] = Path(shared) if shared else start_server(prefix)
     return _FOLDERS[prefix] / "python"
 
 
-def serve(folder):
-    """Take requests on the socket in a folder. Return in each fork, after its program."""
+def share_server():
+    """Start a server for the test processes that this process will start."""
+    os.environ[SHARED] = str(start_server())
+
+
+def start_server(prefix=()):
+    """Start a server, with ``prefix`` before its command. Return its folder."""
+    home = tempfile.TemporaryDirectory(prefix="forks")
+    atexit.register(home.cleanup)
+    folder = Path(home.name)
+    names = {"python": sys.executable, "client": Path(__file__).with_name("fork_client.py")}
+    names |= {"socket": folder / "socket", "snakemake": folder / "snakemake"}
+    quoted = {name: shlex.quote(str(path)) for name, path in names.items()}
+    for name, script in (("python", PYTHON), ("snakemake", SNAKEMAKE)):
+        (folder / name).write_text(script.format(**quoted))
+        (folder / name).chmod(0o755)
+    # Clients can connect at once, and wait until the server has imported the libraries.
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(names["socket"]))
+        listener.listen(64)
+        server = subprocess.Popen(
+            [*prefix, sys.executable, Path(__file__), folder, str(listener.fileno())],
+            pass_fds=[listener.fileno()],
+        )
+    atexit.register(server.kill)
+    return folder
+
+
+class Server:
+    """Passes requests to processes that fork.
+
+    ``folder`` holds the python that starts forks. Clients connect to the socket ``listener``.
+    ``importers`` are the connections to the processes that fork, by the folder of the code that
+    each has imported. The last one is the one that was used last.
+    """
+
+    def __init__(self, folder, listener):
+        self.folder = folder
+        self.listener = listener
+        self.importers = {}
+        self.requested = set()
+
+    def pass_request(self):
+        """Wait for a request, and pass it on."""
+        with ExitStack() as opened:
+            client, _ = self.listener.accept()
+            opened.enter_context(client)
+            message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
+            for descriptor in descriptors:
+                opened.callback(os.close, descriptor)
+            # A client that was killed sends nothing.
+            if message:
+                code = find_code(marshal.loads(message))
+                # An import pays only if another program needs it, too.
+                importer = self.importer_of(code if code in self.requested else None, opened)
+                self.requested.add(code)
+                socket.send_fds(importer, [message], [*descriptors, client.fileno()])
+
+    def importer_of(self, code, opened):
+        """Return the connection to the process that has imported the code in a folder.
+
+        Starts this process if need be, without the files in ``opened``.
+        """
+        if code in self.importers:
+            self.importers[code] = self.importers.pop(code)
+            return self.importers[code]
+        connection, requests = socket.socketpair(type=socket.SOCK_SEQPACKET)
+        if not os.fork():
+            opened.close()
+            for inherited in (self.listener, connection, *self.importers.values()):
+                inherited.close()
+            import_code(code)
+            fork_for(requests, self.folder)
+            sys.exit()
+        requests.close()
+        self.importers[code] = connection
+        if len(self.importers) > MOST_IMPORTERS:
+            self.importers.pop(next(iter(self.importers))).close()
+        return connection
+
+
+def serve(folder, listener):
+    """Serve requests on a socket, for ever."""
     # The first function that is registered is called last.
     atexit.register(leave)
     import_libraries()
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    listener.bind(f"{folder}/socket")
-    listener.listen(64)
-    print("listening", flush=True)
-    # The connections to the processes that fork, by the folder of the code that each has imported.
-    importers = {}
-    requested = set()
+    server = Server(folder, listener)
     while True:
-        client, _ = listener.accept()
-        message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
-        # A client that was killed sends nothing.
-        if message:
-            code = find_code(marshal.loads(message))
-            if code not in requested:
-                # The import only pays if another program needs it, too.
-                requested.add(code)
-                code = None
-            if code in importers:
-                # The last one is the one that was used last.
-                importers[code] = importers.pop(code)
-            else:
-                importers[code], requests = socket.socketpair(type=socket.SOCK_SEQPACKET)
-                if not os.fork():
-                    for connection in (listener, client, *importers.values()):
-                        connection.close()
-                    for descriptor in descriptors:
-                        os.close(descriptor)
-                    import_code(code)
-                    fork_for(requests, folder)
-                    return
-                requests.close()
-            socket.send_fds(importers[code], [message], [*descriptors, client.fileno()])
-            if len(importers) > MOST_IMPORTERS:
-                importers.pop(next(iter(importers))).close()
-        client.close()
-        for descriptor in descriptors:
-            os.close(descriptor)
+        server.pass_request()
 
 
 def import_libraries():
@@ -261,10 +296,7 @@ def forget_changed_code():
 
 
 def fork_for(requests, folder):
-    """Fork for each request on a connection. Return in each fork, after its program.
-
-    Also return once the connection is closed and all forks have ended.
-    """
+    """Fork for each request on a connection, until it is closed and all forks have ended."""
     forks = []
     is_open = True
     while is_open or forks:
@@ -290,7 +322,7 @@ def fork_for(requests, folder):
             for fork in forks:
                 fork.close()
             run(marshal.loads(message), standard, folder)
-            return
+            sys.exit()
         for descriptor in standard:
             os.close(descriptor)
         os.setpgid(process, process)
@@ -382,4 +414,4 @@ def run_program(folder):
 
 
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]))
+    serve(Path(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
