@@ -13,6 +13,8 @@ PIP = .venv/bin/pip -qq --disable-pip-version-check
 # Compiles an environment's packages on all cores. pip would take one. Some packages bring files that
 # are no valid Python, so errors do not count.
 COMPILE = bin/python -m compileall -qq -j 0
+# Some containers set this variable. Each of the tests' processes would then compile the code anew.
+PYTEST = env -u PYTHONDONTWRITEBYTECODE python -m pytest
 # The version of the environment's Python, as in the locks' names, and the other supported version.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
@@ -26,13 +28,13 @@ all: .venv/complete
 test: check
 	python envs/check_system.py --tests
 	@# Two processes more than cores, because some tests wait: for Slurm, killed jobs, or a browser.
-	python -m pytest -n $$(( $(CORES) + 2 ))
+	$(PYTEST) -n $$(( $(CORES) + 2 ))
 
 test-other: export PATH := $(CURDIR)/.venv-other/bin:$(PATH)
 test-other: .venv-other/complete
 	@# Its numpy has other types.
 	mypy scripts/lightfield
-	python -m pytest -n $(CORES) -m "not slow"
+	$(PYTEST) -n $(CORES) -m "not slow"
 
 # Style, types, and Snakemake's own advice.
 check: .venv/complete-for-tests
