@@ -266,8 +266,19 @@ def import_code(folder):
         with suppress(Exception):
             importlib.import_module(name)
     sys.path.remove(str(folder))
+    # Pydantic would build a model's validator for the first value that it checks.
+    for model in subclasses(sys.modules["pydantic"].BaseModel):
+        if model.__module__.startswith("lightfield."):
+            with suppress(Exception):
+                model.model_rebuild()
     STATES.update({file: state_of(file) for file in map(file_of, own_names())})
     gc.freeze()
+
+
+def subclasses(base):
+    """Return all classes below a class."""
+    children = base.__subclasses__()
+    return [*children, *(below for child in children for below in subclasses(child))]
 
 
 def own_names():
