@@ -271,7 +271,9 @@ def import_code(folder):
         if model.__module__.startswith("lightfield."):
             with suppress(Exception):
                 model.model_rebuild()
-    STATES.update({file: state_of(file) for file in map(file_of, own_names())})
+    for name in own_names():
+        file = Path(sys.modules[name].__file__)
+        STATES[file] = state_of(file)
     gc.freeze()
 
 
@@ -286,13 +288,11 @@ def own_names():
     return [name for name in sys.modules if name.partition(".")[0] == "lightfield"]
 
 
-def file_of(name):
-    """Return the file of an imported module."""
-    return Path(sys.modules[name].__file__)
-
-
 def state_of(file):
-    """Return what changes if a file is written. None if the file is missing."""
+    """Return what changes if a file is written. None if the file is missing.
+
+    The project has such a function, but a fork must import it from the folder of its program.
+    """
     with suppress(FileNotFoundError):
         status = file.stat()
         return status.st_mtime_ns, status.st_size

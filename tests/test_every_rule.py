@@ -19,6 +19,7 @@ from checkouts import PUBLISHED_VIEWS as IMPORTED
 from checkouts import checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
+from lightfield.core.files import size_and_time
 from lightfield.dataset import ledger
 
 pytestmark = pytest.mark.slow
@@ -270,12 +271,9 @@ def states(folder):
     """Return the size and the time of each file below a folder. A folder has None, and is first."""
     sizes_and_times = {}
     for entry in os.scandir(folder):
+        sizes_and_times[entry.path] = size_and_time(entry.path)
         if entry.is_dir():
-            sizes_and_times[entry.path] = None
             sizes_and_times |= states(entry.path)
-        else:
-            status = entry.stat()
-            sizes_and_times[entry.path] = (status.st_size, status.st_mtime_ns)
     return sizes_and_times
 
 
