@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -90,19 +89,6 @@ def keep_kernels(folder):
                 for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
                     shutil.copy2(path, cache / f"{path.name}.tmp")
                     (cache / f"{path.name}.tmp").replace(cache / path.name)
-
-
-def wait_until(condition, process, seconds=600, log=None, pause=0.02):
-    """Wait until a condition holds. Fails, with the ``log``, if the process ends before that.
-
-    ``pause`` is the time between two looks, in seconds.
-    """
-    end = time.monotonic() + seconds
-    while not condition():
-        assert process.poll() is None, log.read_text() if log else f"{process.args} has ended"
-        if time.monotonic() > end:
-            raise TimeoutError(f"{process.args}: what was waited for is not there yet")
-        time.sleep(pause)
 
 
 def planned(folder, *arguments):

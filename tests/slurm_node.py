@@ -3,10 +3,10 @@
 python tests/slurm_node.py FOLDER COMMAND ...
 
 Installs missing packages (as root, with apt), starts the daemons, runs the command, and stops the
-daemons. These write into FOLDER and listen on the loopback address. The only file outside FOLDER is
-/etc/slurm/slurm.conf, where a job's steps look for the cluster. It is removed at the end. If this
-program is killed, the daemons end too, and the next run replaces the file. If file systems can be
-mounted, the node's temporary files lie on a small disk of its own.
+daemons. These write into FOLDER and listen on the loopback address. The only files outside FOLDER
+are slurm.conf and cgroup.conf in /etc/slurm, where a job's steps look for the cluster. They are
+removed at the end. If this program is killed, the daemons end too, and the next run replaces the
+files. If file systems can be mounted, the node's temporary files lie on a small disk of its own.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import psutil
-from checkouts import wait_until
+from waiting import wait_until
 
 PACKAGES = {
     "slurmctld": "slurmctld",
@@ -30,6 +30,10 @@ PACKAGES = {
 }
 # Slurm's commands look here by default. The executor hides SLURM_CONF from a job's steps.
 CONFIGURED = Path("/etc/slurm/slurm.conf")
+# Later versions of Slurm do not start in a container without this. Earlier ones do not know it.
+CGROUPS = CONFIGURED.with_name("cgroup.conf")
+WITHOUT_CGROUPS = "CgroupPlugin=disabled\n"
+FIRST_VERSION_WITHOUT_CGROUPS = (23, 2)
 # Debian installs daemons where not every user's PATH leads.
 PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
 # Mounts a disk that only the node's daemon and its jobs see.
@@ -107,6 +111,8 @@ class Node:
         if CONFIGURED.exists() and not _is_left_behind(CONFIGURED.read_text()):
             sys.exit(f"error: {CONFIGURED} exists: this machine already belongs to a cluster")
         CONFIGURED.write_text(content)
+        if _version() >= FIRST_VERSION_WITHOUT_CGROUPS and not CGROUPS.exists():
+            CGROUPS.write_text(WITHOUT_CGROUPS)
         self.environment = os.environ | {"PATH": PATH, "TMPDIR": f"{folder}/disk"}
         self.own_disk = ["unshare", "--mount", "sh", "-c", DISK, f"{folder}/disk"]
         if subprocess.run([*self.own_disk, "true"], capture_output=True, check=False).returncode:
@@ -116,18 +122,28 @@ class Node:
     def __enter__(self) -> "Node":
         folder = self.folder
         munge = [f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")]
-        self.start("munged", "--force", f"--socket={folder}/munge.socket", *munge)
-        self.start("slurmctld", "-D")
-        self.start_node()
+        try:
+            self.start("munged", "--force", f"--socket={folder}/munge.socket", *munge)
+            self.start("slurmctld", "-D")
+            self.start_node()
+        except BaseException:
+            self.end()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """End the daemons, and remove the files outside the folder."""
         self.run("scancel", "--state=RUNNING", "--full")
         for daemon in reversed(self.daemons.values()):
             daemon.terminate()
         for daemon in self.daemons.values():
             daemon.wait(30)
         CONFIGURED.unlink()
+        if CGROUPS.exists() and CGROUPS.read_text() == WITHOUT_CGROUPS:
+            CGROUPS.unlink()
 
     def start(self, daemon: str, *arguments: str) -> None:
         """Start a daemon in the foreground, as a child of this process."""
@@ -178,6 +194,15 @@ def _is_left_behind(configuration: str) -> bool:
         for process in psutil.process_iter(["name", "status"])
     )
     return configuration.startswith(CLUSTER) and not running
+
+
+def _version() -> tuple[int, ...]:
+    """Return the year and the month of Slurm's version."""
+    environment = os.environ | {"PATH": PATH}
+    command = ["slurmd", "-V"]
+    result = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    year, month = result.stdout.split()[-1].split(".")[:2]
+    return int(year), int(month)
 
 
 def _free_port() -> int:

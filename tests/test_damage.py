@@ -14,15 +14,9 @@ from pathlib import Path
 import forks
 import pytest
 import simulated
-from checkouts import (
-    assert_same_bytes,
-    checkout,
-    rendered,
-    snakemake,
-    start_snakemake,
-    wait_until,
-)
+from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake
 from faults import CUBOID, FAULTS, KINDS, flip, spoil
+from waiting import wait_until
 
 from lightfield.core.files import broken, set_aside, sha256
 from lightfield.dataset import ledger

@@ -15,9 +15,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from checkouts import checkout, snakemake, start_snakemake, wait_until
+from checkouts import checkout, snakemake, start_snakemake
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
+from waiting import wait_until
 
 from lightfield.core import disk_space, files, leftovers, live_runs
 from lightfield.core.errors import UserError

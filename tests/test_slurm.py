@@ -6,6 +6,8 @@ import re
 import resource
 import shutil
 import signal
+import subprocess
+import sys
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -13,8 +15,8 @@ from pathlib import Path
 import psutil
 import pytest
 from checkouts import checkout, rendered, snakemake, start_snakemake
-from checkouts import wait_until as wait_until_soon
 from slurm_node import Node, install
+from waiting import wait_until as wait_until_soon
 
 CUBOID = "smoke/LFCuboid_1x1x1"
 JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
@@ -164,6 +166,15 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path):
         views = [line for line in (folder / sums).read_text().splitlines() if "exr/" in line]
         assert len(views) == 2
         assert set(views) <= set((alone / sums).read_text().splitlines())
+
+
+def test_the_documented_program_needs_nothing_of_the_project():
+    program = Path(__file__).with_name("slurm_node.py")
+    environment = {"PATH": os.environ["PATH"]}
+    result = subprocess.run(
+        [sys.executable, program, "--help"], env=environment, capture_output=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
 
 
 def pids(journal: Path) -> set[int]:

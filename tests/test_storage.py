@@ -6,8 +6,9 @@ from collections import Counter
 
 import pytest
 import yaml
-from checkouts import PUBLISHED_VIEWS, ROOT, wait_until
+from checkouts import PUBLISHED_VIEWS, ROOT
 from sphere import write_views
+from waiting import wait_until
 
 import cloud
 from cloud import Cloud, kill_group

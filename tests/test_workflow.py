@@ -14,15 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simulated
-from checkouts import (
-    assert_same_bytes,
-    checkout,
-    planned,
-    rendered,
-    snakemake,
-    start_snakemake,
-    wait_until,
-)
+from checkouts import assert_same_bytes, checkout, planned, rendered, snakemake, start_snakemake
+from waiting import wait_until
 
 from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
