@@ -238,6 +238,9 @@ def import_libraries():
     pydantic = sys.modules["pydantic"]
     pydantic.TypeAdapter(pydantic.create_model("First", value=int)).json_schema()
     sys.modules["PIL.Image"].init()
+    # Numba would compile its runtime for the first kernel.
+    target = sys.modules["numba.core.registry"].cpu_target
+    sys.modules["numba.core.runtime"].rtsys.initialize(target.target_context)
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
     # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()

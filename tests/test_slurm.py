@@ -131,7 +131,7 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     assert len(views_of(folder)) == 6
 
 
-def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path):
+def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path, in_forks):
     install()
     folder = checkout(tmp_path / "cluster", rooms=ROOMS)
     log = folder / "terminal.log"
