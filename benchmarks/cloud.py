@@ -64,7 +64,7 @@ SUBMIT = """#!/bin/sh
 set -e
 job=$(mktemp -d {jobs}/XXXXXX)
 cd {root}
-cp -R --parents program configs config.yaml {settings} "$job"
+cp -Rp --parents program configs config.yaml {settings} "$job"
 cd "$job"
 setsid sh -c 'sh "$1" > terminal.log 2>&1; echo $? > status' sh "$1" > /dev/null 2>&1 &
 echo $! > pid
@@ -105,7 +105,7 @@ class Cloud(Disk):
         program = root / "program"
         program.mkdir()
         for name in PROGRAM:
-            subprocess.run(["cp", "-R", ROOT / name, program], check=True)
+            subprocess.run(["cp", "-Rp", ROOT / name, program], check=True)
         for name, text in (("submit", SUBMIT), ("status", STATUS)):
             script = root / f"{name}.sh"
             paths = " ".join(settings)
