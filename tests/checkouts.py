@@ -11,8 +11,6 @@ from pathlib import Path
 
 import forks
 
-from lightfield.core.files import locked_folder
-
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
 
@@ -72,23 +70,7 @@ def start_snakemake(folder, *arguments, **options):
 
 def snakemake(folder, *arguments, env=None):
     """Run Snakemake in a checkout. Return its CompletedProcess. ``env`` adds to the environment."""
-    result = forks.run_snakemake(["--cores", "1", *arguments], folder, env)
-    keep_kernels(Path(folder))
-    return result
-
-
-def keep_kernels(folder):
-    """Copy the kernels that a checkout compiled to the repository, for the next checkouts."""
-    for index in folder.glob("scripts/lightfield/*/__pycache__/*.nbi"):
-        cache = ROOT / index.parent.relative_to(folder)
-        source = f"{index.name.partition('.')[0]}.py"
-        cache.mkdir(exist_ok=True)
-        with locked_folder(cache):
-            is_missing = not (cache / index.name).exists()
-            if is_missing and filecmp.cmp(index.parents[1] / source, cache.parent / source):
-                for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
-                    shutil.copy2(path, cache / f"{path.name}.tmp")
-                    (cache / f"{path.name}.tmp").replace(cache / path.name)
+    return forks.run_snakemake(["--cores", "1", *arguments], folder, env)
 
 
 def planned(folder, *arguments):

@@ -1,9 +1,9 @@
-"""Runs Snakemake and the programs in forks of processes that have imported what these need.
+"""Runs Snakemake and the programs in forks of a process that has imported what these need.
 
-Most of the time of a short run are imports. A server imports the libraries. It starts a process for
-each folder with the project's code, such as a test's checkout, which imports that code and forks.
-Blender's library is loaded by the server, and counts the processors. Blender is imported in the
-fork, because its import starts threads, which a fork lacks.
+Most of the time of a short run are imports. A server imports the libraries and the project's code.
+A fork uses this code as the code of its test's checkout, if that is an unchanged copy. Blender's
+library is loaded by the server, and counts the processors. Blender is imported in the fork, because
+its import starts threads, which a fork lacks.
 """
 
 import atexit
@@ -11,6 +11,7 @@ import ctypes
 import gc
 import importlib
 import importlib.util
+import itertools
 import marshal
 import multiprocessing.process
 import os
@@ -24,7 +25,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 
 LIBRARIES = (
@@ -74,8 +75,8 @@ CODE = (
     "lightfield.reprojection.job",
     "lightfield.validation.consistency",
 )
-# Tests use few folders at a time, and a process for each takes memory.
-MOST_IMPORTERS = 12
+CHECKOUT = Path(__file__).resolve().parents[1]
+SCRIPTS = CHECKOUT / "scripts"
 # A request has the environment, which is the largest part of it.
 MOST_BYTES = 200_000
 # Stands for python. It starts forks for programs and Snakemake, and processes for all else.
@@ -94,8 +95,10 @@ exec {python} -IS {client} {socket} snakemake.py "$@"
 PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
 # The exit status of a fork, once its program has ended.
 STATUS = []
-# The states of the files with the project's code, when it was imported.
+# The times and sizes of the files with the project's code, when it was imported.
 STATES = {}
+# The variables of the project's modules that hold paths, as pairs of all variables and a name.
+PLACES = []
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
 # The folders of the servers that this test process uses, by the command that starts them.
@@ -160,67 +163,46 @@ def start_server(prefix=()):
     return folder
 
 
-class Server:
-    """Passes requests to processes that fork.
-
-    ``folder`` holds the python that starts forks. Clients connect to the socket ``listener``.
-    ``importers`` are the connections to the processes that fork, by the folder of the code that
-    each has imported. The last one is the one that was used last.
-    """
-
-    def __init__(self, folder, listener):
-        self.folder = folder
-        self.listener = listener
-        self.importers = {}
-        self.requested = set()
-
-    def pass_request(self):
-        """Wait for a request, and pass it on."""
-        with ExitStack() as opened:
-            client, _ = self.listener.accept()
-            opened.enter_context(client)
-            message, descriptors, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
-            for descriptor in descriptors:
-                opened.callback(os.close, descriptor)
-            # A client that was killed sends nothing.
-            if message:
-                code = find_code(marshal.loads(message))
-                # An import pays only if another program needs it, too.
-                importer = self.importer_of(code if code in self.requested else None, opened)
-                self.requested.add(code)
-                socket.send_fds(importer, [message], [*descriptors, client.fileno()])
-
-    def importer_of(self, code, opened):
-        """Return the connection to the process that has imported the code in a folder.
-
-        Starts this process if need be, without the files in ``opened``.
-        """
-        if code in self.importers:
-            self.importers[code] = self.importers.pop(code)
-            return self.importers[code]
-        connection, requests = socket.socketpair(type=socket.SOCK_SEQPACKET)
-        if not os.fork():
-            opened.close()
-            for inherited in (self.listener, connection, *self.importers.values()):
-                inherited.close()
-            import_code(code)
-            fork_for(requests, self.folder)
-            sys.exit()
-        requests.close()
-        self.importers[code] = connection
-        if len(self.importers) > MOST_IMPORTERS:
-            self.importers.pop(next(iter(self.importers))).close()
-        return connection
-
-
 def serve(folder, listener):
-    """Serve requests on a socket, for ever."""
+    """Fork for each request on a socket, for ever.
+
+    ``folder`` holds the python that starts forks.
+    """
     # The first function that is registered is called last.
     atexit.register(leave)
     import_libraries()
-    server = Server(folder, listener)
+    import_code()
+    # The collector would copy the memory of each fork. The forks end before they need it.
+    gc.freeze()
+    gc.disable()
+    forks = []
     while True:
-        server.pass_request()
+        watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
+        ready, _, _ = select.select([listener, *watched], [], [])
+        for fork in [*forks]:
+            if fork.ended in ready:
+                fork.pass_status()
+                forks.remove(fork)
+            elif fork.client in ready:
+                fork.pass_signal()
+        if listener not in ready:
+            continue
+        client, _ = listener.accept()
+        message, standard, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
+        if not message:
+            # The client was killed.
+            client.close()
+            continue
+        process = os.fork()
+        if not process:
+            for inherited in (listener, client, *forks):
+                inherited.close()
+            run(marshal.loads(message), standard, folder)
+            sys.exit()
+        for descriptor in standard:
+            os.close(descriptor)
+        os.setpgid(process, process)
+        forks.append(Fork(process, client))
 
 
 def import_libraries():
@@ -242,42 +224,22 @@ def import_libraries():
     target = sys.modules["numba.core.registry"].cpu_target
     sys.modules["numba.core.runtime"].rtsys.initialize(target.target_context)
     ctypes.CDLL(importlib.util.find_spec("bpy").origin)
-    # The collector would copy the memory of each fork. The forks end before they need it.
-    gc.freeze()
-    gc.disable()
 
 
-def find_code(request):
-    """Return the folder from which a request would import the project's code, or None."""
-    program = request["arguments"][0]
-    # The Snakefile and a program import from the folder of the programs first.
-    own_folder = "scripts" if program == "snakemake.py" else Path(program).parent
-    for name in (own_folder, *request["env"].get("PYTHONPATH", "").split(os.pathsep)):
-        folder = Path(request["folder"], name)
-        if (folder / "lightfield").is_dir():
-            return folder
-    return None
-
-
-def import_code(folder):
-    """Import what many programs import of the project's code in a folder, if there is one."""
-    if folder is None:
-        return
-    sys.path.insert(0, str(folder))
+def import_code():
+    """Import what many programs import of the project's code."""
+    sys.path.insert(0, str(SCRIPTS))
     for name in CODE:
-        # A test may have broken the code. Its program then fails by itself.
-        with suppress(Exception):
-            importlib.import_module(name)
-    sys.path.remove(str(folder))
+        importlib.import_module(name)
+    sys.path.remove(str(SCRIPTS))
     # Pydantic would build a model's validator for the first value that it checks.
     for model in subclasses(sys.modules["pydantic"].BaseModel):
         if model.__module__.startswith("lightfield."):
-            with suppress(Exception):
-                model.model_rebuild()
+            model.model_rebuild()
+    STATES.update(states(SCRIPTS))
     for name in own_names():
-        file = Path(sys.modules[name].__file__)
-        STATES[file] = state_of(file)
-    gc.freeze()
+        variables = vars(sys.modules[name])
+        PLACES.extend((variables, key) for key, value in variables.items() if is_place(value))
 
 
 def subclasses(base):
@@ -286,61 +248,63 @@ def subclasses(base):
     return [*children, *(below for child in children for below in subclasses(child))]
 
 
+def is_place(value):
+    """Return whether a module's variable is a path in the checkout, or a package's list of them."""
+    if isinstance(value, list):
+        return bool(value) and all(map(is_place, value))
+    return isinstance(value, str | Path) and Path(value).is_relative_to(CHECKOUT)
+
+
 def own_names():
     """Return the names of the project's modules that are imported."""
     return [name for name in sys.modules if name.partition(".")[0] == "lightfield"]
 
 
-def state_of(file):
-    """Return what changes if a file is written. None if the file is missing.
+def states(folder):
+    """Return the time and the size of each file of the project's code in a folder."""
+    times_and_sizes = {}
+    for parent, folders, names in os.walk(folder / "lightfield"):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        for name in names:
+            status = os.stat(f"{parent}/{name}")  # noqa: PTH116 (pathlib takes five times as long)
+            path = f"{parent}/{name}".removeprefix(str(folder))
+            times_and_sizes[path] = status.st_mtime_ns, status.st_size
+    return times_and_sizes
 
-    The project has such a function, but a fork must import it from the folder of its program.
-    """
-    with suppress(FileNotFoundError):
-        status = file.stat()
-        return status.st_mtime_ns, status.st_size
+
+def find_code(request):
+    """Return the folder from which a request would import the project's code, or None."""
+    program, *arguments = request["arguments"]
+    own_folder = Path(program).parent
+    if program == "snakemake.py":
+        options = dict(itertools.pairwise(arguments))
+        own_folder = Path(options.get("--snakefile", "Snakefile")).with_name("scripts")
+    # The Snakefile and a program import from the folder of the programs first.
+    for name in (own_folder, *request["env"].get("PYTHONPATH", "").split(os.pathsep)):
+        folder = Path(request["folder"], name)
+        if (folder / "lightfield").is_dir():
+            return folder.resolve()
     return None
 
 
-def forget_changed_code():
-    """Let a fork import the project's code anew, if a test has changed it since its import."""
-    if any(state_of(file) != state for file, state in STATES.items()):
+def take_code(folder):
+    """Let a fork use the imported code as the code in a folder, which is a copy of it.
+
+    If a test has changed the files there, the fork imports them itself.
+    """
+    if folder is None or states(folder) != STATES:
         for name in own_names():
             del sys.modules[name]
+    elif folder != SCRIPTS:
+        for variables, name in PLACES:
+            variables[name] = moved(variables[name], folder.parent)
 
 
-def fork_for(requests, folder):
-    """Fork for each request on a connection, until it is closed and all forks have ended."""
-    forks = []
-    is_open = True
-    while is_open or forks:
-        watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
-        ready, _, _ = select.select([requests, *watched] if is_open else watched, [], [])
-        for fork in [*forks]:
-            if fork.ended in ready:
-                fork.pass_status()
-                forks.remove(fork)
-            elif fork.client in ready:
-                fork.pass_signal()
-        if requests not in ready:
-            continue
-        message, descriptors, _, _ = socket.recv_fds(requests, MOST_BYTES, 4)
-        if not message:
-            is_open = False
-            continue
-        *standard, client = descriptors
-        process = os.fork()
-        if not process:
-            requests.close()
-            os.close(client)
-            for fork in forks:
-                fork.close()
-            run(marshal.loads(message), standard, folder)
-            sys.exit()
-        for descriptor in standard:
-            os.close(descriptor)
-        os.setpgid(process, process)
-        forks.append(Fork(process, socket.socket(fileno=client)))
+def moved(place, checkout):
+    """Return a path, or a package's list of paths, as it is in another checkout."""
+    if isinstance(place, list):
+        return [moved(path, checkout) for path in place]
+    return type(place)(f"{checkout}{str(place).removeprefix(str(CHECKOUT))}")
 
 
 class Fork:
@@ -377,7 +341,7 @@ class Fork:
 def run(request, descriptors, folder):
     """Turn a fork into the process of a request, and run its program until it ends."""
     try:
-        forget_changed_code()
+        take_code(find_code(request))
         become(request, descriptors)
         run_program(folder)
     except SystemExit as end:
