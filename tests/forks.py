@@ -15,6 +15,7 @@ import itertools
 import marshal
 import multiprocessing.process
 import os
+import pkgutil
 import resource
 import runpy
 import select
@@ -61,20 +62,6 @@ LIBRARIES = (
 )
 # What Blender imports. Not every version needs, and brings, all of it.
 BLENDER_LIBRARIES = ("cattrs.preconf.json", "requests")
-# What many programs import of the project's code. None of it imports Blender.
-CODE = (
-    "lightfield.core.failures",
-    "lightfield.core.leftovers",
-    "lightfield.core.run_display",
-    "lightfield.dataset.job_settings",
-    "lightfield.dataset.loading",
-    "lightfield.dataset.shard_files",
-    "lightfield.export.instant_ngp",
-    "lightfield.measurement.forecast",
-    "lightfield.report.page",
-    "lightfield.reprojection.job",
-    "lightfield.validation.consistency",
-)
 CHECKOUT = Path(__file__).resolve().parents[1]
 SCRIPTS = CHECKOUT / "scripts"
 # A request has the environment, which is the largest part of it.
@@ -227,10 +214,14 @@ def import_libraries():
 
 
 def import_code():
-    """Import what many programs import of the project's code."""
+    """Import the project's code, except for modules that import Blender."""
     sys.path.insert(0, str(SCRIPTS))
-    for name in CODE:
-        importlib.import_module(name)
+    # Makes the import of Blender an error.
+    sys.modules["bpy"] = None
+    for module in pkgutil.walk_packages([SCRIPTS / "lightfield"], "lightfield."):
+        with suppress(ImportError):
+            importlib.import_module(module.name)
+    del sys.modules["bpy"]
     sys.path.remove(str(SCRIPTS))
     # Pydantic would build a model's validator for the first value that it checks.
     for model in subclasses(sys.modules["pydantic"].BaseModel):
