@@ -38,7 +38,7 @@ def checkout(folder, **scenes):
     Also copies compiled files, but not those that another process is writing.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*", "*.tmp")
+    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():

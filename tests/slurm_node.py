@@ -127,15 +127,11 @@ class Node:
             self.start("slurmctld", "-D")
             self.start_node()
         except BaseException:
-            self.end()
+            self.__exit__()
             raise
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.end()
-
-    def end(self) -> None:
-        """End the daemons, and remove the files outside the folder."""
         self.run("scancel", "--state=RUNNING", "--full")
         for daemon in reversed(self.daemons.values()):
             daemon.terminate()

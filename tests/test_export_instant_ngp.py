@@ -592,8 +592,9 @@ def test_an_impossible_export_is_an_error(
     ("arguments", "message"),
     [
         ([], "required: --input-cfg, --output"),
-        (["--image-suffix", ".jpg"], "--image-suffix: invalid choice: '.jpg'"),
-        (["--aabb-scale", "3"], "--aabb-scale: invalid choice"),
+        (["--image-suffix", ".jpg"], r"--image-suffix: invalid choice: '\.jpg'"),
+        # Later versions of Python quote the number.
+        (["--aabb-scale", "3"], r"--aabb-scale: invalid choice: (3|'3') "),
         (["--offset", "0", "nan", "0"], "--offset: is nan; must be a finite number"),
     ],
 )
@@ -602,7 +603,7 @@ def test_impossible_arguments_are_refused(
 ) -> None:
     with pytest.raises(SystemExit):
         export_instant_ngp.main(arguments)
-    assert message in capsys.readouterr().err
+    assert re.search(message, capsys.readouterr().err)
 
 
 def test_one_camera_has_no_extent_to_fit(dataset: Dataset) -> None:
