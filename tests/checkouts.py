@@ -2,11 +2,13 @@
 
 import filecmp
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import forks
@@ -35,19 +37,29 @@ scene: {dataset: published}
 def checkout(folder, **scenes):
     """Copy what Snakemake needs to ``folder``. ``scenes`` are YAML texts for configs/scenes/.
 
-    Also copies compiled files, but not those that another process is writing.
+    Also takes compiled files, but not those that another process is writing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=unfinished)
+            shutil.copytree(source, folder / name, ignore=unfinished, copy_function=copy_or_link)
         else:
             shutil.copy(source, folder / name)
     for name, text in scenes.items():
         (folder / "configs" / "scenes" / f"{name}.yaml").write_text(text)
     return folder
+
+
+def copy_or_link(source, target):
+    """Copy a file. Link a compiled one: Python and Numba only replace such files."""
+    if "__pycache__" in source:
+        with suppress(OSError):
+            # Fails on another disk.
+            os.link(source, target)
+            return
+    shutil.copy2(source, target)
 
 
 def with_consumers(folder):

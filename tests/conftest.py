@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import forks
 import pytest
-from checkouts import checkout, snakemake
+from checkouts import checkout, copy_or_link, snakemake
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -29,9 +29,10 @@ SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "rend
 def pytest_sessionstart(session):
     """Do once what all workers need. Each checkout copies the compiled files."""
     if not hasattr(session.config, "workerinput"):
-        compileall.compile_dir(SCRIPTS, quiet=2)
         if session.config.getoption("numprocesses", None):
             forks.share_server()
+        # Meanwhile the server imports libraries.
+        compileall.compile_dir(SCRIPTS, quiet=2)
 
 
 # Each of these files takes more than half a minute. The first four begin at once. Of these, only
@@ -157,7 +158,7 @@ def built_once(build, name, config, tmp_path_factory):
             finished.symlink_to(folder)
     copy = tmp_path_factory.mktemp(name) / "plenoforge"
     # copytree keeps the files' times, so the copy stays up to date.
-    shutil.copytree(finished.resolve(), copy, symlinks=True)
+    shutil.copytree(finished.resolve(), copy, symlinks=True, copy_function=copy_or_link)
     return copy
 
 

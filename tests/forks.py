@@ -1,15 +1,16 @@
 """Runs Snakemake and the programs in forks of a process that has imported what these need.
 
-Most of the time of a short run are imports. A server imports the libraries and the project's code.
-A fork uses this code as the code of its test's checkout, if that is an unchanged copy. Blender's
-library is loaded by the server, and counts the processors. Blender is imported in the fork, because
-its import starts threads, which a fork lacks.
+Most of the time of a short run are imports. A server imports the libraries and the project's code,
+and reads the rules. A fork uses them as those of its test's checkout, if that has equal files.
+Blender's library is loaded by the server, and counts the processors. Blender is imported in the
+fork, because its import starts threads, which a fork lacks. The server reads the scripts for it.
 """
 
 import atexit
 import ctypes
 import gc
 import importlib
+import importlib.machinery
 import importlib.util
 import itertools
 import marshal
@@ -27,7 +28,10 @@ import sys
 import tempfile
 import traceback
 from contextlib import suppress
+from functools import partial
+from io import StringIO
 from pathlib import Path
+from types import CodeType, SimpleNamespace
 
 LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
@@ -86,6 +90,12 @@ STATUS = []
 STATES = {}
 # The variables of the project's modules that hold paths, as pairs of all variables and a name.
 PLACES = []
+# What Snakemake makes of a file of rules, by the file's text: Python code, the line of the file for
+# each line of the code, and the number of rules. In the code, FILE stands for the file's path.
+RULES = {}
+FILE = "<file>"
+# This code as Python compiles it, by its text.
+COMPILED = {}
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
 # The folders of the servers that this test process uses, by the command that starts them.
@@ -159,6 +169,7 @@ def serve(folder, listener):
     atexit.register(leave)
     import_libraries()
     import_code()
+    read_rules()
     # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()
     gc.disable()
@@ -210,7 +221,20 @@ def import_libraries():
     # Numba would compile its runtime for the first kernel.
     target = sys.modules["numba.core.registry"].cpu_target
     sys.modules["numba.core.runtime"].rtsys.initialize(target.target_context)
-    ctypes.CDLL(importlib.util.find_spec("bpy").origin)
+    library = importlib.util.find_spec("bpy").origin
+    ctypes.CDLL(library)
+    read_scripts(Path(library).parent)
+
+
+def read_scripts(folder):
+    """Read the compiled scripts that Blender's import runs, which each fork would read again."""
+    loader = importlib.machinery.SourceFileLoader
+    read = loader.get_code
+    codes = {}
+    for kind in ("startup", "modules"):
+        for path in folder.glob(f"*/scripts/{kind}/**/*.py"):
+            codes[str(path)] = read(loader(path.stem, str(path)), path.stem)
+    loader.get_code = lambda self, name: codes.get(self.path) or read(self, name)
 
 
 def import_code():
@@ -231,6 +255,56 @@ def import_code():
     for name in own_names():
         variables = vars(sys.modules[name])
         PLACES.extend((variables, key) for key, value in variables.items() if is_place(value))
+
+
+def read_rules():
+    """Parse and compile the rules. This takes most of the time in which Snakemake reads them.
+
+    Forks take the results for files with equal texts.
+    """
+    workflow = sys.modules["snakemake.workflow"]
+    source_file = sys.modules["snakemake.sourcecache"].LocalSourceFile
+    # The parser opens a file by the workflow that it belongs to.
+    opener = SimpleNamespace(open=lambda file: StringIO(Path(file.path).read_text()))
+    for path in (CHECKOUT / "Snakefile", *(CHECKOUT / "rules").rglob("*.smk")):
+        lines = {}
+        belongs_to = SimpleNamespace(sourcecache=opener)
+        code, rules = workflow.parse(source_file(str(path)), belongs_to, lines)
+        code = code.replace(repr(str(path)), repr(FILE))
+        RULES[path.read_text()] = code, lines, rules
+        COMPILED[code] = compile(code, FILE, "exec")
+    workflow.parse = partial(parse, workflow.parse)
+    workflow.compile = compile_rules
+
+
+def parse(parser, file, workflow, linemap, overwrite_shellcmd=None, rulecount=0):
+    """Do what Snakemake's ``parser`` does. Parses only what the server has not parsed.
+
+    The number of rules before a file only counts for rules without names. The project has none.
+    """
+    path = file.get_path_or_uri(secret_free=True)
+    text = Path(path).read_text() if type(file).__name__ == "LocalSourceFile" else None
+    if text not in RULES:
+        return parser(file, workflow, linemap, overwrite_shellcmd, rulecount)
+    code, lines, rules = RULES[text]
+    linemap.update(lines)
+    return code, rulecount + rules
+
+
+def compile_rules(code, path, mode):
+    """Compile the code of a file of rules. Compiles only what the server has not compiled."""
+    if code not in COMPILED:
+        return compile(code, path, mode)
+    return in_file(COMPILED[code], path)
+
+
+def in_file(code, path):
+    """Return compiled code as that of the file at a path."""
+    constants = [
+        in_file(value, path) if isinstance(value, CodeType) else path if value == FILE else value
+        for value in code.co_consts
+    ]
+    return code.replace(co_filename=path, co_consts=tuple(constants))
 
 
 def subclasses(base):

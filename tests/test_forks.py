@@ -1,6 +1,6 @@
-"""Forks run the code of the checkout that they are started for, though its import is shared."""
+"""Forks run their checkout's code and rules, though these are read only once for all forks."""
 
-from checkouts import checkout
+from checkouts import checkout, snakemake
 
 PROGRAM = """
 import lightfield.core.errors
@@ -27,3 +27,18 @@ def test_a_fork_runs_the_code_of_its_checkout_and_notices_changes(tmp_path, run_
         str(package / "__init__.py"),
         "True",
     ]
+
+
+def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
+    folder = checkout(tmp_path / "plenoforge")
+    snakefile = folder / "Snakefile"
+    lines = snakefile.read_text().splitlines()
+    # An unchanged file of rules calls a changed function.
+    with (folder / "scripts/lightfield/core/disk_space.py").open("a") as file:
+        file.write("def obstacle(path): raise TypeError('mistaken')\n")
+    (line,) = (n for n, text in enumerate(lines, 1) if "obstacle(Path(" in text)
+    error = f'TypeError in file "{snakefile}", line {line}:\nmistaken'
+    assert error in snakemake(folder, "--dry-run").stdout
+    snakefile.write_text("\n".join(["assert GIVEN", *lines]))
+    error = f'NameError in file "{snakefile}", line 1:'
+    assert error in snakemake(folder, "--dry-run").stdout

@@ -5,6 +5,7 @@ import numpy as np
 from lightfield.geometry.rigs import BlendCamera, Path, Poses, Random, Rig
 from lightfield.geometry.rigs.hemisphere import GOLDEN_ANGLE
 from lightfield.geometry.rigs.orbit import on_sphere
+from lightfield.geometry.rotations import euler_to_matrix
 
 # So many directions are tested, spread evenly.
 DIRECTIONS = 200
@@ -27,9 +28,11 @@ def sees_all_round(rig: Rig) -> bool:
     lens = rig.camera.make()
     number = np.arange(DIRECTIONS, dtype=np.float64)
     directions = on_sphere(GOLDEN_ANGLE * number, 1 - (2 * number + 1) / DIRECTIONS)
-    cameras = np.array([pose.matrix() for pose in rig.thinned(MOST_CAMERAS).poses()])
-    x, y = np.moveaxis(lens.pixels(directions @ cameras[:, :3, :3]), -1, 0)
-    side = (cameras[:, :3, 3] - np.array(rig.center)) @ directions.T
+    poses = rig.thinned(MOST_CAMERAS).poses()
+    places = np.array([pose.position for pose in poses])
+    turns = euler_to_matrix(np.array([pose.rotation for pose in poses]))
+    x, y = np.moveaxis(lens.pixels(directions @ turns), -1, 0)
+    side = (places - np.array(rig.center)) @ directions.T
     seen = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height) & (side >= -1e-9)
     return bool(seen.any(axis=0).mean() >= SEEN_PART)
 
