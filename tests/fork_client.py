@@ -6,7 +6,7 @@ uses what lies behind them.
 
 import _signal
 import _socket
-import array
+import _struct
 import marshal
 import os
 import resource
@@ -19,7 +19,7 @@ connection.connect(path)
 folder = os.getcwd()  # noqa: PTH109
 request = {"arguments": arguments, "folder": folder, "env": dict(os.environ)}
 request["largest_file"] = resource.getrlimit(resource.RLIMIT_FSIZE)
-descriptors = array.array("i", [0, 1, 2])
+descriptors = _struct.pack("3i", 0, 1, 2)
 rights = (_socket.SOL_SOCKET, _socket.SCM_RIGHTS, descriptors)
 connection.sendmsg([marshal.dumps(request)], [rights])
 for number in (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP):

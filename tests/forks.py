@@ -96,6 +96,8 @@ RULES = {}
 FILE = "<file>"
 # This code as Python compiles it, by its text.
 COMPILED = {}
+# From Linux's mman.h.
+MADV_COLLAPSE = 25
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
 # The folders of the servers that this test process uses, by the command that starts them.
@@ -173,6 +175,7 @@ def serve(folder, listener):
     # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()
     gc.disable()
+    use_huge_pages()
     forks = []
     while True:
         watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
@@ -201,6 +204,20 @@ def serve(folder, listener):
             os.close(descriptor)
         os.setpgid(process, process)
         forks.append(Fork(process, client))
+
+
+def use_huge_pages():
+    """Put the server's memory into huge pages, so that a fork has fewer pages to copy and free.
+
+    Without it, a fork with its client takes 57 ms of CPU time instead of 42. Linux before 6.1 does
+    nothing.
+    """
+    madvise = ctypes.CDLL(None).madvise
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        addresses, access, _, _, _, *name = line.split()
+        if "w" in access and name in ([], ["[heap]"]):
+            start, end = (int(address, 16) for address in addresses.split("-"))
+            madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), MADV_COLLAPSE)
 
 
 def import_libraries():
@@ -266,9 +283,9 @@ def read_rules():
     source_file = sys.modules["snakemake.sourcecache"].LocalSourceFile
     # The parser opens a file by the workflow that it belongs to.
     opener = SimpleNamespace(open=lambda file: StringIO(Path(file.path).read_text()))
+    belongs_to = SimpleNamespace(sourcecache=opener)
     for path in (CHECKOUT / "Snakefile", *(CHECKOUT / "rules").rglob("*.smk")):
         lines = {}
-        belongs_to = SimpleNamespace(sourcecache=opener)
         code, rules = workflow.parse(source_file(str(path)), belongs_to, lines)
         code = code.replace(repr(str(path)), repr(FILE))
         RULES[path.read_text()] = code, lines, rules
