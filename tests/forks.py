@@ -56,7 +56,6 @@ LIBRARIES = (
     "scipy.ndimage",
     "scipy.optimize",
     "scipy.spatial",
-    "scipy.stats",
     "skimage.exposure",
     "skimage.metrics",
     "skimage.util",

@@ -4,7 +4,6 @@ import cv2
 import flip_evaluator
 import numpy as np
 import pytest
-from scipy.stats import linregress
 from skimage.metrics import structural_similarity
 
 from lightfield.geometry import lenses
@@ -198,10 +197,14 @@ def test_a_power_law_is_fitted_with_its_slopes_standard_error():
     # A denoiser's error may hardly fall. Then no number of samples is enough.
     assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == metrics.Line(0, 0, 1.0).inverse(1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
+    # Its import takes most of a second, in each process of the tests.
+    from scipy.stats import linregress
+
     wanted = linregress(np.log(x), np.log(y))
     line = metrics.fit(x, y)
     assert line.slope == pytest.approx(wanted.slope)
     assert line.slope_error == pytest.approx(wanted.stderr)
+    assert metrics.fit(x, [0.1] * 5) == metrics.Line(0, 0, 0.1)
     assert metrics.fit([5, 5, 5], [1, 2, 3]) is None
     assert metrics.fit([0, 1, 2], [1, 2, 3]) is metrics.fit([1, 2, 3], [1, 2, 0]) is None
 

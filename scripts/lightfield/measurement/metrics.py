@@ -37,8 +37,7 @@ from typing import Any
 import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import linregress
-from skimage.metrics import peak_signal_noise_ratio, structural_similarity
+from skimage.metrics import structural_similarity
 
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging.pictures import WHITE, exposure_for
@@ -165,7 +164,8 @@ def compare(
     mask = reference.counted
     shown, truth = (developed(x, reference) for x in (colour, reference.colour))
     with np.errstate(divide="ignore"):
-        psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
+        # scikit-image's function would import all of SciPy's statistics, which takes half a second.
+        psnr = -10 * np.log10(np.mean((truth[mask] - shown[mask]) ** 2, dtype=np.float64))
     excess = _squares(colour, reference) - reference.variance[mask]
     unexposed, mrse = (float((excess * weights).mean()) for weights in reference.unexposed_weights)
     return Errors(
@@ -387,10 +387,11 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     """
     if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
-    line = linregress(np.log(x), np.log(y))
-    # Of equal y, which a level line fits exactly, SciPy does not know the error.
-    slope_error = 0.0 if min(y) == max(y) else float(line.stderr)
-    return Line(float(line.slope), slope_error, float(np.exp(line.intercept)))
+    if min(y) == max(y):
+        # The fit would be level except for rounding.
+        return Line(0.0, 0.0, float(y[0]))
+    (slope, intercept), covariance = np.polyfit(np.log(x), np.log(y), 1, cov=True)
+    return Line(float(slope), math.sqrt(covariance[0, 0]), float(np.exp(intercept)))
 
 
 def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from scipy.stats import linregress
+import numpy as np
 
 from lightfield.core import processors
 from lightfield.core.files import read_keys, reading
@@ -201,14 +201,18 @@ def cheaper_parts(
     for method, points in advice["unchanged"].items():
         counts = [point["samples"] for point in points]
         errors = metrics.fit(counts, [point["error"] for point in points])
-        seconds = linregress(counts, [point["seconds"] for point in points])
-        if errors is None or seconds.slope <= 0:
+        if errors is None:
             return None, None
-        laws[method] = errors, max(0.0, float(seconds.intercept)), float(seconds.slope)
+        slope, intercept = np.polyfit(counts, [point["seconds"] for point in points], 1)
+        if slope <= 0:
+            return None, None
+        laws[method] = errors, max(0.0, float(intercept)), float(slope)
 
     def seconds_to(error: float, method: str) -> float:
         errors, overhead, sample_seconds = laws[method]
-        return overhead + sample_seconds * max(1.0, math.ceil(errors.inverse(error)))
+        # A rounding error must not add a sample.
+        needed = math.ceil(round(errors.inverse(error), 6))
+        return overhead + sample_seconds * max(1.0, needed)
 
     errors, overhead, sample_seconds = laws[TRACED]
     plain = overhead + sample_seconds * samples
