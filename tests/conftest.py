@@ -27,11 +27,11 @@ SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "rend
 
 
 def pytest_sessionstart(session):
-    """Do once what all workers need. Each checkout copies the compiled files."""
+    """Do once what all workers need. Each checkout takes the compiled files."""
     if not hasattr(session.config, "workerinput"):
         if session.config.getoption("numprocesses", None):
             forks.share_server()
-        # Meanwhile the server imports libraries.
+        # The server imports libraries meanwhile.
         compileall.compile_dir(SCRIPTS, quiet=2)
 
 

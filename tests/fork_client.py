@@ -1,7 +1,7 @@
 """Asks the server of forks.py for a fork that runs a program, and ends as the fork does.
 
-The modules socket, signal and json import enum and re, which takes longer than all of this. So it
-uses what lies behind them.
+The modules socket, signal and json import enum and re, and array imports collections. This takes
+longer than all else here. So this program uses what lies behind them.
 """
 
 import _signal
