@@ -299,7 +299,9 @@ def parse(parser, file, workflow, linemap, overwrite_shellcmd=None, rulecount=0)
     The number of rules before a file only counts for rules without names. The project has none.
     """
     path = file.get_path_or_uri(secret_free=True)
-    text = Path(path).read_text() if type(file).__name__ == "LocalSourceFile" else None
+    # Other files are in Git or on the web.
+    is_local = type(file).__name__ == "LocalSourceFile" and Path(path).is_file()
+    text = Path(path).read_text() if is_local else None
     if text not in RULES:
         return parser(file, workflow, linemap, overwrite_shellcmd, rulecount)
     code, lines, rules = RULES[text]
@@ -316,10 +318,12 @@ def compile_rules(code, path, mode):
 
 def in_file(code, path):
     """Return compiled code as that of the file at a path."""
-    constants = [
-        in_file(value, path) if isinstance(value, CodeType) else path if value == FILE else value
-        for value in code.co_consts
-    ]
+    constants = []
+    for value in code.co_consts:
+        if isinstance(value, CodeType):
+            constants.append(in_file(value, path))
+        else:
+            constants.append(path if value == FILE else value)
     return code.replace(co_filename=path, co_consts=tuple(constants))
 
 

@@ -7,7 +7,6 @@ compared. Pictures with alpha are composited over a background. LPIPS is missing
 of this environment holds the weights of its network.
 """
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -290,7 +289,7 @@ def errors(
             name,
             {
                 "pixels": int(region.sum()),
-                "psnr": -10 * math.log10(mean_square) if mean_square else math.inf,
+                "psnr": metrics.psnr(mean_square),
                 "ws_psnr": metrics.ws_psnr(true_colour, shown_colour, np.where(region, angles, 0)),
                 "iv_psnr": metrics.iv_psnr(true_colour, shown_colour, region, weights)
                 if name == "all"

@@ -163,9 +163,7 @@ def compare(
     """Compare an image, (h, w, 3) scene-linear with depth (h, w), with its reference."""
     mask = reference.counted
     shown, truth = (developed(x, reference) for x in (colour, reference.colour))
-    with np.errstate(divide="ignore"):
-        # scikit-image's function would import all of SciPy's statistics, which takes half a second.
-        psnr = -10 * np.log10(np.mean((truth[mask] - shown[mask]) ** 2, dtype=np.float64))
+    mean_square = float(np.mean((truth[mask] - shown[mask]) ** 2, dtype=np.float64))
     excess = _squares(colour, reference) - reference.variance[mask]
     unexposed, mrse = (float((excess * weights).mean()) for weights in reference.unexposed_weights)
     return Errors(
@@ -173,7 +171,7 @@ def compare(
         relative_mse_whole=relative_mse(colour, reference, left_out=0),
         relative_mse_unexposed=unexposed,
         mrse=mrse,
-        psnr=float(psnr),
+        psnr=psnr(mean_square),
         ssim=float(ssim_map(truth, shown)[mask].mean()),
         flip=float(flip_map(truth, shown)[mask].mean()),
         depth=None
@@ -223,6 +221,15 @@ def solid_angles(lens: Lens) -> Array:
     rising = rays[:-1, 1:] - rays[1:, :-1]
     angles: Array = np.linalg.norm(np.cross(falling, rising), axis=-1) / 2
     return np.nan_to_num(angles)
+
+
+def psnr(mean_square: float) -> float:
+    """Return the PSNR in decibel of pictures in [0, 1] with this mean squared error.
+
+    Equal pictures have inf. scikit-image's function would import all of SciPy's statistics, which
+    takes half a second.
+    """
+    return -10 * math.log10(mean_square) if mean_square else math.inf
 
 
 def ws_psnr(truth: Array, shown: Array, weights: Array) -> float:
