@@ -15,7 +15,7 @@ from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 
 
-def main() -> None:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--lightfield", required=True, type=Path, help="lightfield.json of the dataset"
@@ -32,7 +32,11 @@ def main() -> None:
     parser.add_argument(
         "--record", type=Path, help="JSON to write: the sizes and checksums of the files"
     )
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    arguments = parse_arguments()
 
     # Only now, so that --help need not wait for these.
     import numpy as np

@@ -14,7 +14,7 @@ from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
 
 
-def main() -> None:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
@@ -34,6 +34,11 @@ def main() -> None:
     add_settings_flags(parser)
     arguments = parser.parse_args()
     check_settings(arguments, add_settings_flags)
+    return arguments
+
+
+def main() -> None:
+    arguments = parse_arguments()
 
     # Only now, so that --help need not wait for these.
     import numpy as np

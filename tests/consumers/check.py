@@ -118,10 +118,37 @@ def nerfstudio(folder, name):
     assert metres < 2e-3
 
 
+def ncore_frame(camera, index, matrix, seen, model, points):
+    """Check a frame of an NCore camera. Return its colours' largest error, in levels of 255.
+
+    ``matrix`` (4, 4) is the view's camera-to-world, and ``seen`` (h, w) says which pixels have a
+    ray. The ``points`` (n, 3) have the colours that the views show.
+    """
+    from ncore.data import FrameTimepoint
+
+    for moment in (FrameTimepoint.START, FrameTimepoint.END):
+        pose = camera.get_frames_T_source_target(
+            camera.sensor_id, "world", np.array(index), moment
+        ).reshape(4, 4)
+        np.testing.assert_allclose(pose @ np.diag([1, -1, -1, 1]), matrix, atol=1e-6)
+    picture = camera.get_frame_image_array(index)
+    mask = np.ones(seen.shape, bool)
+    if camera.has_frame_generic_data(index, "mask"):
+        mask = camera.get_frame_generic_data(index, "mask") > 0
+    assert (mask == seen).all()
+    toward = (points - pose[:3, 3]) @ pose[:3, :3]
+    shown = model.camera_rays_to_image_points(toward.astype(np.float32))
+    valid = shown.valid_flag.numpy()
+    x, y = np.floor(shown.image_points.numpy()[valid]).astype(int).T
+    colours = 40 + 175 * (points[valid] / RADIUS / 2 + 0.5)
+    inside = mask[y, x]
+    assert inside.sum() > 1000
+    return np.abs(picture[y, x] - colours)[inside].max()
+
+
 def ncore(folder, name):
     """Check an NCore sequence through its loader, its pose graph and its camera class."""
     import torch
-    from ncore.data import FrameTimepoint
     from ncore.data.v4 import SequenceComponentGroupsReader, SequenceLoaderV4
     from ncore.sensors import CameraModel
 
@@ -158,23 +185,7 @@ def ncore(folder, name):
     levels = 0.0
     for index in range(camera.frames_count):
         matrix = matrices[names.index(camera.get_frame_generic_meta_data(index)["name"])]
-        for moment in (FrameTimepoint.START, FrameTimepoint.END):
-            pose = camera.get_frames_T_source_target(
-                camera.sensor_id, "world", np.array(index), moment
-            ).reshape(4, 4)
-            np.testing.assert_allclose(pose @ np.diag([1, -1, -1, 1]), matrix, atol=1e-6)
-        picture = camera.get_frame_image_array(index)
-        mask = np.ones(seen.shape, bool)
-        if camera.has_frame_generic_data(index, "mask"):
-            mask = camera.get_frame_generic_data(index, "mask") > 0
-        assert (mask == seen).all()
-        toward = (points - pose[:3, 3]) @ pose[:3, :3]
-        shown = model.camera_rays_to_image_points(toward.astype(np.float32))
-        x, y = np.floor(shown.image_points.numpy()[shown.valid_flag.numpy()]).astype(int).T
-        colours = 40 + 175 * (points[shown.valid_flag.numpy()] / RADIUS / 2 + 0.5)
-        inside = mask[y, x]
-        assert inside.sum() > 1000
-        levels = max(levels, np.abs(picture[y, x] - colours)[inside].max())
+        levels = max(levels, ncore_frame(camera, index, matrix, seen, model, points))
     print(
         f"NCore, {name}, {type(model).__name__}: {camera.frames_count} views, rays up to "
         f"{np.degrees(np.arccos(local[:, 2]).max()):.1f} degrees from the axis within {pixels:.2g} "
