@@ -1,9 +1,9 @@
 """Make 200 models to test families with: shapes of the scenes' library, in five formats.
 
 Most are sound: twenty kinds of shapes, each with its own sizes, colours or texture, as glTF, GLB,
-USD, OBJ, PLY or STL. The others are what collections contain too: files that are cut short, empty,
-of another format, without their texture or without faces, and models that are animated, mirrored,
-huge, tiny or far away. models.json beside them says what each is, and whether it can be rendered.
+USD, OBJ, PLY or STL. The others are what collections contain, too. Some files are cut short, empty,
+of another format, without their texture or without faces. Some models are animated, mirrored, huge,
+tiny or far away. models.json beside them says what each is, and whether it can be rendered.
 Equal counts give equal files, except that USDZ archives say when they were written.
 """
 

@@ -22,8 +22,8 @@ Prints for each lens, of the first view:
 - visible: the part of the pixels that a second view, 5 cm beside the first, also sees.
 - warped: the mean difference of albedo to that view, where flow leads; not warped: without flow.
 
-Then it prints the core seconds of a view, how many of them the geometry takes, and its bytes, with
-more and more passes, and with a moving camera.
+Then it prints the core seconds of a view, how many of them the geometry takes, and its bytes. It
+does so with more and more passes, and with a moving camera.
 """
 
 import argparse

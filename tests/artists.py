@@ -4,8 +4,8 @@ Run as `artists.py FOLDER`.
 
 - interior.blend: a room with a chair from a linked library, a poster whose texture is missing, a
   compositor, and the file's own view exposure.
-- character.blend: an animated character (armature, hair curves) and its stage in two view layers,
-  filmed by two cameras that markers choose, saved at frame 24 with motion blur on.
+- character.blend: an animated character (armature, hair curves) and its stage in two view layers.
+  Markers choose between two cameras. Saved at frame 24, with motion blur on.
 - product.blend: a bottle with its label, film transparent, depth of field, view exposure +1.5,
   and a camera that clips.
 """

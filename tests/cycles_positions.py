@@ -2,8 +2,9 @@
 
 Runs in a process of its own, because bpy keeps one global state. Input: a list of
 {"name", "resolution", "camera": attributes of Blender's camera}. Output: an .npz file. For each
-name it has the unit rays, in camera coordinates, to the points that Cycles hit (NaN without a hit),
-the points' distance from the camera, the Depth pass, and Blender's own projection matrix.
+name it has the unit rays to the points that Cycles hit, in camera coordinates. They are NaN without
+a hit. It also has the points' distance from the camera, the Depth pass, and Blender's own
+projection matrix.
 """
 
 import json

@@ -2,9 +2,11 @@
 
 Runs in a process of its own, because bpy keeps one global state. Arguments: a folder, and a JSON
 file that maps names to [scene, content of a lightfield.json]. FOLDER/views.npz holds of each case's
-first view: "<name>.z" as in the dataset, "<name>.normal" in world space, "<name>.objects" and
-"<name>.materials", "<name>.colour" rendered after these, and "<name>.alone", the same colour
-rendered without any geometry before it.
+first view:
+
+- "<name>.z" as in the dataset, and "<name>.normal" in world space;
+- "<name>.objects" and "<name>.materials";
+- "<name>.colour" rendered after these, and "<name>.alone" rendered without geometry before it.
 """
 
 import json

@@ -1,8 +1,8 @@
 """Renders a scene with emitters of every kind, with a light group for each.
 
 Runs in a process of its own, because bpy keeps one global state. The argument is a folder. It gets
-scene.blend with library.blend beside it, emitters.json, and a dataset <name>/ with <name>.json, its
-record, for each lens, for a transparent view, for a clamp, and for the lamp alone.
+scene.blend with library.blend beside it, and emitters.json. It also gets a dataset <name>/ with its
+record <name>.json for each lens, a transparent view, a clamp, and the lamp alone.
 """
 
 import json
@@ -80,9 +80,9 @@ def build(folder):
     two.data.polygons[0].material_index = 1
     lamp("lamp.1", (-1, 0, 2))
     lamp("lamp 1", (1, 0, 2), 50)
-    own = bulbs(warm)
+    collection = bulbs(warm)
     for number in range(2):
-        place_collection(f"place {number}", own, (-1, number, 0.3))
+        place_collection(f"place {number}", collection, (-1, number, 0.3))
     with bpy.data.libraries.load(str(folder / "library.blend"), link=True) as (_, wanted):
         wanted.collections = ["bulbs"]
     place_collection("from library", wanted.collections[0], (0.6, 0.2, 0.3))

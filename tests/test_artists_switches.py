@@ -121,12 +121,12 @@ def test_a_window_of_a_view_of_any_size_has_the_pixels_of_the_whole(render, size
     width, height = size
     bpy.context.scene.render.resolution_x = width
     bpy.context.scene.render.resolution_y = height
-    whole = render_colour(POSE, 0).pixels
-    assert whole.shape == (height, width, 3)
+    full_view = render_colour(POSE, 0).pixels
+    assert full_view.shape == (height, width, 3)
     for x, y in ((13, 3), (3, 9), (15, 14), (width - 7, height - 6), (0, 0)):
         cycles.set_window(x, y, 7, 6)
         window = render_colour(POSE, 0).pixels
-        np.testing.assert_array_equal(window, whole[y : y + 6, x : x + 7])
+        np.testing.assert_array_equal(window, full_view[y : y + 6, x : x + 7])
 
 
 def add_fog(shader):

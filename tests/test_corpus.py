@@ -329,8 +329,8 @@ def test_the_sums_hold_and_cover_everything(built):
 def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, fault):
     folder = shutil.copytree(built, tmp_path / "chairs")
     damaged = {folder / name for name in spoil(folder, kind, fault)}
-    found = {folder / os.path.relpath(each.path, folder) for each in corpus_faults(folder)}
-    assert found == damaged
+    named = {folder / os.path.relpath(each.path, folder) for each in corpus_faults(folder)}
+    assert named == damaged
 
 
 @pytest.mark.parametrize("fault", ["emptied", "cut short", "deleted", "a folder"])

@@ -369,9 +369,9 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     content = view.read_bytes()
     view.write_bytes(content[:-1])
     verify = [forks.python(), ROOT / "scripts/verify.py", "results/rooms"]
-    found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
-    assert found.returncode == 1
-    assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in found.stdout
+    verified = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
+    assert verified.returncode == 1
+    assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in verified.stdout
     run = snakemake(folder, *choice)
     assert "5 of 5 members of rooms built" in run.stderr
     assert times == {name: (members / name / "member.json").stat().st_mtime_ns for name in times}
@@ -379,8 +379,8 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     corpus = json.loads((members / "corpus.json").read_text())
     assert [member["state"] for member in corpus["members"]] == ["valid"] * 5
     assert len([*(members / "thumbnails").iterdir()]) == 5
-    found = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
-    assert found.returncode == 0, found.stdout
+    verified = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
+    assert verified.returncode == 0, verified.stdout
     assert_a_plan_finds_damaged_records(folder, choice)
 
 

@@ -280,13 +280,13 @@ def test_z_depth_is_for_lenses_within_180_degrees(name: str) -> None:
 def fisheyes(fov: float) -> list[Lens]:
     """Return one of every fisheye of at least 180 degrees, completely in the frame."""
     size = {"width": 64, "height": 48, "fov": fov}
-    known: dict[str, Any] = {"focal_length": 4, "coefficients": (0.0,) * 4}
+    calibration: dict[str, Any] = {"focal_length": 4, "coefficients": (0.0,) * 4}
     return [
         Equidistant(**size),
         Equisolid(**size, focal_length=4),
         Stereographic(**size),
         Polynomial(**size, coefficients=(0, -0.25, 0, 0, 0)),
-        KannalaBrandt(**size, **known),
+        KannalaBrandt(**size, **calibration),
     ]
 
 

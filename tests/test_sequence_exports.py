@@ -305,8 +305,8 @@ def write_moving_ball(folder, camera):
         distance, on_ball = pixels_of_ball(lens, view.matrix, BALL + MOVES * (number - 1))
         local = lens.pixel_rays() * distance[..., None]
         moved = lens.pixels(local + np.where(on_ball[..., None], way @ view.matrix[:3, :3], 0))
-        own = np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5
-        motion = np.where(on_ball[..., None], moved - own, 0).astype(np.float32)
+        centres = np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5
+        motion = np.where(on_ball[..., None], moved - centres, 0).astype(np.float32)
         attributes = {images.DEPTH_ATTRIBUTE: "distance"}
         colour = {name: np.zeros(distance.shape, np.float16) for name in "RGB"}
         channels = colour | {"Z": distance.astype(np.float32)}

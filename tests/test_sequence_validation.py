@@ -223,8 +223,10 @@ def test_the_program_writes_sums_that_a_copy_of_the_sequence_is_checked_by(
     assert json.loads(validation.read_text())["valid"] is True
     listed = dict(line.split("  ")[::-1] for line in sums.read_text().splitlines())
     files = {path.relative_to(rig).as_posix(): path for path in rig.rglob("*") if path.is_file()}
-    own = {name: path for name, path in files.items() if name.split("/")[0] == "perspective"}
-    assert listed == {name: sha256(path) for name, path in own.items()} | {
+    of_sequence = {
+        name: path for name, path in files.items() if name.split("/")[0] == "perspective"
+    }
+    assert listed == {name: sha256(path) for name, path in of_sequence.items()} | {
         "validation.json": sha256(validation)
     }
     shutil.copytree(rig, tmp_path / "copy")

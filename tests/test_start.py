@@ -57,11 +57,11 @@ def test_an_exr_is_reprojected_without_what_it_does_not_use(tmp_path):
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
     write_json(tmp_path / "lightfield.json", lens.to_lightfield())
     images.write_exr(tmp_path / "a.exr", dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
-    words = ["--single", tmp_path / "a.exr", "--input-cfg", tmp_path / "lightfield.json", "--exr"]
-    words += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
+    arguments = ["--single", tmp_path / "a.exr", "--input-cfg", tmp_path / "lightfield.json"]
+    arguments += ["--exr", "--rectilinear", "18,36", "-o", tmp_path / "made"]
     # Kernels may be compiled in the first run, but not in the second.
     for _ in range(2):
-        imported_modules = imports_of("reproject", *words)
+        imported_modules = imports_of("reproject", *arguments)
     assert (tmp_path / "made/a.exr").is_file()
     assert "numba.core" in imported_modules
     compiling = {"numba.cpython.listobj", "scipy.linalg"}

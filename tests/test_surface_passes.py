@@ -48,9 +48,9 @@ def test_one_principled_bsdf_has_its_own_values(lens, made):
         np.testing.assert_allclose(read(folder, "surface_mask")[pixels], 1, atol=1e-3)
         for title, value in (MATT if name == "matt" else KNOWN).items():
             expected = 1.0 if (name, title) == ("clamped", "roughness") else value
-            found = read(folder, title)[pixels]
-            expected = np.broadcast_to(expected, found.shape)
-            np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-4)
+            rendered = read(folder, title)[pixels]
+            expected = np.broadcast_to(expected, rendered.shape)
+            np.testing.assert_allclose(rendered, expected, rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("lens", LENSES)

@@ -118,8 +118,8 @@ class DatasetPaths(Description):
         folders = ["exr", *(view_pass.name for view_pass in passes.selected(self.render))]
         if self.render.get("light_groups"):
             # Only lightfield.json names all of them.
-            found = Path(self.folder).glob(f"{passes.GROUP_PREFIX}*")
-            folders = list(dict.fromkeys([*folders, *sorted(path.name for path in found)]))
+            present = Path(self.folder).glob(f"{passes.GROUP_PREFIX}*")
+            folders = list(dict.fromkeys([*folders, *sorted(path.name for path in present)]))
         if self.flow:
             folders.append(passes.FLOW.name)
         folders += self.reprojections

@@ -129,10 +129,10 @@ class Family(Settings):
         if (self.seeds is None) == (self.models is None):
             raise ValueError("must have one of seeds and models")
         for key in self.values:
-            own = "scene.parameters.seed" if self.seeds else "scene.model"
+            key_of_member = "scene.parameters.seed" if self.seeds else "scene.model"
             if not re.fullmatch(r"\w[\w-]*(\.\w[\w-]*)+", key) or key.startswith("family."):
                 raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
-            if key == own:
+            if key == key_of_member:
                 raise ValueError(f"values: {key} cannot be drawn, because each member has its own")
         if self.seeds and len(self._seeds) > MOST_MEMBERS:
             raise ValueError(f"seeds: is {self.seeds!r}; must be at most {MOST_MEMBERS} seeds")

@@ -35,10 +35,10 @@ class Pass:
     - "id" and "matte": the value of the source pixel that the ray falls in;
     - "motion" and "flow": not at all, because they are in pixels of their own lens.
 
-    Its values are the sum of the Cycles passes ``cycles``, times the Cycles pass ``factor`` if it
-    has one, less the Cycles pass ``without`` if it has one. They are 0 where the Cycles pass
-    ``unless`` is not. A matte has them side by side. Light, values and mattes are means over all
-    samples. Other passes describe the surface at the pixel's centre, as depth does.
+    Its values are the sum of the Cycles passes ``cycles``. If it has them, this sum is multiplied
+    by the Cycles pass ``factor``, and the Cycles pass ``without`` is subtracted. Values are 0 where
+    the Cycles pass ``unless`` is not. A matte has them side by side. Light, values and mattes are
+    means over all samples. Other passes describe the surface at the pixel's centre, as depth does.
     """
 
     name: str

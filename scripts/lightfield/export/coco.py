@@ -1,8 +1,8 @@
 """Writes the boxes of objects in each view as COCO's list of instances.
 
-``instances.json`` has an image for each view, a category for each object of the scene, and an
-annotation for each object or instance that a view shows. Boxes are those of the pixels in the
-passes ``object`` and ``instance``, so they are exact, and what hides an object is not in its box.
+``instances.json`` has an image for each view, and a category for each object of the scene. Each
+object or instance that a view shows has an annotation. Boxes are exact: those of the pixels in the
+passes ``object`` and ``instance``. What hides an object is not in its box.
 Source: "Data format" of the COCO dataset.
 """
 

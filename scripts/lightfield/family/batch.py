@@ -1,7 +1,7 @@
 """Builds a batch of members: one after the other, in a process that may die without the others.
 
-A worker process builds the members. If a signal ends it, as when memory runs out or Blender
-crashes, the member at hand has failed, and another worker goes on with the next. A journal beside
+A worker process builds the members. When memory runs out or Blender crashes, a signal ends it. Then
+the member at hand has failed, and another worker goes on with the next. A journal beside
 the batch's record says what each process did. So if this process dies as well, the next run knows
 which member was at hand, and builds it last: a user may have killed the run, or the member may have
 taken all memory. A member at which three runs in a row have died has failed. Without a common

@@ -87,8 +87,8 @@ def scene_flow(
 
     Flow is in metres, from one frame to the next, and 0 where it is not known. The camera at
     ``matrix`` (4, 4) stands still. The distances (h, w) are along the ray, in metres, at the two
-    frames. ``motion`` (h, w, 2) is the way in pixels to the surface's place in the next frame, and
-    ``next_motion`` that of the next frame back to this one.
+    frames. ``motion`` (h, w, 2) is the way in pixels to the surface's place in the next frame.
+    ``next_motion`` is the way of the next frame's surfaces back to this one.
 
     The surface is at the distance that the next frame has around its new place. 1/distance is
     interpolated there, which is linear on a plane. Flow is not known where

@@ -269,8 +269,8 @@ def errors(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the errors of each region: means over its pixels, None without depth or normals.
 
-    They are psnr in decibel (inf if equal), ws_psnr and iv_psnr (100 if equal), ssim (1 if equal),
-    flip (0 if equal), depth as in `metrics.depth_error`, and normal as the mean angle in degrees.
+    They are psnr in decibel, ws_psnr, iv_psnr, ssim and flip. Equal pictures have inf, 100, 100, 1
+    and 0. Depth is as in `metrics.depth_error`, and normal is the mean angle in degrees.
     Only the region "all" has iv_psnr, because a match may lie in another region. Outside the region
     "all" both pictures count as black.
     """

@@ -167,8 +167,8 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
     needed = [name for each in passes for name in each.needed]
-    own = [name for name in needed if not name.startswith(ADDED_PASSES)]
-    for name in ("Combined", *own, *(GEOMETRY_PASSES if needed else ())):
+    built_in = [name for name in needed if not name.startswith(ADDED_PASSES)]
+    for name in ("Combined", *built_in, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # A cryptomatte pass holds two objects: 6 gives three passes.
     layer.pass_cryptomatte_depth = 6

@@ -1,8 +1,8 @@
 """Reads the surface that cameras can see from the open scene, as a render has it.
 
-A camera sees an object if a render evaluates it, if it and its instancer meet camera rays, and if
-neither a collection nor the object makes it a holdout or leaves it to indirect light. Modifiers
-have their render settings. Source: sync_object in intern/cycles/blender/object.cpp.
+A camera sees an object that a render evaluates if it and its instancer meet camera rays. Neither a
+collection nor the object may make it a holdout, or leave it to indirect light. Modifiers have their
+render settings. Source: sync_object in intern/cycles/blender/object.cpp.
 """
 
 from collections.abc import Iterator

@@ -38,9 +38,9 @@ class Part:
     def in_whole(self, pixels: Array, value: float) -> Array:
         """Return ``pixels`` (height, width, …) in a whole view that has ``value`` elsewhere."""
         view_width, view_height = self.whole
-        whole = np.full((view_height, view_width, *pixels.shape[2:]), value, pixels.dtype)
-        whole[self.y : self.y + self.height, self.x : self.x + self.width] = pixels
-        return whole
+        view = np.full((view_height, view_width, *pixels.shape[2:]), value, pixels.dtype)
+        view[self.y : self.y + self.height, self.x : self.x + self.width] = pixels
+        return view
 
 
 def places() -> NDArray[np.float64] | None:

@@ -460,8 +460,8 @@ def _selects_table(key: str, value: dict[str, Any]) -> bool:
 
 def _numbers(value: dict[str, Any]) -> bool:
     """Return whether the allowed values are numbers."""
-    words = value["enum"] if "enum" in value else [value["const"]]
-    return all(isinstance(word, int) for word in words)
+    allowed = value["enum"] if "enum" in value else [value["const"]]
+    return all(isinstance(each, int) for each in allowed)
 
 
 def _text(value: Any) -> str:
@@ -592,8 +592,8 @@ def row_of(action: argparse.Action) -> str:
         default = f"`{shown}`"
     values = action.choices if action.choices is not None else []
     metavar = action.metavar if action.metavar is not None else action.dest.upper()
-    words = metavar if isinstance(metavar, str) else " ".join(metavar)
-    value_text = ", ".join(f"`{choice}`" for choice in values) or code(words)
+    placeholder = metavar if isinstance(metavar, str) else " ".join(metavar)
+    value_text = ", ".join(f"`{choice}`" for choice in values) or code(placeholder)
     if action.nargs == 0:
         value_text = "–"
     elif action.nargs in ("+", "*"):

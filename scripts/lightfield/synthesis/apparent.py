@@ -33,8 +33,8 @@ DETAIL = 0.04
 TORN = 0.1
 # A window must be seen by more than this many other views on average.
 OTHERS = 1.0
-# Reflections grow by at most this many pixels, on surfaces whose inverse distances differ by less
-# than this part, where the difference in this smaller window is less than this part.
+# Reflections grow by at most this many pixels. They grow on surfaces whose inverse distances differ
+# by less than this part. The difference in this smaller window must be less than this part.
 REACH = 16
 FLAT = 0.3
 EDGE = 3

@@ -24,8 +24,8 @@ from lightfield.imaging import images
 from lightfield.synthesis import apparent, kernels
 from lightfield.synthesis.defaults import BEST
 
-# Views are chosen by how well they see points in this many directions across and down the picture,
-# at two distances that are typical of the scene.
+# Views are chosen by how well they see points at two distances that are typical of the scene. The
+# points lie in this many directions across and down the picture.
 DIRECTIONS = 12
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent.
 STEEPEST = 6.0

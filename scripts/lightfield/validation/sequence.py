@@ -285,14 +285,14 @@ def _flow_faults(frame: Frame, flow: Flow) -> Iterator[str]:
     except UserError as error:
         yield str(error)
         return
-    known = channels["V"] > 0
+    has_flow = channels["V"] > 0
     lens = camera.lens
     distance = converted(depth.channels["Z"], camera, "distance")
     moved = np.stack([channels[axis] for axis in "XYZ"], axis=-1).astype(np.float64)
     local = lens.pixel_rays() * distance[..., None] + moved @ view.matrix[:3, :3]
     motion = np.stack([moves[f"next.{axis}"] for axis in "XY"], axis=-1)
-    pixels = np.indices(known.shape)[::-1].transpose(1, 2, 0) + 0.5
-    off: Floats = lens.pixels(local[known]) - (pixels + motion)[known]
+    pixels = np.indices(has_flow.shape)[::-1].transpose(1, 2, 0) + 0.5
+    off: Floats = lens.pixels(local[has_flow]) - (pixels + motion)[has_flow]
     off[:, 0] = shorter(lens, off[:, 0])
     wrong = int((~(np.abs(off) <= _FLOW_PIXELS).all(axis=-1)).sum())
     if wrong:

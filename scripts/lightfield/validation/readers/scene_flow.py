@@ -32,14 +32,14 @@ def _faults(path: Path, size: tuple[int, int]) -> list[str]:
     with reading(path, "scene flow"):
         channels = images.read_image(path, list("XYZV")).channels
     flow = np.stack([channels[axis] for axis in "XYZ"], axis=-1)
-    known = channels["V"]
+    validity = channels["V"]
     faults = []
-    if known.shape[::-1] != size:
+    if validity.shape[::-1] != size:
         faults.append(
-            f"{path}: is {' × '.join(map(str, known.shape[::-1]))} pixels, not as its view"
+            f"{path}: is {' × '.join(map(str, validity.shape[::-1]))} pixels, not as its view"
         )
-    if not np.isin(known, (0, 1)).all():
+    if not np.isin(validity, (0, 1)).all():
         faults.append(f"{path}: V: is not 0 or 1 everywhere")
-    if not np.isfinite(flow).all() or flow[known == 0].any():
+    if not np.isfinite(flow).all() or flow[validity == 0].any():
         faults.append(f"{path}: X, Y, Z: are not finite, or not 0 where V is 0")
     return faults
