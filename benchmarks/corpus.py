@@ -2,6 +2,7 @@
 
 The models are those of benchmarks/models.py. The build is killed some times, each time after a part
 of the members, and then finishes. It prints a table, and the CPU seconds of each stage a member.
+
 The program fails if a model that can be rendered has failed, or if a broken one has not. It fails
 if a kill lost more than the members at hand, or if a byte is not as the sums over the corpus say.
 """

@@ -3,6 +3,7 @@
 The families have small views and little detail here. The build is killed some times, each time
 after a part of the members, and then finishes. A second build of some members in another folder is
 not disturbed. Prints a table, and what `snakemake status` says after each kill.
+
 The program fails if a member has failed, or if it differs between the builds. It fails if a kill
 lost more than the members at hand, or if a byte is not as the sums over a corpus say.
 """
