@@ -6,7 +6,7 @@ first view:
 
 - "<name>.z" as in the dataset, and "<name>.normal" in world space;
 - "<name>.objects" and "<name>.materials";
-- "<name>.colour" rendered after these, and "<name>.alone" rendered without geometry before it.
+- "<name>.colour" rendered after these, and "<name>.alone", the same without geometry before it.
 """
 
 import json

@@ -128,8 +128,8 @@ class Family(Settings):
     def _one_of_two(self) -> Self:
         if (self.seeds is None) == (self.models is None):
             raise ValueError("must have one of seeds and models")
+        key_of_member = "scene.parameters.seed" if self.seeds else "scene.model"
         for key in self.values:
-            key_of_member = "scene.parameters.seed" if self.seeds else "scene.model"
             if not re.fullmatch(r"\w[\w-]*(\.\w[\w-]*)+", key) or key.startswith("family."):
                 raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
             if key == key_of_member:

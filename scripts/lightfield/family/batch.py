@@ -1,11 +1,11 @@
 """Builds a batch of members: one after the other, in a process that may die without the others.
 
-A worker process builds the members. When memory runs out or Blender crashes, a signal ends it. Then
-the member at hand has failed, and another worker goes on with the next. A journal beside
-the batch's record says what each process did. So if this process dies as well, the next run knows
-which member was at hand, and builds it last: a user may have killed the run, or the member may have
-taken all memory. A member at which three runs in a row have died has failed. Without a common
-folder, the journal lies in the storage, because the next run may be on another node.
+A worker process builds the members. A signal may end it, as when memory runs out or Blender
+crashes. Then the member at hand has failed, and another worker goes on with the next. A journal
+beside the batch's record says what each process did. So if this process dies as well, the next run
+knows which member was at hand, and builds it last: a user may have killed the run, or the member
+may have taken all memory. A member at which three runs in a row have died has failed. Without a
+common folder, the journal lies in the storage, because the next run may be on another node.
 """
 
 import os
