@@ -21,6 +21,7 @@ from lightfield.measurement.sampling import PROBES
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     trial_flags.add_arguments(parser, "lightfield.json with render.target_error")
+    trial_flags.add_size(parser)
     parser.add_argument(
         "--probes",
         type=positive,

@@ -11,6 +11,7 @@ from lightfield.measurement import trial_flags
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     trial_flags.add_arguments(parser, "lightfield.json")
+    trial_flags.add_size(parser)
     trial_flags.add_calibration(parser)
     parser.add_argument(
         "--probes",

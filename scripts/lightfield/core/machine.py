@@ -1,4 +1,4 @@
-"""Describes a machine. Machines with equal descriptions write the same bytes.
+"""Describes a machine. Processors of machines with equal descriptions write the same bytes.
 
 Cycles and Embree use other kernels on processors without AVX2. The denoiser uses others on those
 with AVX-512. Embree builds on approximate reciprocals, which differ between makers of processors.

@@ -18,12 +18,6 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
     )
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
     parser.add_argument(
-        "--size",
-        type=positive,
-        default=WINDOW_SIZE,
-        help="width and height of each rendered window, in pixels (default: %(default)s)",
-    )
-    parser.add_argument(
         "--device", default="auto", help="device on which Cycles renders (default: auto)"
     )
     parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
@@ -32,6 +26,16 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
         required=True,
         type=Path,
         help="folder that keeps finished renders, so that an interrupted run can continue",
+    )
+
+
+def add_size(parser: argparse.ArgumentParser) -> None:
+    """Add the argument for the size of the windows, for a program that renders no whole views."""
+    parser.add_argument(
+        "--size",
+        type=positive,
+        default=WINDOW_SIZE,
+        help="width and height of each rendered window, in pixels (default: %(default)s)",
     )
 
 
