@@ -55,8 +55,9 @@ SSIM_WINDOW = 11
 TO_YCBCR = np.array(
     [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
 )
-# IV-PSNR weights luma and both colour differences by these.
-IV_WEIGHTS = np.array([4.0, 1.0, 1.0]) / 6
+# IV-PSNR weights luma and both colour differences by these. Whole numbers, so that a mean of equal
+# values is exact on every processor.
+IV_WEIGHTS = np.array([4.0, 1.0, 1.0])
 # IV-PSNR forgives shifts of this many pixels, and this difference of the mean colour.
 SHIFT = 2
 MOST_OFFSET = 0.01
@@ -279,7 +280,7 @@ def _iv_psnr(picture: Array, other: Array, weights: Array) -> float:
             least[is_less] = error[is_less]
             best[is_less] = squares[is_less]
     means = np.average(best.reshape(-1, 3), axis=0, weights=weights.ravel())
-    return float(IV_WEIGHTS @ (-10 * np.log10(np.maximum(means, 1e-10))))
+    return float(np.average(-10 * np.log10(np.maximum(means, 1e-10)), weights=IV_WEIGHTS))
 
 
 def relative_mse(
