@@ -40,12 +40,11 @@ def main() -> None:
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
-    again = arguments.cache / "again"
     renders = {}
     for name, device, cache in (
         ("processor", "cpu", arguments.cache),
         ("GPU", arguments.device, arguments.cache),
-        ("GPU again", arguments.device, again),
+        ("GPU again", arguments.device, arguments.cache / "again"),
     ):
         maker = Trials(
             arguments.blend, arguments.inventory, lightfield, device, arguments.threads, cache
