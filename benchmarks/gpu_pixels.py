@@ -5,7 +5,7 @@ seed. Prints a Markdown table. Each row compares two renders by the pixels of th
 
 - equal: the part of the pixels whose colours are equal to the last bit.
 - within: the part of the pixels whose colours differ by less than this part of the larger one.
-- light: the relative difference of all light.
+- light: the largest relative difference of a channel's mean.
 - depths: the part of the pixels whose depths differ by more than 1e-4 of the depth.
 """
 
@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core.cli import positive, run
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import trial_flags
-from lightfield.measurement.gpu_check import SAME_DEPTH
+from lightfield.measurement.gpu_check import depths_differ
 from lightfield.measurement.metrics import Mask
 from lightfield.measurement.trials import Trial, Trials
 
@@ -67,15 +67,12 @@ def row(first: Trial, second: Trial, mask: Mask) -> str:
     larger = np.maximum(colours, others).max(axis=-1)
     cells = [f"{(difference == 0).mean():.1%}"]
     cells += [f"{(difference <= bound * larger).mean():.1%}" for bound in BOUNDS]
-    cells.append(f"{others.sum() / colours.sum() - 1:.1e}")
+    cells.append(f"{np.abs(others.mean(axis=0) / colours.mean(axis=0) - 1).max():.1e}")
     if first.depth is None or second.depth is None:
-        return " | ".join([*cells, "–"])
-    depths = first.depth[mask].astype(np.float64)
-    other_depths = second.depth[mask].astype(np.float64)
-    same = depths == other_depths
-    with np.errstate(invalid="ignore"):
-        same |= np.abs(depths / other_depths - 1) <= SAME_DEPTH
-    return " | ".join([*cells, f"{(~same).mean():.2%}"])
+        cells.append("–")
+    else:
+        cells.append(f"{depths_differ(first.depth, second.depth)[mask].mean():.2%}")
+    return " | ".join(cells)
 
 
 if __name__ == "__main__":

@@ -89,10 +89,16 @@ def compare(
     second_depth = second[0].depth
     differ = np.zeros(mask.shape, dtype=bool)
     if first_depth is not None and second_depth is not None:
-        with np.errstate(invalid="ignore"):
-            near = np.abs(second_depth / first_depth - 1) <= SAME_DEPTH
-        differ = ~near & ~(np.isinf(first_depth) & np.isinf(second_depth))
+        differ = depths_differ(first_depth, second_depth)
     return Comparison(_over(difference, noise), light, float(differ[mask].mean()))
+
+
+def depths_differ(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return where two depths (h, w) differ by more than `SAME_DEPTH`, or only one is infinite."""
+    with np.errstate(invalid="ignore"):
+        near = np.abs(second / first - 1) <= SAME_DEPTH
+    differ: NDArray[np.bool_] = ~near & ~(np.isinf(first) & np.isinf(second))
+    return differ
 
 
 def _block_means(trials: Sequence[Trial], block: int, mask: metrics.Mask) -> metrics.Reference:
