@@ -12,10 +12,25 @@ import os
 import resource
 import sys
 
-path, *arguments = sys.argv[1:]
+# A program that has one of these words in its text uses Blender.
+BLENDER = b"bpy", b"lightfield.rendering", b"lightfield.family", b"trials"
+
+
+def server_of(program):
+    """Return the name of the server that forks for a program."""
+    try:
+        # The import of pathlib takes long.
+        with open(program, "rb") as file:  # noqa: PTH123
+            text = file.read()
+    except OSError:
+        # Snakemake is not a file. The fork says so of any other.
+        return "plain"
+    return "blender" if any(word in text for word in BLENDER) else "plain"
+
+
+sockets, *arguments = sys.argv[1:]
 connection = _socket.socket(_socket.AF_UNIX, _socket.SOCK_SEQPACKET)
-connection.connect(path)
-# The import of pathlib takes long, too.
+connection.connect(f"{sockets}/{server_of(arguments[0])}")
 folder = os.getcwd()  # noqa: PTH109
 request = {"arguments": arguments, "folder": folder, "env": dict(os.environ)}
 request["largest_file"] = resource.getrlimit(resource.RLIMIT_FSIZE)

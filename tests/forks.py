@@ -2,21 +2,20 @@
 
 Most of the time of a short run are imports. A server imports the libraries and the project's code,
 and reads the rules. A fork uses them as those of its test's checkout, if that has equal files.
-Blender's library is loaded by the server, and counts the processors. Blender is imported in the
-fork, because its import starts threads, which a fork lacks. The server reads the scripts for it.
+A second server also imports Blender. It forks for the programs that use Blender.
 """
 
 import atexit
 import ctypes
 import gc
 import importlib
-import importlib.machinery
 import importlib.util
 import itertools
 import marshal
 import multiprocessing.process
 import os
 import pkgutil
+import re
 import resource
 import runpy
 import select
@@ -63,8 +62,6 @@ LIBRARIES = (
     "matplotlib.style",
     "matplotlib.backends.backend_svg",
 )
-# What Blender imports. Not every version needs, and brings, all of it.
-BLENDER_LIBRARIES = ("cattrs.preconf.json", "requests")
 CHECKOUT = Path(__file__).resolve().parents[1]
 SCRIPTS = CHECKOUT / "scripts"
 # A request has the environment, which is the largest part of it.
@@ -72,13 +69,13 @@ MOST_BYTES = 200_000
 # Stands for python. It starts forks for programs and Snakemake, and processes for all else.
 PYTHON = """#!/bin/sh
 case "$1" in
-*.py) exec {python} -IS {client} {socket} "$@" ;;
+*.py) exec {python} -IS {client} {sockets} "$@" ;;
 -m) [ "$2" != snakemake ] || {{ shift 2 && exec {snakemake} "$@"; }} ;;
 esac
 exec {python} "$@"
 """
 SNAKEMAKE = """#!/bin/sh
-exec {python} -IS {client} {socket} snakemake.py "$@"
+exec {python} -IS {client} {sockets} snakemake.py "$@"
 """
 # Names the python that runs the programs of Snakemake's jobs in processes of their own. They start
 # faster than forks if they import no large library.
@@ -95,8 +92,9 @@ RULES = {}
 FILE = "<file>"
 # This code as Python compiles it, by its text.
 COMPILED = {}
-# From Linux's mman.h.
+# From Linux's mman.h and prctl.h.
 MADV_COLLAPSE = 25
+PR_SET_PDEATHSIG = 1
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
 # The folders of the servers that this test process uses, by the command that starts them.
@@ -144,21 +142,58 @@ def start_server(prefix=()):
     atexit.register(home.cleanup)
     folder = Path(home.name)
     names = {"python": sys.executable, "client": Path(__file__).with_name("fork_client.py")}
-    names |= {"socket": folder / "socket", "snakemake": folder / "snakemake"}
+    names |= {"sockets": folder, "snakemake": folder / "snakemake"}
     quoted = {name: shlex.quote(str(path)) for name, path in names.items()}
     for name, script in (("python", PYTHON), ("snakemake", SNAKEMAKE)):
         (folder / name).write_text(script.format(**quoted))
         (folder / name).chmod(0o755)
     # Clients can connect at once, and wait until the server has imported the libraries.
-    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
-        listener.bind(str(names["socket"]))
-        listener.listen(64)
-        server = subprocess.Popen(
-            [*prefix, sys.executable, Path(__file__), folder, str(listener.fileno())],
-            pass_fds=[listener.fileno()],
-        )
+    listeners = [listen(folder / name) for name in ("plain", "blender")]
+    numbers = [listener.fileno() for listener in listeners]
+    server = subprocess.Popen(
+        [*prefix, sys.executable, Path(__file__), folder, *map(str, numbers)], pass_fds=numbers
+    )
+    for listener in listeners:
+        listener.close()
     atexit.register(server.kill)
     return folder
+
+
+def listen(path):
+    """Return a socket at a path to which clients can connect."""
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.bind(str(path))
+    listener.listen(64)
+    return listener
+
+
+def start(folder, plain, blender):
+    """Import what programs need, and serve the two sockets, one of them for Blender's programs."""
+    # The first function that is registered is called last.
+    atexit.register(leave)
+    import_libraries()
+    # Makes the import of Blender an error.
+    sys.modules["bpy"] = None
+    import_code()
+    del sys.modules["bpy"]
+    read_rules()
+    first = os.getpid()
+    if os.fork():
+        blender.close()
+        serve(folder, plain)
+    plain.close()
+    end_with(first)
+    import_blender(folder)
+    import_code()
+    serve(folder, blender)
+
+
+def end_with(parent):
+    """Let this process be killed when its parent process ends."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        # The parent had ended before.
+        sys.exit()
 
 
 def serve(folder, listener):
@@ -166,11 +201,6 @@ def serve(folder, listener):
 
     ``folder`` holds the python that starts forks.
     """
-    # The first function that is registered is called last.
-    atexit.register(leave)
-    import_libraries()
-    import_code()
-    read_rules()
     # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()
     gc.disable()
@@ -227,9 +257,6 @@ def import_libraries():
     sys.modules["snakemake.cli"].get_argument_parser()
     # The folder of this file is not on the path of other programs.
     sys.path.remove(str(Path(__file__).parent))
-    for name in BLENDER_LIBRARIES:
-        with suppress(ModuleNotFoundError):
-            importlib.import_module(name)
     # These libraries import most of themselves at the first model and at the first image.
     pydantic = sys.modules["pydantic"]
     pydantic.TypeAdapter(pydantic.create_model("First", value=int)).json_schema()
@@ -237,37 +264,41 @@ def import_libraries():
     # Numba would compile its runtime for the first kernel.
     target = sys.modules["numba.core.registry"].cpu_target
     sys.modules["numba.core.runtime"].rtsys.initialize(target.target_context)
-    library = importlib.util.find_spec("bpy").origin
-    ctypes.CDLL(library)
-    read_scripts(Path(library).parent)
 
 
-def read_scripts(folder):
-    """Read the compiled scripts that Blender's import runs, which each fork would read again."""
-    loader = importlib.machinery.SourceFileLoader
-    read = loader.get_code
-    codes = {}
-    for kind in ("startup", "modules"):
-        for path in folder.glob(f"*/scripts/{kind}/**/*.py"):
-            codes[str(path)] = read(loader(path.stem, str(path)), path.stem)
-    loader.get_code = lambda self, name: codes.get(self.path) or read(self, name)
+def import_blender(folder):
+    """Import Blender without threads, because a fork would lack them.
+
+    Blender takes the user's settings from ``folder``, which has none.
+    """
+    os.environ["BLENDER_USER_RESOURCES"] = str(folder)
+    # The import starts a thread for each processor except the first.
+    with sys.modules["lightfield.core.processors"].only(1):
+        bpy = importlib.import_module("bpy")
+    # Each fork makes its own.
+    Path(bpy.app.tempdir).rmdir()
+    # OpenEXR's threads remain. Without them, the process that writes a file compresses it.
+    maps = Path("/proc/self/maps").read_text().splitlines()
+    path = next(line.split()[-1] for line in maps if "/bpy/" in line and "libOpenEXR.so" in line)
+    # C++ adds its version's namespace to the name.
+    name = re.search(rb"_ZN7Imf_\d_\d20setGlobalThreadCountEi", Path(path).read_bytes())[0]
+    ctypes.CDLL(path)[name.decode()](0)
+    assert len([*Path("/proc/self/task").iterdir()]) == 1
 
 
 def import_code():
-    """Import the project's code, except for modules that import Blender."""
+    """Import the project's code, except for modules that cannot be imported."""
     sys.path.insert(0, str(SCRIPTS))
-    # Makes the import of Blender an error.
-    sys.modules["bpy"] = None
     for module in pkgutil.walk_packages([SCRIPTS / "lightfield"], "lightfield."):
         with suppress(ImportError):
             importlib.import_module(module.name)
-    del sys.modules["bpy"]
     sys.path.remove(str(SCRIPTS))
     # Pydantic would build a model's validator for the first value that it checks.
     for model in subclasses(sys.modules["pydantic"].BaseModel):
         if model.__module__.startswith("lightfield."):
             model.model_rebuild()
     STATES.update(states(SCRIPTS))
+    PLACES.clear()
     for name in own_names():
         variables = vars(sys.modules[name])
         PLACES.extend((variables, key) for key, value in variables.items() if is_place(value))
@@ -428,6 +459,8 @@ def run(request, descriptors, folder):
     try:
         take_code(find_code(request))
         become(request, descriptors)
+        if "bpy" in sys.modules:
+            make_temporary_folder()
         run_program(folder)
     except SystemExit as end:
         if isinstance(end.code, str):
@@ -437,6 +470,13 @@ def run(request, descriptors, folder):
     except BaseException:
         traceback.print_exc()
         STATUS.append(1)
+
+
+def make_temporary_folder():
+    """Give a fork a folder of its own for Blender's temporary files."""
+    paths = sys.modules["bpy"].context.preferences.filepaths
+    # Blender makes the folder when the path of its parent is set.
+    paths.temporary_directory = paths.temporary_directory
 
 
 def leave():
@@ -481,4 +521,4 @@ def run_program(folder):
 
 
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
+    start(Path(sys.argv[1]), *(socket.socket(fileno=int(number)) for number in sys.argv[2:]))
