@@ -62,11 +62,14 @@ def copy_or_link(source, target):
     shutil.copy2(source, target)
 
 
-def with_consumers(folder):
-    """Put a stand-in for the consumers' environment into a checkout."""
+def with_consumers(folder, python=sys.executable):
+    """Put a stand-in for the consumers' environment into a checkout.
+
+    ``python`` runs its programs.
+    """
     environment = folder / ".venv-consumers"
     (environment / "bin").mkdir(parents=True)
-    (environment / "bin/python").symlink_to(sys.executable)
+    (environment / "bin/python").symlink_to(python)
     (environment / "complete").touch()
 
 

@@ -77,8 +77,8 @@ exec {python} "$@"
 SNAKEMAKE = """#!/bin/sh
 exec {python} -IS {client} {sockets} snakemake.py "$@"
 """
-# Names the python that runs the programs of Snakemake's jobs in processes of their own. They start
-# faster than forks if they import no large library.
+# Names what runs the programs of Snakemake's jobs in processes of their own, in place of python. It
+# is called python, too. A stand-in that imports no large library starts faster than a fork.
 PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
 # The exit status of a fork, once its program has ended.
 STATUS = []

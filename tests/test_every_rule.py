@@ -10,7 +10,6 @@ import os
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import forks
@@ -144,32 +143,27 @@ WITHOUT_OUTPUT = {
     "advise",
     "verify",
 }
-# Stands in for every program. It writes what identifies its job, in a form that rules can read.
-STAND_IN = f"""#!{sys.executable}
-import hashlib, json, os, sys
-def read(name):
-    with open(name, "rb") as file:
-        return file.read()
-def is_own(log):
-    # Snakemake removes the old log of each job that it starts meanwhile.
-    try:
-        return os.path.samestat(os.stat(log), os.fstat(2))
-    except FileNotFoundError:
-        return False
-(job,) = (job for log, job in json.loads(read("work_to_do.json")).items() if is_own(log))
-inputs = {{name: hashlib.sha256(read(name)).hexdigest() for name in job["input"]}}
-content = {{"frames": [], "external_files": [], "cost_samples": 4, "inputs": inputs}}
-content |= {{"sources": {{}}, "members": {{}}}}
-content["command"] = sys.argv
-listing = {{"files": {{}}}}
-for name in job["output"]:
-    last = os.path.basename(name)
-    is_list = last == "export.json" or "-" in last.rpartition(".")[0]
-    with open(name, "w") as file:
-        json.dump(content | {{"name": name}} | (listing if is_list else {{}}), file)
+# Stands in for every program. It writes what identifies its job, in a form that rules can read. It
+# is a shell script, because Python's start would take most of the time of these tests.
+STAND_IN = """
+set -e
+# Only the log of a job tells which job this is. A job fails if Snakemake removes its log meanwhile.
+log=$(readlink /proc/self/fd/2)
+# Sets ``inputs`` and ``outputs``.
+. "$PWD/work_to_do/${log#"$PWD"/}"
+sums=$(sha256sum ${inputs:-/dev/null} | tr '\\n' ';')
+command=$(printf '"%s", ' "$0" "$@")
+for output in $outputs; do
+    case ${output##*/} in
+    export.json | *-*.*) listing=', "files": {}' ;;
+    *) listing= ;;
+    esac
+    cat > "$output" << END
+{"name": "$output", "inputs": "$sums", "command": [${command%, }], "frames": [],
+"external_files": [], "cost_samples": 4, "sources": {}, "members": {}$listing}
+END
+done
 """
-# Stand-ins import little, so they start faster in processes of their own.
-ENVIRONMENT = {forks.PYTHON_OF_JOBS: sys.executable}
 # Options that say how a job runs, not what it makes.
 MACHINE = {"--threads", "--processes", "--cores", "--device", "--stall"}
 
@@ -185,12 +179,15 @@ class Build:
             (folder / name).write_text("# stands in for a model\n")
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
         write_views(folder / "published/LFPlane", camera, {"type": "plane", "cameras": [2, 1]})
+        self.environment = {forks.PYTHON_OF_JOBS: str(folder / "shell/python")}
+        (folder / "shell").mkdir()
+        (folder / "shell/python").symlink_to("/bin/sh")
         for program in [*ROOT.glob("scripts/*.py"), *ROOT.glob("benchmarks/*.py")]:
             stand_in = folder / program.relative_to(ROOT)
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(STAND_IN)
         (folder / "scripts/check_device.py").write_text("")
-        with_consumers(folder)
+        with_consumers(folder, python="/bin/sh")
         self.jobs = self.run()
         shutil.rmtree(folder / ".snakemake")
 
@@ -202,7 +199,7 @@ class Build:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | ENVIRONMENT,
+            env=os.environ | self.environment,
         )
 
     def command_line(self, *arguments):
@@ -210,7 +207,7 @@ class Build:
 
     def snakemake(self, *arguments):
         """Run everything. Return the terminal's stderr."""
-        result = snakemake(self.folder, *self.command_line(*arguments), env=ENVIRONMENT)
+        result = snakemake(self.folder, *self.command_line(*arguments), env=self.environment)
         assert result.returncode == 0, result.stdout + result.stderr
         return result.stderr
 
@@ -235,7 +232,11 @@ class Build:
         work = {job["log"][0]: job for job in jobs.values()}
         for log in ("plan", "advise"):
             work[f"work/logs/{log}.log"] = {"input": [], "output": []}
-        (self.folder / "work_to_do.json").write_text(json.dumps(work))
+        for log, job in work.items():
+            path = self.folder / "work_to_do" / log
+            path.parent.mkdir(parents=True, exist_ok=True)
+            names = {"inputs": " ".join(job["input"]), "outputs": " ".join(job["output"])}
+            path.write_text("".join(f"{key}={shlex.quote(names[key])}\n" for key in names))
         return jobs
 
     def ledger(self):
@@ -348,6 +349,12 @@ def identifying_arguments(command):
     return [word for word in arguments if word not in MACHINE or not next(arguments)]
 
 
+def read_sums(text):
+    """Return the SHA-256 of each input, by name, as a stand-in wrote them."""
+    pairs = (entry.split("  ") for entry in text.split(";")[:-1])
+    return {name: digest for digest, name in pairs if name != "/dev/null"}
+
+
 def assert_made_from_present_inputs(build, jobs):
     """Check that each output was made by its job's present command from its present inputs.
 
@@ -365,7 +372,7 @@ def assert_made_from_present_inputs(build, jobs):
         command = arguments[arguments.index(python) + 1 : arguments.index(">")]
         for output in job["output"]:
             content = json.loads((build.folder / output).read_text())
-            assert content["inputs"] == inputs, output
+            assert read_sums(content["inputs"]) == inputs, output
             assert identifying_arguments(content["command"]) == identifying_arguments(command), (
                 output
             )
