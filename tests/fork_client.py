@@ -12,8 +12,9 @@ import os
 import resource
 import sys
 
-# A program that has one of these words in its text uses Blender.
-BLENDER = b"bpy", b"lightfield.rendering", b"lightfield.family", b"trials"
+# A program with one of these words in its text imports Blender itself. Others leave it to processes
+# that they start, to which they pass the path on which they found their modules.
+BLENDER = b"bpy", b"lightfield.rendering"
 
 
 def server_of(program):
