@@ -24,7 +24,7 @@ from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.names import EXPORTS
 from lightfield.dataset.scene_yaml import Scene
 from lightfield.export import disparity
-from lightfield.export.points import evenly
+from lightfield.export.points import evenly, one_a_voxel
 from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -1240,6 +1240,17 @@ def test_points_are_as_dense_at_the_origin_as_elsewhere():
 def test_a_point_that_several_views_see_alike_is_kept_once():
     points = np.random.default_rng(1).normal(size=(50, 3))
     assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))
+
+
+@pytest.mark.parametrize("size", [1, 1e9])
+def test_the_first_point_in_each_voxel_is_kept(size):
+    # Many of the points share a voxel, however far apart the others are.
+    positions = np.random.default_rng(2).normal(size=(500, 3)).round(1)
+    positions[0] = 5 * size
+    first = {}
+    for index, cell in enumerate(np.floor(positions / 0.25).tolist()):
+        first.setdefault(tuple(cell), index)
+    assert one_a_voxel(positions, 0.25).tolist() == list(first.values())
 
 
 def test_views_of_another_lens_do_not_test(dataset):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,12 @@ PHOTO_QUALITY = 84
 
 def write(output: Path, template: str, **content: Any) -> None:
     """Fill in one of `TEMPLATES`, and write the page atomically. Escapes all of ``content``."""
+    write_text(output, environment().get_template(template).render(**content))
+
+
+@cache
+def environment() -> jinja2.Environment:
+    """Return what fills in `TEMPLATES`. It compiles each template once in a process."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -46,7 +53,7 @@ def write(output: Path, template: str, **content: Any) -> None:
         "walk_js": Markup(scripts.joined(only_of_walk)),
         "relight_js": Markup(scripts.joined(only_of_relight)),
     }
-    write_text(output, environment.get_template(template).render(**content))
+    return environment
 
 
 def photo(path: Path, widest: int) -> str | None:
