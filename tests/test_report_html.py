@@ -368,8 +368,10 @@ def test_the_scenes_points_are_drawn_in_the_views_directions(sphere, show):
 
 def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
     rig = {**LINE, "split": "odd"}
-    write_dataset(tmp_path, rig)
-    draw(tmp_path, rig, tmp_path / "report")
+    lightfield = write_dataset(tmp_path, rig)
+    parts = [view.split for view in lightfield.views]
+    picture = tmp_path / "report/rig"
+    figures.draw_rig(picture, rigs.from_settings(rig), lightfield.matrices, parts)
     tab = show(make_page(tmp_path, rig))
     pixels(tab, "viewer")
     assert "15 (8 train, 7 test)" in tab.inner_text("main")
@@ -788,7 +790,6 @@ def lit(tmp_path_factory):
         for group, part in (("lamp", 0.75), ("World", 0.25)):
             path = folder / f"Combined_{group}" / f"{view.name}.exr"
             images.write_exr(path, channels_of((part * colour).astype(np.float16)))
-    draw(folder, SPHERE, folder / "report")
     return make_page(folder, SPHERE)
 
 
