@@ -18,7 +18,7 @@ from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 from scenes import room
 
-RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+RENDER = {"adaptive_threshold": 0, "denoise": False, "seed": 0}
 FRAME = 7
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
@@ -145,14 +145,15 @@ def features():
     walls.links.new(mix.outputs[0], walls.nodes["Material Output"].inputs["Surface"])
 
 
-def rendered(path, scene_inventory=None, frame=FRAME, seeds=((0, 1), (1, 1))):
+def rendered(path, scene_inventory=None, frame=FRAME, seeds=((0, 1), (1, 1)), samples=4):
     """Return colours and depths of a scene's views. Prunes the scene if its inventory is given.
 
     ``seeds`` are the rendered views: the number of a camera, and the noise's seed.
     """
+    render = RENDER | {"samples": samples}
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.4, "center": [0.2, 0.1, 1.4]}
-    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=RENDER)
+    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=render)
     if scene_inventory:
         scene_inventory = scene_inventory | {"left_out": pruning.left_out(scene_inventory)}
     cycles.set_up(path, scene_inventory, lightfield, "cpu", 1)
