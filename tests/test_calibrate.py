@@ -50,9 +50,12 @@ def room_probes(tmp_path_factory, run_program, room):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory, run_program, room_probes):
-    """Return a function that calibrates the room, each time in a new folder."""
+    """Return a function that calibrates the room, each time in a new folder.
 
-    def run(target, *more, **limits):
+    Without a ``cache`` of renders, it renders all anew.
+    """
+
+    def run(target, *more, cache=None, **limits):
         folder = tmp_path_factory.mktemp("calibrated")
         result = run_program(
             "calibrate.py",
@@ -64,7 +67,7 @@ def calibrated(tmp_path_factory, run_program, room_probes):
             "--device",
             "cpu",
             "--cache",
-            folder / "cache",
+            cache or folder / "cache",
             "--output",
             folder / "record.json",
             "--seconds",
@@ -107,8 +110,10 @@ def test_the_choice_is_the_same_to_the_byte_on_other_threads(once, calibrated):
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_preset_limits_the_choice(calibrated):
-    folder, result = calibrated(0.01, most_samples=4, denoise=False)
+def test_a_preset_limits_the_choice(once, calibrated):
+    # The references are those of the other choice.
+    cache = once[0] / "cache"
+    folder, result = calibrated(0.01, cache=cache, most_samples=4, denoise=False)
     record = json.loads((folder / "record.json").read_text())
     assert record["choice"]["samples"] <= 4
     assert record["choice"]["denoise"] is False
