@@ -68,10 +68,16 @@ def red(matrix, seed=0):
 
 
 def sub_frames(motion):
-    """Return the mean of still pictures at equal steps of the exposure."""
+    """Return the mean of still pictures at equal steps of the exposure.
+
+    Together they have four times the samples of a blurred picture.
+    """
+    bpy.context.scene.cycles.samples = RENDER["samples"] * 4 // SUB_FRAMES
     times = (np.arange(SUB_FRAMES) + 0.5) / SUB_FRAMES - 0.5
     poses = [pose_at(np.eye(4), motion["travel"], motion["turn"], time) for time in times]
-    return np.mean([red(pose, seed) for seed, pose in enumerate(poses)], axis=0)
+    mean = np.mean([red(pose, seed) for seed, pose in enumerate(poses)], axis=0)
+    bpy.context.scene.cycles.samples = RENDER["samples"]
+    return mean
 
 
 build()

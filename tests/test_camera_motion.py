@@ -1,7 +1,5 @@
 """Cameras that move while their shutters are open: blur, rolling shutter, and the poses."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,16 +18,10 @@ TRAVEL = 0.3
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
+def pictures(tmp_path_factory, run_program):
     """Pictures of a bright wall, which fills the right half of a still picture."""
     folder = tmp_path_factory.mktemp("motion")
-    program = Path(__file__).with_name("motion_renders.py")
-    scripts = Path(__file__).parents[1] / "scripts"
-    environment = {"PYTHONPATH": str(scripts), "PATH": "/usr/bin:/bin", "HOME": str(folder)}
-    result = subprocess.run(
-        [sys.executable, program, folder], capture_output=True, text=True, env=environment
-    )
-    assert result.returncode == 0, result.stderr
+    run_program(Path(__file__).with_name("motion_renders.py"), folder)
     return np.load(folder / "results.npz")
 
 
