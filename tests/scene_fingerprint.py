@@ -45,6 +45,8 @@ def rendered():
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = 48, 24
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 2, False, 3
+    # By this map Cycles sends rays to the bright parts of the sky. By default it is large.
+    scene.world.cycles.sampling_method, scene.world.cycles.sample_map_resolution = "MANUAL", 128
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     scene.render.image_settings.file_format = "OPEN_EXR"
     with TemporaryDirectory() as folder:
