@@ -51,10 +51,10 @@ class Store:
         with reading(path, "compressed metadata of an NCore store"):
             content, _ = _cbor(_decompressed(path, lzma.decompress), 0)
             self.metadata = dict(content["metadata"])
+        # `Path.relative_to` is slow for many files.
+        depth = len(folder.parts)
         names = {
-            file.relative_to(folder).as_posix()
-            for file in folder.rglob(".z*")
-            if file.name != METADATA
+            "/".join(file.parts[depth:]) for file in folder.rglob(".z*") if file.name != METADATA
         }
         for name in sorted(names | self.metadata.keys()):
             if name not in names or name not in self.metadata:
