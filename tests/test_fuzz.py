@@ -7,6 +7,7 @@ hide all other faults.
 
 import contextlib
 import copy
+import functools
 import hashlib
 import itertools
 import json
@@ -195,7 +196,12 @@ PLANE = {"type": "plane", "cameras": [2, 2]}
 
 
 def lightfield(rng):
-    name = rng.choice(list(CAMERAS))
+    return lightfield_of(rng.choice(list(CAMERAS)))
+
+
+# `spoiled` changes a copy.
+@functools.cache
+def lightfield_of(name):
     lens = lenses.from_camera({"lens": name, "resolution": [16, 16], **CAMERAS[name]})
     more = {
         "scene": {"name": "room", "fingerprint": "0"},
@@ -353,16 +359,21 @@ def read_export_list(path, _):
     readers.read(path, (16, 16))
 
 
-def splits_of(_):
+@functools.cache
+def training_views():
     camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
-    return splits_content({"LFPlane": LightField.from_rig({**PLANE, "split": "train"}, camera)})
+    return LightField.from_rig({**PLANE, "split": "train"}, camera)
+
+
+def splits_of(_):
+    return splits_content({"LFPlane": training_views()})
 
 
 def read_splits(path, _):
     folder = path.parent / "LFPlane"
-    folder.mkdir(exist_ok=True)
-    camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
-    LightField.from_rig({**PLANE, "split": "train"}, camera).write(folder / "lightfield.json")
+    if not folder.exists():
+        folder.mkdir()
+        training_views().write(folder / "lightfield.json")
     splits_check.check(path, folder, [])
 
 
@@ -496,6 +507,11 @@ KINDS = {
     "poses": ("../../poses.json", poses, read_poses),
 }
 
+# The kinds whose functions read through a dataset.
+OF_DATASETS = {"inventory", "calibration", "probe", "lock"}
+# The kinds that are YAML.
+OF_YAML = {"scene", "configuration"}
+
 OWN = """
 scene: {blend: own.blend, frame: file}
 render: {target_error: 0.01}
@@ -569,7 +585,10 @@ def test_a_spoiled_file_is_read_or_refused(kind, count, home):
         data = text_of(kind, spoiled(content, rng))
         if number % 3 == 2:
             data = damaged(text_of(kind, content), rng)
-        (dataset,) = scene_datasets("own")
+        if kind in OF_YAML:
+            # PyYAML refuses 1000 open lists, too. It takes seconds for 5000.
+            data = data.replace(b"[" * 5000, b"[" * 1000)
+        (dataset,) = scene_datasets("own") if kind in OF_DATASETS else [None]
         path = home / "work/own" / name
         assert_read_or_refused(read, path, dataset, data, LISTED.get(kind))
         # The next sample's dataset follows from the settings alone.
