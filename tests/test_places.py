@@ -78,7 +78,7 @@ def test_a_scene_without_a_place_keeps_its_settings_and_a_place_is_another_scene
 def test_the_pieces_of_a_still_life_stand_apart_on_the_board():
     still_life = import_module("scenes.still_life.plan")
     for place in PLACES:
-        plan = still_life.drawn(place)
+        plan = drawn("still_life", place)
         standing = []
         for piece in still_life.PIECES:
             if piece.elements[0] in plan.moves:
@@ -104,7 +104,7 @@ def corners(piece, rooms):
 def test_the_pieces_of_a_room_stand_apart_within_it_and_leave_the_rigs_free():
     rooms = import_module("scenes.rooms.place")
     for place in PLACES:
-        room = rooms.drawn(place)
+        room = drawn("rooms", place)
         taken = [(-0.6, -0.6, 0.6, 0.6)]
         for piece in room.furniture:
             if piece.name not in rooms.AT_WALLS or piece.turned % 90:
