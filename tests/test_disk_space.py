@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
+import forks
 import pytest
 from checkouts import checkout, snakemake, start_snakemake
 from conftest import SCRIPTS, mount_disk
@@ -45,11 +46,13 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
 
-# Stands in for the program that builds a scene. It waits until the test lets it go on.
+# Stands in for the program that builds a scene. It writes the number of the process group of
+# Snakemake and its jobs. Then it waits until the test lets it go on.
 WAITING = """
-import sys, time
+import os, sys, time
 from pathlib import Path
-Path("started").touch()
+Path("starting").write_text(str(os.getpgrp()))
+Path("starting").rename("started")
 while not Path("go").exists():
     time.sleep(0.05)
 Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
@@ -478,9 +481,18 @@ def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch,
     assert len(list(folder.iterdir())) == 1
 
 
+@pytest.fixture
+def real_jobs(monkeypatch):
+    """Run the jobs of forks as real children of Snakemake, which share its locks."""
+    monkeypatch.setenv(forks.PYTHON_OF_JOBS, sys.executable)
+
+
 @pytest.fixture(params=["checkout", "own folder"])
-def building(request, tmp_path):
-    """A folder with a run that waits for its job, and the run's process."""
+def building(request, tmp_path, real_jobs, in_forks):
+    """A folder with a run that waits for its job, the process, the run's number, and a function.
+
+    The process stands for the run, which is a fork. The function runs Snakemake there.
+    """
     folder, arguments = checkout(tmp_path / "checkout", one=ONE), BUILD
     (folder / "scripts/build_scene.py").write_text(WAITING)
     if request.param == "own folder":
@@ -500,10 +512,11 @@ def building(request, tmp_path):
         return snakemake(tmp_path / "checkout", *more, *given)
 
     run.start = lambda **options: start_snakemake(tmp_path / "checkout", *arguments, **options)
-    yield folder, process, run
+    number = int((folder / "started").read_text())
+    yield folder, process, number, run
     (folder / "go").touch()
     with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+        os.killpg(number, signal.SIGKILL)
     process.wait()
 
 
@@ -513,8 +526,8 @@ def last_line(run):
 
 @pytest.mark.slow
 def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(building):
-    folder, process, run = building
-    refusal = f"error: another run makes these files, process {process.pid}: wait for it, or end"
+    folder, process, number, run = building
+    refusal = f"error: another run makes these files, process {number}: wait for it, or end"
     second = run()
     assert second.returncode != 0
     assert last_line(second).startswith(refusal)
@@ -532,8 +545,8 @@ def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(buildi
 
 @pytest.mark.slow
 def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
-    folder, process, run = building
-    os.killpg(process.pid, signal.SIGKILL)
+    folder, process, number, run = building
+    os.killpg(number, signal.SIGKILL)
     process.wait()
     (folder / "go").touch()
     following = run()
@@ -544,8 +557,8 @@ def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
 
 @pytest.mark.slow
 def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp_path):
-    folder, process, run = building
-    process.kill()
+    folder, process, number, run = building
+    os.kill(number, signal.SIGKILL)
     process.wait()
     log = tmp_path / "terminal.log"
     with log.open("w") as terminal:
@@ -560,8 +573,8 @@ def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp
 @pytest.mark.slow
 @pytest.mark.parametrize("building", ["checkout"], indirect=True)
 def test_a_stopped_run_says_so_and_the_next_one_continues(building):
-    folder, process, run = building
-    process.terminate()
+    folder, process, number, run = building
+    os.kill(number, signal.SIGTERM)
     said = process.stderr.readline()
     while "stopping after SIGTERM" not in said:
         said = process.stderr.readline()
@@ -577,8 +590,8 @@ def test_a_stopped_run_says_so_and_the_next_one_continues(building):
 @pytest.mark.slow
 @pytest.mark.parametrize("building", ["checkout"], indirect=True)
 def test_the_locks_of_another_machine_are_left_to_the_user(building):
-    folder, process, run = building
-    os.killpg(process.pid, signal.SIGKILL)
+    folder, process, number, run = building
+    os.killpg(number, signal.SIGKILL)
     process.wait()
     (folder / "go").touch()
     (note,) = (folder / ".snakemake/locks").glob("*.here")
