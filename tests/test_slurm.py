@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+import forks
 import psutil
 import pytest
 from checkouts import checkout, rendered, snakemake, start_snakemake
@@ -22,7 +23,12 @@ CUBOID = "smoke/LFCuboid_1x1x1"
 JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
 SHARDS = ("0-3", "3-6")
 # What the jobs on the cluster need.
-INPUTS = ("cameras.json", "perspective/lens_map.npy", "panorama/lightfield.json")
+INPUTS = (
+    f"work/{CUBOID}/cameras.json",
+    f"work/{CUBOID}/perspective/lens_map.npy",
+    f"work/{CUBOID}/panorama/lightfield.json",
+    "work/smoke/inventory.json",
+)
 CONFIG = ["--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"]
 WORDS = [
     "--profile",
@@ -89,13 +95,17 @@ def views_of(folder: Path) -> dict[str, bytes]:
 def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     install()
     folder = slower_checkout(tmp_path / "cluster")
-    build(folder, *(f"work/{CUBOID}/{name}" for name in INPUTS))
+    build(folder, *INPUTS)
     undisturbed = tmp_path / "undisturbed"
     shutil.copytree(folder, undisturbed)
     build(undisturbed, *(f"work/{CUBOID}/render/{shard}.json" for shard in SHARDS))
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
         environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}
+        # The Snakemake of a batch only starts the job's steps, so it is a fork. The steps are
+        # processes of the node: they see its disk, and Slurm measures their memory.
+        environment["PYTHON_OF_BATCHES"] = str(forks.python())
+        environment[forks.PYTHON_OF_JOBS] = sys.executable
         with log.open("wb") as terminal:
             run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
         began = stop_next(folder, "*.journal.jsonl", set(), run)
