@@ -188,7 +188,6 @@ def test_a_scene_damaged_before_its_ledger_line_is_built_again(tmp_path):
     assert not (folder / "work/ledger.txt").exists()
     flip(folder / blend, None)
     rotten = (folder / blend).read_bytes()
-    snakemake(folder, "--unlock", inventory)
     result = snakemake(folder, inventory)
     assert result.returncode == 0, result.stdout + result.stderr
     assert (folder / blend).read_bytes() != rotten

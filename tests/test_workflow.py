@@ -219,7 +219,6 @@ def test_after_a_kill_during_rendering_the_next_run_continues(smoke, other):
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
         landed += bool(unfinished_shards(other))
-        succeeding(other, "--unlock", "--config", *chosen)
     assert landed
     succeeding(other, "--cores", "1", "--config", *chosen)
     assert max(rendered(other).values()) == 1
