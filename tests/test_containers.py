@@ -1,12 +1,10 @@
 """Jobs in containers: with Snakemake's --sdm apptainer, each job runs with the image's Python."""
 
 import os
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from checkouts import checkout
+from checkouts import checkout, snakemake
 
 TARGET = "results/smoke/LFPlane_3x2_equisolid/lightfield.json"
 # Stands in for Apptainer: an image is a folder of programs, and only these can run.
@@ -37,14 +35,8 @@ def test_a_job_in_a_container_runs_with_the_python_of_the_image(tmp_path):
     write_program(tmp_path / "bin/apptainer", APPTAINER.format(image=tmp_path / "image"))
     python = PYTHON.format(seen=seen, python=sys.executable)
     write_program(tmp_path / "image/python", python)
-    snakemake = Path(sys.executable).with_name("snakemake")
-    run = subprocess.run(
-        [snakemake, "--cores", "1", "--sdm", "apptainer", "--", TARGET],
-        cwd=folder,
-        env=os.environ | {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"},
-        capture_output=True,
-        text=True,
-    )
+    path = {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"}
+    run = snakemake(folder, "--sdm", "apptainer", "--", TARGET, env=path)
     assert run.returncode == 0, run.stdout + run.stderr
     assert (folder / TARGET).is_file()
     assert seen.read_text() == "scripts/make_lightfield.py\n"
