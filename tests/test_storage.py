@@ -28,7 +28,8 @@ WORDS = (
     "render=shard",
     "reproject=shard",
     "--",
-    f"results/{PANORAMAS}/validation.json",
+    f"work/{PANORAMAS}/perspective/0-2.json",
+    f"results/{PANORAMAS}/perspective/transforms.json",
 )
 
 
