@@ -297,6 +297,10 @@ def import_code():
     for model in subclasses(sys.modules["pydantic"].BaseModel):
         if model.__module__.startswith("lightfield."):
             model.model_rebuild()
+    # So would jinja compile each template.
+    environment = sys.modules["lightfield.report.page"].environment()
+    for name in environment.list_templates(extensions="j2"):
+        environment.get_template(name)
     STATES.update(states(SCRIPTS))
     PLACES.clear()
     for name in own_names():
