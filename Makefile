@@ -76,6 +76,8 @@ soak: .venv/complete
 
 # PYTHON names an interpreter. Without it, envs/find_python.sh chooses one.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt
+	@test ! -L .venv || { echo "error: .venv is a link to $$(readlink .venv), which make would replace:" \
+		"remove the link" >&2; exit 1; }
 	@set -e; python=$$(envs/find_python.sh $(PYTHON)); \
 	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
 	"$$python" envs/check_system.py; \
