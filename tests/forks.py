@@ -80,6 +80,8 @@ exec {python} -IS {client} {sockets} snakemake.py "$@"
 # Names what runs the programs of Snakemake's jobs in processes of their own, in place of python. It
 # is called python, too. A stand-in that imports no large library starts faster than a fork.
 PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
+# Set in the environment of a request, if its fork shall obey permissions although it is root's.
+OBEDIENT = "OBEDIENT"
 # The exit status of a fork, once its program has ended.
 STATUS = []
 # The times and sizes of the files with the project's code, when it was imported.
@@ -92,23 +94,24 @@ RULES = {}
 FILE = "<file>"
 # This code as Python compiles it, by its text.
 COMPILED = {}
-# From Linux's mman.h and prctl.h.
+# From Linux's mman.h, prctl.h and capability.h.
 MADV_COLLAPSE = 25
 PR_SET_PDEATHSIG = 1
+PR_CAPBSET_DROP = 24
+CAPABILITY_VERSION = 0x20080522
+CAP_DAC_OVERRIDE = 1
+CAP_DAC_READ_SEARCH = 2
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
-# The folders of the servers that this test process uses, by the command that starts them.
-_FOLDERS = {}
 
 
-def run_snakemake(arguments, folder, env=None, merge_outputs=False, prefix=()):
+def run_snakemake(arguments, folder, env=None, merge_outputs=False):
     """Run ``snakemake`` with arguments in a folder. Return its CompletedProcess.
 
-    ``env`` adds to the environment. ``merge_outputs`` writes stderr to stdout. ``prefix`` is a
-    command that runs another, such as ``nice``.
+    ``env`` adds to the environment. ``merge_outputs`` writes stderr to stdout.
     """
     return subprocess.run(
-        [python(prefix), "snakemake.py", *map(str, arguments)],
+        [python(), "snakemake.py", *map(str, arguments)],
         cwd=Path(folder).absolute(),
         env=os.environ | (env or {}),
         stdin=subprocess.DEVNULL,
@@ -119,25 +122,23 @@ def run_snakemake(arguments, folder, env=None, merge_outputs=False, prefix=()):
     )
 
 
-def python(prefix=()):
+def python():
     """Return the path of a ``python`` that runs programs in forks. Starts their server if need be.
 
     A ``snakemake`` is beside it.
     """
-    prefix = tuple(map(str, prefix))
-    if prefix not in _FOLDERS:
-        shared = None if prefix else os.environ.get(SHARED)
-        _FOLDERS[prefix] = Path(shared) if shared else start_server(prefix)
-    return _FOLDERS[prefix] / "python"
+    if SHARED not in os.environ:
+        share_server()
+    return Path(os.environ[SHARED]) / "python"
 
 
 def share_server():
-    """Start a server for the test processes that this process will start."""
+    """Start a server for this process, and for the test processes that it will start."""
     os.environ[SHARED] = str(start_server())
 
 
-def start_server(prefix=()):
-    """Start a server, with ``prefix`` before its command. Return its folder."""
+def start_server():
+    """Start a server. Return its folder."""
     home = tempfile.TemporaryDirectory(prefix="forks")
     atexit.register(home.cleanup)
     folder = Path(home.name)
@@ -151,7 +152,7 @@ def start_server(prefix=()):
     listeners = [listen(folder / name) for name in ("plain", "blender")]
     numbers = [listener.fileno() for listener in listeners]
     server = subprocess.Popen(
-        [*prefix, sys.executable, Path(__file__), folder, *map(str, numbers)], pass_fds=numbers
+        [sys.executable, Path(__file__), folder, *map(str, numbers)], pass_fds=numbers
     )
     for listener in listeners:
         listener.close()
@@ -502,11 +503,28 @@ def become(request, descriptors):
     os.environ.clear()
     os.environ.update(request["env"])
     resource.setrlimit(resource.RLIMIT_FSIZE, request["largest_file"])
+    if OBEDIENT in os.environ:
+        obey_permissions()
     for target, descriptor in enumerate(descriptors):
         os.dup2(descriptor, target)
         os.close(descriptor)
     sys.path[:0] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     sys.argv = request["arguments"]
+
+
+def obey_permissions():
+    """Give up the rights to read and write files against their permissions."""
+    libc = ctypes.CDLL(None)
+    header = (ctypes.c_uint32 * 2)(CAPABILITY_VERSION, 0)
+    # The lower 32 capabilities that act, that are permitted, and that are inherited. Then the rest.
+    sets = (ctypes.c_uint32 * 6)()
+    libc.capget(header, sets)
+    for right in (CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH):
+        # Programs that the fork starts would have it again.
+        libc.prctl(PR_CAPBSET_DROP, right)
+        for kind in range(3):
+            sets[kind] &= ~(1 << right)
+    libc.capset(header, sets)
 
 
 def run_program(folder):
