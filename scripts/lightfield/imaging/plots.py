@@ -13,6 +13,9 @@ from lightfield.core.files import atomic_path
 matplotlib.use("agg")
 
 from matplotlib import pyplot, style
+from matplotlib.backend_bases import RendererBase
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 # Okabe and Ito's palette, which people with any kind of colour vision can tell apart.
 BLUE = "#0072b2"
@@ -44,6 +47,21 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+class PlotFigure(Figure):
+    """A figure that is drawn once for each file.
+
+    Before Matplotlib draws a file, it draws the figure without output, only to lay it out.
+    """
+
+    def draw(self, renderer: RendererBase) -> None:
+        layout = self.get_layout_engine()
+        # For the file itself, Matplotlib has turned the layout off.
+        if isinstance(layout, ConstrainedLayoutEngine):
+            layout.execute(self)
+        else:
+            super().draw(renderer)
+
+
 @contextmanager
 def plot(
     stem: Path, rows: int = 1, columns: int = 1, size: tuple[float, float] = (8, 5)
@@ -54,7 +72,7 @@ def plot(
     """
     # "default" overrides a user's matplotlibrc.
     with style.context(("default", _STYLE)):
-        figure, axes = pyplot.subplots(rows, columns, figsize=size)
+        figure, axes = pyplot.subplots(rows, columns, figsize=size, FigureClass=PlotFigure)
         try:
             yield axes
             for suffix, metadata in ((".svg", {"Date": None}), (".png", {})):
