@@ -64,7 +64,9 @@ SUBMIT = """#!/bin/sh
 set -e
 job=$(mktemp -d {jobs}/XXXXXX)
 cd {root}
-cp -Rp --parents program configs config.yaml {settings} "$job"
+# Jobs only replace files of the program, so links are enough.
+cp -Rpl program "$job"
+cp -Rp --parents configs config.yaml {settings} "$job"
 cd "$job"
 setsid sh -c 'sh "$1" > terminal.log 2>&1; echo $? > status' sh "$1" > /dev/null 2>&1 &
 echo $! > pid
