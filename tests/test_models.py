@@ -488,10 +488,11 @@ rigs:
 def test_a_dataset_of_a_model_follows_its_files(renders, tmp_path):
     folder = checkout(tmp_path / "plenoforge", chair=SCENE)
     shutil.copytree(renders.folder, folder / "models")
-    choice = ("--config", "scenes=chair", "preset=full")
+    target = "results/chair/ring/validation.json"
+    choice = ("--config", "scenes=chair", "preset=full", "--", target)
     result = snakemake(folder, *choice)
     assert result.returncode == 0, result.stdout + result.stderr
-    validation = json.loads((folder / "results/chair/ring/validation.json").read_text())
+    validation = json.loads((folder / target).read_text())
     assert validation["valid"]
 
     def planned():
