@@ -116,6 +116,7 @@ rigs:
 exports:
   dnerf: {sources: [views], points: 20}
   poses_csv: {sources: [views]}
+report: {panorama: false}
 """
 
 
