@@ -116,12 +116,13 @@ def folder(tmp_path):
 
 @pytest.mark.slow
 def test_flow_belongs_to_the_dataset_only_while_the_yaml_asks_for_it(folder):
-    def build():
-        made = snakemake(folder, "--config", "scenes=theirs", "preset=full")
+    def build(target):
+        made = snakemake(folder, target, "--config", "scenes=theirs", "preset=full")
         assert made.returncode == 0, made.stdout + made.stderr
 
-    build()
+    build("all")
     dataset = folder / "results/theirs/row"
+    validation = "results/theirs/row/validation.json"
     files = sorted((dataset / "flow").iterdir())
     assert files[0].name == "view_0000f_to_view_0001f.exr" and len(files) == 3
     assert "flow/view_0000f_to_view_0001f.exr" in (dataset / "sha256sums.txt").read_text()
@@ -134,11 +135,11 @@ def test_flow_belongs_to_the_dataset_only_while_the_yaml_asks_for_it(folder):
     # A missing file alone is computed again, to the same bytes.
     made, kept = files[1].read_bytes(), files[0].stat().st_mtime_ns
     files[1].unlink()
-    build()
+    build(validation)
     assert (files[1].read_bytes(), files[0].stat().st_mtime_ns) == (made, kept)
     # Removed from the YAML, flow is no part of the dataset.
     (folder / "configs/scenes/theirs.yaml").write_text("scene: {dataset: published}")
-    build()
+    build(validation)
     assert not (dataset / "flow").exists()
     assert "flow" not in (dataset / "lightfield.json").read_text()
     assert len(list((folder / "work/removed").rglob("flow/*.exr"))) == 3
