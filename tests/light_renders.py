@@ -178,7 +178,10 @@ def picture():
 
 
 def world_of_a_picture():
-    tree = world(colour=(0, 0, 0, 1)).node_tree
+    sky = world(colour=(0, 0, 0, 1))
+    # By this map Cycles sends rays to the bright parts of the sky. By default it is large.
+    sky.cycles.sampling_method, sky.cycles.sample_map_resolution = "MANUAL", 16
+    tree = sky.node_tree
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     node.image = picture()
     tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
