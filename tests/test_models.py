@@ -37,7 +37,7 @@ def renders(tmp_path_factory):
     )
     assert result.returncode == 0, result.stderr
     with np.load(folder / "pictures.npz") as pictures:
-        records = {name: json.loads((folder / f"{name}.json").read_text()) for name in pictures}
+        records = json.loads((folder / "records.json").read_text())
         return SimpleNamespace(folder=folder, records=records, pictures=dict(pictures))
 
 
