@@ -3,7 +3,6 @@
 import json
 import struct
 import subprocess
-import sys
 from pathlib import Path
 
 import forks
@@ -122,18 +121,8 @@ def test_random_places_are_seeded_and_a_thinned_rig_has_the_first_of_them():
     assert pose.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
 
 
-BUILD = """
-import sys, bpy
-sys.path.insert(0, sys.argv[1])
-from scenes.room import build
-bpy.ops.wm.read_factory_settings(use_empty=True)
-build({})
-bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
-"""
-
-
 def free_places(blend, rig, output):
-    settings = blend.with_name("free_places.json")
+    settings = output.with_name("free_places.json")
     settings.write_text(json.dumps({"rig": rig}))
     arguments = ["--blend", blend, "--settings", settings, "--output", output]
     return subprocess.run(
@@ -145,11 +134,9 @@ def free_places(blend, rig, output):
 
 
 @pytest.mark.slow
-def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path):
-    blend = tmp_path / "room.blend"
-    subprocess.run([sys.executable, "-c", BUILD, SCRIPTS, blend], check=True, capture_output=True)
+def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(room, tmp_path):
     output = tmp_path / "places.json"
-    result = free_places(blend, RANDOM | {"clearance": 0.6}, output)
+    result = free_places(room, RANDOM | {"clearance": 0.6}, output)
     assert result.returncode == 0, result.stderr
     free = places(from_settings(RANDOM).placed(output))
     assert len(np.unique(free, axis=0)) == 40
@@ -160,7 +147,7 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     assert np.linalg.norm(free[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
     # The scene's box lies in the rig's box, so no place has half a metre free.
     narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
-    result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
+    result = free_places(room, narrow | {"clearance": 0.5}, tmp_path / "none.json")
     assert result.returncode == 1
     assert "3 of 3 cameras found no place with 0.5 m of free space in 100 tries" in result.stderr
     assert not (tmp_path / "none.json").exists()
