@@ -42,7 +42,8 @@ def room_probes(tmp_path_factory, run_program, room):
 
     def arguments(**render):
         path = folder / f"{len(list(folder.iterdir()))}.json"
-        made.changed(render={"seed": 0, **render}).write(path)
+        # This prefilter denoises in a third of the time.
+        made.changed(render={"seed": 0, "denoise_prefilter": "fast", **render}).write(path)
         return ("--blend", room, "--inventory", folder / "inventory.json", "--lightfield", path)
 
     return arguments

@@ -26,6 +26,8 @@ from lightfield.report import tables
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": True, "seed": 0}
+# Denoises colour, albedo and normals at once, in a third of the time.
+RENDER |= {"denoise_prefilter": "fast"}
 
 
 def lightfield(render=RENDER):
@@ -59,7 +61,7 @@ def measured(tmp_path_factory, run_program, room):
             "--octaves",
             "4",
             "--reference",
-            "256",
+            "128",
             "--output",
             folder / "room",
         )
