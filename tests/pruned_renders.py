@@ -145,13 +145,14 @@ def features():
     walls.links.new(mix.outputs[0], walls.nodes["Material Output"].inputs["Surface"])
 
 
-def rendered(path, scene_inventory=None, frame=FRAME, seeds=((0, 1), (1, 1)), samples=4):
+def rendered(path, scene_inventory=None, frame=FRAME, seeds=((0, 1), (1, 1)), samples=4, height=32):
     """Return colours and depths of a scene's views. Prunes the scene if its inventory is given.
 
-    ``seeds`` are the rendered views: the number of a camera, and the noise's seed.
+    ``seeds`` are the rendered views: the number of a camera, and the noise's seed. ``height`` is
+    in pixels.
     """
     render = RENDER | {"samples": samples}
-    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [2 * height, height]})
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.4, "center": [0.2, 0.1, 1.4]}
     lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=render)
     if scene_inventory:
