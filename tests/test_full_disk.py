@@ -46,8 +46,10 @@ def write_small_png(path, seed):
 
 
 def write_plot(path, seed):
-    with plots.plot(path.with_suffix("")) as axes:
-        axes.plot(noise(seed, 20))
+    # Many points and no text make files of several blocks that are quickly drawn.
+    with plots.plot(path.with_suffix(""), size=(4, 3)) as axes:
+        axes.set_axis_off()
+        axes.plot(noise(seed, 700))
 
 
 def write_page(path, seed):
