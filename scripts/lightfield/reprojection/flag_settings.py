@@ -36,6 +36,10 @@ class FlagSettings(ReprojectionSettings):
         return self.output_lens
 
 
+# The only adapter of these settings, because an adapter takes long to build its validator.
+_FLAG_SETTINGS = TypeAdapter(FlagSettings)
+
+
 def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
     """Return the light field and lens that `flags.add_configuration_flags` asks for."""
     if arguments.no_configs:
@@ -87,7 +91,7 @@ def reproject_settings(arguments: argparse.Namespace, source: Lens) -> Reproject
 
 
 def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
-    return checked(TypeAdapter(FlagSettings), dict(content), "flags")
+    return checked(_FLAG_SETTINGS, dict(content), "flags")
 
 
 def _lens_map_content(arguments: argparse.Namespace, source: Lens) -> dict[str, Any]:
