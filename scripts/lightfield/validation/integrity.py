@@ -62,6 +62,11 @@ def file_problem(path: Path, digest: str, source: str) -> str | None:
     return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
 
+def _is_below(path: Path, folder: Path) -> bool:
+    """Return what `Path.is_relative_to` does, in a tenth of its time. Both paths are relative."""
+    return path.parts[: len(folder.parts)] == folder.parts
+
+
 class Integrity:
     """Checks the files of a dataset. With the folder ``work``, also those that it was made from.
 
@@ -175,7 +180,7 @@ class Integrity:
         """
         digests: dict[Path, str] = {}
         for path in map(Path, self._ledger):
-            if not (self._belongs_here(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
+            if not (re.fullmatch(r"\d+-\d+\.json", path.name) and self._belongs_here(path)):
                 continue
             for file, digest in self._shard_sums(path).items():
                 # Records of shards with other bounds may name views that no longer exist.
@@ -213,16 +218,16 @@ class Integrity:
         """The SHA-256 that each file must have, and the name of the list that says so."""
         sums = {path: (digest, SUMS) for path, digest in self._published.items()}
         sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
-        for name, digest in self._ledger.items():
-            if self._belongs_here(Path(name)):
-                sums[Path(name)] = (digest, f"{self.work}/{ledger.NAME}")
+        for path, digest in zip(map(Path, self._ledger), self._ledger.values(), strict=True):
+            if self._belongs_here(path):
+                sums[path] = (digest, f"{self.work}/{ledger.NAME}")
         return dict(sorted(sums.items()))
 
     def _belongs_here(self, path: Path) -> bool:
         """Return whether a file of the ledger belongs to the dataset, or to its scene."""
-        if path.is_relative_to(self.dataset) or path == self._splits:
+        if _is_below(path, self.dataset) or path == self._splits:
             return not self._is_of_frame(path, self.dataset)
-        if not self.work or not path.is_relative_to(self.work):
+        if not self.work or not _is_below(path, self.work):
             return False
         inside = path.relative_to(self.work).as_posix()
         scene, _, name_in_scene = inside.partition("/")
@@ -234,9 +239,9 @@ class Integrity:
 
     def _is_of_frame(self, path: Path, folder: Path) -> bool:
         """Return whether a file is of a frame, if ``folder`` is that of a sequence."""
-        if not path.is_relative_to(folder) or path == folder:
+        if not _is_below(path, folder) or path == folder:
             return False
-        return bool(_FRAME.fullmatch(path.relative_to(folder).parts[0]))
+        return bool(_FRAME.fullmatch(path.parts[len(folder.parts)]))
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files. Those of its report only with a ledger, which lists them."""
