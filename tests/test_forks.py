@@ -1,5 +1,7 @@
 """Forks run their checkout's code and rules, though these are read only once for all forks."""
 
+from pathlib import Path
+
 from checkouts import checkout, snakemake
 
 PROGRAM = """
@@ -42,3 +44,19 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
     snakefile.write_text("\n".join(["assert GIVEN", *lines]))
     error = f'NameError in file "{snakefile}", line 1:'
     assert error in snakemake(folder, "--dry-run").stdout
+
+
+WITH_BLENDER = """
+import os, bpy
+print(bpy.app.tempdir, len(os.listdir("/proc/self/task")))
+"""
+
+
+def test_a_fork_has_blender_without_threads_and_with_a_folder_of_its_own(tmp_path, run_program):
+    program = tmp_path / "program.py"
+    program.write_text(WITH_BLENDER)
+    folders, threads = zip(*(run_program(program).stdout.split() for _ in range(2)), strict=True)
+    assert threads == ("1", "1")
+    assert folders[0] != folders[1]
+    # A fork removes it at its end.
+    assert not any(Path(folder).exists() for folder in folders)
