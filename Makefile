@@ -13,6 +13,9 @@ PIP = .venv/bin/pip -qq --disable-pip-version-check
 # Compiles an environment's packages on all cores. pip would take one. Some packages bring files that
 # are no valid Python, so errors do not count.
 COMPILE = bin/python -m compileall -qq -j 0
+# Through a link, a new environment would clear that of another checkout. $(@D) is the environment.
+NO_LINK = test ! -L $(@D) || { \
+	echo "error: $(@D) is a link to $$(readlink $(@D)), which make would replace: remove the link" >&2; exit 1; }
 # Some containers set this variable. Each of the tests' processes would then compile the code anew.
 PYTEST = env -u PYTHONDONTWRITEBYTECODE python -m pytest
 # The version of the environment's Python, as in the locks' names, and the other supported version.
@@ -50,6 +53,7 @@ consumers: .venv/complete .venv-consumers/complete
 
 # Several GB: for Linux, the package index only has torch with CUDA.
 .venv-consumers/complete: .venv/complete envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
+	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-consumers
 	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
 	.venv-consumers/bin/pip -q install --require-hashes --no-deps -r envs/requirements-nerfstudio.txt
@@ -76,8 +80,7 @@ soak: .venv/complete
 
 # PYTHON names an interpreter. Without it, envs/find_python.sh chooses one.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt
-	@test ! -L .venv || { echo "error: .venv is a link to $$(readlink .venv), which make would replace:" \
-		"remove the link" >&2; exit 1; }
+	@$(NO_LINK)
 	@set -e; python=$$(envs/find_python.sh $(PYTHON)); \
 	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
 	"$$python" envs/check_system.py; \
@@ -92,6 +95,7 @@ soak: .venv/complete
 	@touch $@
 
 .venv-other/complete: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
+	@$(NO_LINK)
 	@set -e; python=$$(envs/find_python.sh $(OTHER)); \
 	echo "setting up .venv-other with $$python: some minutes, mostly to download 400 MB"; \
 	"$$python" envs/check_system.py; \
@@ -108,12 +112,14 @@ soak: .venv/complete
 
 # The S3 server of benchmarks/cloud.py needs other versions of the environment's packages.
 .venv-s3-server/complete: .venv/complete envs/requirements-s3-server.txt
+	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-s3-server
 	.venv-s3-server/bin/pip -qq --disable-pip-version-check install --require-hashes \
 		-r envs/requirements-s3-server.txt
 	@touch $@
 
 .venv-docs/complete: .venv/complete envs/requirements-docs.txt
+	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-docs
 	.venv-docs/bin/pip -qq --disable-pip-version-check install --require-hashes -r envs/requirements-docs.txt
 	@touch $@

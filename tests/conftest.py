@@ -212,6 +212,16 @@ def tabs():
     return {}
 
 
+def error_listeners(errors):
+    """Return what listens to a page, by event, and adds its errors to a list."""
+
+    def note(message):
+        if READ_BACK not in message.text:
+            errors.append(message.text)
+
+    return {"console": note, "pageerror": lambda error: errors.append(str(error))}
+
+
 @pytest.fixture
 def show(browser, tabs):
     """Open pages. At the end of the test no page may have had an error.
@@ -221,16 +231,8 @@ def show(browser, tabs):
     """
     log = SimpleNamespace(errors=[], requests=[])
     shown = []
-
-    def note(message):
-        if READ_BACK not in message.text:
-            log.errors.append(message.text)
-
-    listeners = {
-        "console": note,
-        "pageerror": lambda error: log.errors.append(str(error)),
-        "request": lambda request: log.requests.append(request.url),
-    }
+    listeners = error_listeners(log.errors)
+    listeners["request"] = lambda request: log.requests.append(request.url)
 
     def show(path, width=600, walk_scale=0.0, **options):
         kind = walk_scale, *options.items()

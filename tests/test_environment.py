@@ -151,16 +151,24 @@ def test_other_users_are_told_the_command_that_installs_it(check_system):
     assert not check_system.log.exists()
 
 
-def test_make_does_not_replace_the_environment_of_another_checkout(tmp_path):
+ENVIRONMENTS = (".venv", ".venv-other", ".venv-consumers", ".venv-s3-server", ".venv-docs")
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_make_does_not_replace_the_environment_of_another_checkout(name, tmp_path):
     shutil.copy(ROOT / "Makefile", tmp_path)
     shutil.copytree(ROOT / "envs", tmp_path / "envs")
+    if name != ".venv":
+        # The others are made by this one's Python.
+        (tmp_path / ".venv").mkdir()
+        (tmp_path / ".venv/complete").touch()
     other = tmp_path / "other"
     other.mkdir()
     (other / "installed").touch()
-    (tmp_path / ".venv").symlink_to(other)
+    (tmp_path / name).symlink_to(other)
     result = subprocess.run(
-        ["make", ".venv/complete"], cwd=tmp_path, capture_output=True, text=True, check=False
+        ["make", f"{name}/complete"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert result.returncode != 0
-    assert result.stderr.startswith(f"error: .venv is a link to {other}, which make would replace")
+    assert result.stderr.startswith(f"error: {name} is a link to {other}, which make would replace")
     assert [path.name for path in other.iterdir()] == ["installed"]

@@ -10,7 +10,7 @@ import accessibility
 import mirrors
 import numpy as np
 import pytest
-from conftest import READ_BACK, SMALL_WALK
+from conftest import SMALL_WALK, error_listeners
 from PIL import Image
 from sphere import BALL, RADIUS, RED, look, look_at_ball, write_views
 
@@ -72,13 +72,8 @@ def open_page(small, browser):
     page = browser.new_page()
     page.add_init_script(f"devicePixelRatio = {SMALL_WALK}")
     errors = []
-
-    def note(message):
-        if READ_BACK not in message.text:
-            errors.append(message.text)
-
-    page.on("console", note)
-    page.on("pageerror", lambda error: errors.append(str(error)))
+    for event, listener in error_listeners(errors).items():
+        page.on(event, listener)
     page.goto((small / "index.html").as_uri())
     wait(page)
     yield page, errors

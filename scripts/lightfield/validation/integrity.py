@@ -218,7 +218,8 @@ class Integrity:
         """The SHA-256 that each file must have, and the name of the list that says so."""
         sums = {path: (digest, SUMS) for path, digest in self._published.items()}
         sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
-        for path, digest in zip(map(Path, self._ledger), self._ledger.values(), strict=True):
+        for name, digest in self._ledger.items():
+            path = Path(name)
             if self._belongs_here(path):
                 sums[path] = (digest, f"{self.work}/{ledger.NAME}")
         return dict(sorted(sums.items()))
