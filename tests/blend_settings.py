@@ -1,0 +1,115 @@
+"""The settings of a .blend that were tried, and what becomes of each: data for a test and a table.
+
+tests/test_blend_settings.py renders each case by Blender itself and by Plenoforge. Run this file
+to write the table in docs/reference/blend.md anew: ``python tests/blend_settings.py``.
+
+To add a setting, add a `Case` to the row of `ROWS` that says the same of it, or add a row.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import blend_scenes as scenes
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "blend.md"
+# The table is between these lines of the page.
+BEGIN = "<!-- Written by tests/blend_settings.py. Change its rows instead. -->"
+END = "<!-- End of the table. -->"
+
+# The picture is that of Blender with the setting.
+TAKEN = "taken"
+# The picture is that of Blender with the setting's default.
+IGNORED = "ignored"
+# The scene is refused with one line.
+REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A change of a .blend that changes Blender's own picture.
+
+    - ``change``: the new values by owner and property, as in ``{"render.use_border": True}``, or a
+      function that changes the open file. `blend_scenes.roots` has the owners.
+    - ``scene``: the function that makes the scene.
+    - ``yaml``: blocks of the scene YAML, which are merged with the usual ones.
+    - ``by_hand``: a change that gives Blender's own picture what ``yaml`` asks for. None if
+      nothing is needed.
+    - ``note``: a part of the note or of the error. None if nothing needs to be said.
+    - ``outcome``: what becomes of the change, if it is not the row's.
+    - ``format``: the file format of Blender's picture. It may concern only pictures for display.
+    """
+
+    change: Mapping[str, Any] | Callable[[], None]
+    scene: Callable[[], None] = scenes.studio
+    yaml: Mapping[str, Any] = field(default_factory=dict)
+    by_hand: Mapping[str, Any] | Callable[[], None] | None = None
+    note: str | None = None
+    outcome: str | None = None
+    format: str = "OPEN_EXR"
+
+    @property
+    def name(self) -> str:
+        if callable(self.change):
+            return self.change.__name__
+        return ",".join(f"{path}={value}" for path, value in self.change.items())
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table: some settings of one outcome. ``remark`` follows the outcome.
+
+    ``key`` is the key of the scene YAML that changes the outcome, as Markdown.
+    """
+
+    settings: str
+    outcome: str
+    cases: list[Case]
+    remark: str = ""
+    key: str = ""
+
+
+ROWS = [
+    Row(
+        "samples of the scene and of the view layer",
+        IGNORED,
+        [Case({"cycles.samples": 1}), Case({"layer.samples": 1})],
+        "the YAML has the number",
+        "`render: {samples: file}`",
+    ),
+    Row("film exposure", TAKEN, [Case({"cycles.film_exposure": 2})]),
+    Row(
+        "render border",
+        IGNORED,
+        [
+            Case(
+                {"render.use_border": True, "render.border_min_x": 0.5},
+                note="render border ignored",
+            )
+        ],
+    ),
+]
+
+
+def table() -> str:
+    """Return the table of the rows, as Markdown."""
+    lines = [
+        "| setting of the file | what becomes of it | key that changes it |",
+        "| --- " * 3 + "|",
+    ]
+    for row in ROWS:
+        remark = f": {row.remark}" if row.remark else ""
+        lines.append(f"| {row.settings} | {row.outcome}{remark} | {row.key} |")
+    return "\n".join(lines)
+
+
+def page(text: str) -> str:
+    """Return the text of the page with the present table."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{table()}\n{END}{after}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text()))
