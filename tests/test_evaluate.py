@@ -5,6 +5,7 @@ import math
 import shutil
 
 import accessibility
+import exr_windows
 import numpy as np
 import pytest
 from sphere import write_views
@@ -49,6 +50,31 @@ def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
     parts = evaluation.regions(source, chosen_view, counted, true.depth)
     return dict(evaluation.errors(rendered, true, parts, source.lens))
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_a_render_is_compared_as_viewers_show_it(dataset, tmp_path, name):
+    """An EXR may store more than it shows, or less. What it does not store is black and a miss."""
+    for folder in ("whole", "wide", "cropped", "black"):
+        shutil.copytree(dataset / name, tmp_path / folder)
+    view = f"{TESTS[0]}.exr"
+    rows, columns = np.s_[5:40], np.s_[9:30]
+    for path in (tmp_path / "wide" / view, tmp_path / "wide" / "normal" / view):
+        exr_windows.widen(path)
+    exr_windows.crop(tmp_path / "cropped" / view, rows, columns)
+    stored = images.read_image(dataset / name / view)
+    black = {}
+    for channel, plane in stored.channels.items():
+        black[channel] = np.full_like(plane, np.inf if channel == "Z" else 0)
+        black[channel][rows, columns] = plane[rows, columns]
+    images.write_exr(tmp_path / "black" / view, black, stored.attributes)
+    errors = {
+        folder: rows_of(dataset, name, tmp_path / folder / view)
+        for folder in ("whole", "wide", "cropped", "black")
+    }
+    assert errors["wide"] == errors["whole"]
+    assert errors["cropped"] == errors["black"]
+    assert errors["cropped"]["all"]["psnr"] < 20
 
 
 @pytest.mark.parametrize("name", LENSES)

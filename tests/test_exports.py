@@ -10,7 +10,9 @@ import zlib
 from pathlib import Path
 
 import cv2
+import exr_windows
 import numpy as np
+import OpenEXR
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
@@ -853,6 +855,21 @@ def test_lichtfeld_shows_its_points_and_depth_where_they_are(dataset, tmp_path, 
         to_world = np.linalg.inv(matrix)
         reach = steps[:, None] * rays * [1, -1, -1] / -rays[:, 2:] @ to_world[:3, :3].T
         on_sphere(to_world[:3, 3] + lichtfeld_scale(reach, to_world[:3, 3]) * reach, 1e-3)
+
+
+def test_lichtfeld_gets_the_pixels_that_an_exr_shows(tmp_path):
+    """LichtFeld takes all pixels that an EXR stores for its picture, as tinyexr does."""
+    write_views(tmp_path / "dataset", LENSES["perspective"], RIG)
+    view, other = sorted((tmp_path / "dataset" / "exr").iterdir())[:2]
+    shown = OpenEXR.File(str(view)).channels()["RGB"].pixels
+    exr_windows.widen(view)
+    folder = exported(tmp_path / "dataset", "lichtfeld", "views", tmp_path, points=9, format="exr")
+    exported_view = OpenEXR.File(str(folder / "images" / view.name))
+    header = exported_view.header()
+    for corner in (0, 1):
+        assert np.array_equal(header["dataWindow"][corner], header["displayWindow"][corner])
+    np.testing.assert_array_equal(exported_view.channels()["RGB"].pixels, shown)
+    assert (folder / "images" / other.name).samefile(other)
 
 
 def lichtfeld_scale(reach, place):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import bpy
+import exr_windows
 import numpy as np
 import OpenEXR
 import OpenImageIO as oiio
@@ -130,7 +131,7 @@ def test_some_rows_of_some_channels(tmp_path, channels):
     assert read_channels.keys() == {"B"} and np.array_equal(read_channels["B"], pixels[17:20, :, 2])
 
 
-@pytest.mark.parametrize("storage", ["parts", "tiles", "offset"])
+@pytest.mark.parametrize("storage", ["parts", "tiles"])
 def test_exr_files_of_other_kinds(tmp_path, channels, storage):
     path = str(tmp_path / "a.exr")
     colors = {name: channels[name] for name in "RGB"}
@@ -144,9 +145,6 @@ def test_exr_files_of_other_kinds(tmp_path, channels, storage):
             tiles = OpenEXR.TileDescription()
             tiles.xSize = tiles.ySize = 16
             OpenEXR.File({"type": OpenEXR.tiledimage, "tiles": tiles}, dict(channels)).write(path)
-        case "offset":
-            corners = np.array([7, -5], np.int32), np.array([59, 31], np.int32)
-            OpenEXR.File(kind | {"dataWindow": corners}, dict(channels)).write(path)
     read_channels = read_image(path).channels
     assert read_channels.keys() == channels.keys()
     assert all(
@@ -154,6 +152,58 @@ def test_exr_files_of_other_kinds(tmp_path, channels, storage):
     )
     some_rows = read_image(path, ["Z"], (3, 9)).channels["Z"]
     assert np.array_equal(some_rows, channels["Z"][3:9], equal_nan=True)
+
+
+# The first and the last pixel, across and down, of what a file stores. The file has 53 × 37 pixels.
+DATA_WINDOWS = {
+    "displaced": ((7, -5), (59, 31)),
+    "overscan": ((-4, -3), (48, 33)),
+    "beside": ((100, 100), (152, 136)),
+}
+DISPLAY_WINDOWS = {
+    "as large": ((0, 0), (52, 36)),
+    "smaller": ((0, 0), (39, 29)),
+    "from a negative origin": ((-10, -8), (60, 40)),
+    "larger": ((0, 0), (79, 49)),
+}
+
+
+@pytest.mark.parametrize("storage", ["lines", "tiles", "parts"])
+@pytest.mark.parametrize("display", DISPLAY_WINDOWS)
+@pytest.mark.parametrize("data", DATA_WINDOWS)
+def test_what_an_exr_stores_is_placed_in_its_display_window(
+    tmp_path, channels, data, display, storage
+):
+    """OpenImageIO pads pixels outside the data window with 0."""
+    path = tmp_path / "a.exr"
+    channels["A"] = np.ones((37, 53), np.float16)
+    exr_windows.write(path, channels, DATA_WINDOWS[data], DISPLAY_WINDOWS[display], storage)
+    (left, top), (right, bottom) = DISPLAY_WINDOWS[display]
+    size = (right - left + 1, bottom - top + 1)
+    header = read_header(path)
+    assert (header.width, header.height) == size
+    shown = {}
+    for subimage in range(len(channels) if storage == "parts" else 1):
+        pixels = oiio.ImageBuf(str(path), subimage, 0)
+        planes = np.moveaxis(pixels.get_pixels(oiio.FLOAT, pixels.roi_full), -1, 0)
+        shown |= dict(zip(pixels.spec().channelnames, planes, strict=True))
+    shown["Z"][shown["A"] == 0] = np.inf
+    read_channels = read_image(path).channels
+    assert read_channels.keys() == shown.keys()
+    for name, plane in read_channels.items():
+        assert plane.dtype == channels[name].dtype
+        assert np.array_equal(plane, shown[name].astype(plane.dtype), equal_nan=True), name
+    for rows in ((0, 3), (3, 20), (size[1] - 2, size[1])):
+        part = read_image(path, ["Z"], rows).channels["Z"]
+        assert np.array_equal(part, read_channels["Z"][slice(*rows)], equal_nan=True)
+
+
+def test_a_display_window_that_no_picture_fills_is_refused(tmp_path, channels):
+    path = tmp_path / "a.exr"
+    exr_windows.write(path, channels, ((0, 0), (52, 36)), ((0, 0), (999999, 9)))
+    for read in (read_header, read_image):
+        with pytest.raises(UserError, match=r"a\.exr: displayWindow: is 1000000 × 10; must"):
+            read(path)
 
 
 def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):

@@ -7,8 +7,10 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import exr_windows
 import forks
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from checkouts import ROOT, planned, snakemake
 from pydantic import TypeAdapter
@@ -142,6 +144,47 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     run("validate.py", *arguments)
     validation = json.loads((dataset / "validation.json").read_text())
     assert validation["valid"], validation["summary"]
+
+
+def reprojected(folder, published, run_program):
+    """Import published views into a folder, reproject them, and return them by their names."""
+    dataset = folder / "results" / "theirs" / "LFPlane"
+    lightfield = dataset / "lightfield.json"
+    arguments = ["--scene", "theirs", "--rig", "LFPlane", "--output", lightfield]
+    run_program("make_lightfield.py", *arguments, cwd=folder)
+    arguments = ["--dataset", published, "--lightfield", lightfield, "--output", dataset / "exr"]
+    run_program("import_views.py", *arguments)
+    settings = folder / "perspective.json"
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
+    settings.write_text(json.dumps({"camera": camera, "formats": ["exr"]}))
+    output = dataset / "perspective"
+    arguments = ["--settings", settings, "--input-cfg", lightfield, "--input-dir", dataset / "exr"]
+    arguments += ["--output-dir", output, "--output-cfg", output / "lightfield.json"]
+    run_program("reproject.py", *arguments)
+    return {path.name: images.read_image(path).channels for path in output.glob("*.exr")}
+
+
+def test_views_with_data_windows_are_reprojected_as_viewers_show_them(
+    published, tmp_path, run_program
+):
+    """OpenImageIO pads and crops to the display window. What is missing is black, and a miss."""
+    views = sorted((published / "exr").iterdir())
+    exr_windows.widen(views[0])
+    exr_windows.crop(views[1], np.s_[20:40], np.s_[3:30])
+    shown = reprojected(tmp_path, published, run_program)
+    for view in views[:2]:
+        pixels = oiio.ImageBuf(str(view))
+        planes = np.moveaxis(pixels.get_pixels(oiio.HALF, pixels.roi_full), -1, 0)
+        channels = dict(zip(pixels.spec().channelnames, planes, strict=True))
+        channels["Z"][channels["Z"] == 0] = np.inf
+        view.unlink()
+        images.write_exr(view, channels)
+    shutil.rmtree(tmp_path / "results")
+    whole = reprojected(tmp_path, published, run_program)
+    assert shown.keys() == whole.keys()
+    for name, channels in whole.items():
+        for channel, plane in channels.items():
+            np.testing.assert_array_equal(shown[name][channel], plane, err_msg=name)
 
 
 @pytest.mark.parametrize(("side", "fewest", "most"), [(64, 1, 1), (2048, 4, 20)])

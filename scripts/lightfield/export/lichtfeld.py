@@ -49,7 +49,7 @@ def export(source: SourceDataset, settings: LichtFeld, folder: Path) -> None:
     for view in views:
         image = folder / "images" / f"{view.name}{suffix}"
         if settings.format == "exr":
-            link_or_copy(source.path(view), image)
+            _write_exr(source.path(view), image)
         else:
             source.write_image(view, image)
         valid = source.valid(view)
@@ -84,6 +84,16 @@ def camera(lens: Lens) -> dict[str, Any]:
     distortion = {"k1": k1, "k2": k2, "k3": k3}
     focal = {"fl_x": fx, "fl_y": fy}
     return {"camera_model": "OPENCV_FISHEYE", **focal, **center, **size, **distortion}
+
+
+def _write_exr(path: Path, target: Path) -> None:
+    """Make a hard link to an EXR. If it stores other pixels than it shows, write what it shows."""
+    if images.read_header(path).window.is_stored_whole:
+        link_or_copy(path, target)
+        return
+    shown = images.read_image(path)
+    colour = {name: plane for name, plane in shown.channels.items() if name in "RGBA"}
+    images.write_exr(target, colour, chromaticities=shown.chromaticities)
 
 
 def _depth(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uint16]]:

@@ -38,6 +38,9 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
 
+# Of a picture, in pixels.
+LARGEST_SIDE = 65536
+
 # OpenEXR's codecs that keep every bit of halves and floats.
 CODECS = {
     "zip": "ZIP_COMPRESSION",
@@ -86,14 +89,70 @@ class Image:
 
 
 @dataclass(frozen=True)
-class Header:
-    """The header of a file's first subimage. The size is in pixels."""
+class Window:
+    """The size of a picture in pixels, and which of its pixels a file stores.
+
+    They differ only in an EXR whose data window is not its display window. ``left`` and ``top`` are
+    the place of the first stored pixel in the picture, which may be outside.
+    """
 
     width: int
     height: int
+    left: int
+    top: int
+    stored_width: int
+    stored_height: int
+
+    @property
+    def is_stored_whole(self) -> bool:
+        """Whether the file stores exactly the pixels of the picture."""
+        return self == Window(self.width, self.height, 0, 0, self.width, self.height)
+
+    def stored_rows(self, rows: tuple[int, int] | None) -> tuple[int, int]:
+        """Return which stored rows (first, end) the ``rows`` of the picture contain. None: all."""
+        first, end = rows or (0, self.height)
+        return (
+            min(max(first - self.top, 0), self.stored_height),
+            min(max(end - self.top, 0), self.stored_height),
+        )
+
+    def placed(
+        self, name: str, stored: np.ndarray[Any, Any], rows: tuple[int, int] | None
+    ) -> np.ndarray[Any, Any]:
+        """Return ``rows`` of the picture's channel ``name``, from its `stored_rows`.
+
+        What the file does not store is 0, as viewers show it. In Z, it is inf, a miss.
+        """
+        if self.is_stored_whole:
+            return stored
+        first, end = rows or (0, self.height)
+        missing = np.inf if name == "Z" and stored.dtype.kind == "f" else 0
+        plane = np.full((end - first, self.width), missing, stored.dtype)
+        top = max(self.top - first, 0)
+        left = max(self.left, 0)
+        part = stored[:, max(-self.left, 0) :][:, : max(self.width - left, 0)]
+        plane[top : top + part.shape[0], left : left + part.shape[1]] = part
+        return plane
+
+
+@dataclass(frozen=True)
+class Header:
+    """The header of a file's first subimage."""
+
+    window: Window
     channels: list[str]
     attributes: dict[str, Attribute]
     chromaticities: Chromaticities | None = None
+
+    @property
+    def width(self) -> int:
+        """The width of the picture in pixels."""
+        return self.window.width
+
+    @property
+    def height(self) -> int:
+        """The height of the picture in pixels."""
+        return self.window.height
 
 
 # Of 100. Most values are off by a level at most.
@@ -126,9 +185,10 @@ def read_header(path: Path | str) -> Header:
         return header
     file = _open(path)
     spec = file.spec()
+    window = _window(path, file)
     file.close()
     names = _channel_names(path, spec)
-    return Header(spec.width, spec.height, names, _attributes(spec), _chromaticities(spec))
+    return Header(window, names, _attributes(spec), _chromaticities(spec))
 
 
 def read_image(
@@ -319,11 +379,32 @@ def _plain_exr_header(path: Path | str) -> Header | None:
         return None
     except (RuntimeError, ValueError) as error:
         raise UserError(f"{path}: is not an image that can be read: {error}") from None
-    (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
+    data, display = (_box(header[key]) for key in ("dataWindow", "displayWindow"))
     attributes = {k: v for k, v in header.items() if isinstance(v, str | int | float)}
     chromaticities = header.get(_CHROMATICITIES)
-    size = (right - left + 1, bottom - top + 1)
-    return Header(*size, _colour_first(names), attributes, chromaticities)
+    window = _placed_window(path, data, display)
+    return Header(window, _colour_first(names), attributes, chromaticities)
+
+
+def _box(corners: Sequence[np.ndarray[Any, Any]]) -> tuple[int, int, int, int]:
+    """Return x, y, width and height of a box of an EXR's header."""
+    (left, top), (right, bottom) = (corner.tolist() for corner in corners)
+    return left, top, right - left + 1, bottom - top + 1
+
+
+def _placed_window(path: Path | str, data: Sequence[int], display: Sequence[int]) -> Window:
+    """Return the window of a file with boxes (x, y, width, height) of ``data`` and ``display``.
+
+    Raises `UserError` for a display window that is too large to fill.
+    """
+    x, y, width, height = display
+    window = Window(width, height, data[0] - x, data[1] - y, *data[2:])
+    if not window.is_stored_whole and max(width, height) > LARGEST_SIDE:
+        raise UserError(
+            f"{path}: displayWindow: is {width} × {height}; must have at most {LARGEST_SIDE} "
+            "pixels a side"
+        )
+    return window
 
 
 def _colour_first(names: Iterable[str]) -> list[str]:
@@ -339,19 +420,23 @@ def _read_plain_exr(
 ) -> tuple[Image, list[str]]:
     """Return an EXR's image with the ``channels`` or all, and the names of all its channels."""
     names = [name for name in header.channels if channels is None or name in channels]
-    first, end = rows or (0, header.height)
+    window = header.window
+    first, end = window.stored_rows(rows)
     try:
         # OpenEXR.File, which will replace InputFile, can only read all rows.
         file = OpenEXR.InputFile(str(path))
         raw_header = file.header()
         top = raw_header["dataWindow"].min.y
-        planes = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
+        planes: Sequence[bytes] = [b""] * len(names)
+        if first < end:
+            planes = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
     except OSError as error:
         raise UserError(f"{path}: cannot be read whole: {error}") from None
     plane_by_name = {}
     for name, plane in zip(names, planes, strict=True):
         dtype = np.dtype(_EXR_TYPES[str(raw_header["channels"][name].type)])
-        plane_by_name[name] = np.frombuffer(plane, dtype).reshape(end - first, header.width)
+        stored = np.frombuffer(plane, dtype).reshape(end - first, window.stored_width)
+        plane_by_name[name] = window.placed(name, stored, rows)
     image = Image(plane_by_name, header.attributes, header.chromaticities)
     return image, header.channels
 
@@ -370,6 +455,8 @@ def _read_other(
         spec = file.spec()
         attributes = _attributes(spec) | attributes
         channel_names = _channel_names(path, spec)
+        window = _window(path, file)
+        stored_rows = slice(*window.stored_rows(rows))
         indices = [
             index
             for index, name in enumerate(channel_names)
@@ -380,14 +467,21 @@ def _read_other(
             if pixels is None:
                 raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
             pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
-            if rows:
-                pixels = pixels[rows[0] : rows[1]]
-            planes = np.moveaxis(pixels, -1, 0)
-            plane_by_name |= dict(zip(channel_names[first:end], planes, strict=True))
+            planes = np.moveaxis(pixels[stored_rows], -1, 0)
+            for name, plane in zip(channel_names[first:end], planes, strict=True):
+                plane_by_name[name] = window.placed(name, plane, rows)
         names += channel_names
         subimage += 1
     file.close()
     return Image(plane_by_name, attributes, chromaticities), names
+
+
+def _window(path: Path | str, file: Any) -> Window:
+    """Return the window of an open file's current subimage."""
+    spec = file.spec()
+    data = (spec.x, spec.y, spec.width, spec.height)
+    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    return _placed_window(path, data, display if file.format_name() == "openexr" else data)
 
 
 def _channel_names(path: Path | str, spec: Any) -> list[str]:
