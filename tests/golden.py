@@ -130,7 +130,8 @@ def differences(noted, present):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     names = ", ".join(SCENES)
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"which of {names} (default: all)")
+    about = f"which of {names} (default: all)"
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=about)
     parser.add_argument("--write", action="store_true", help="note the sums anew")
     arguments = parser.parse_args()
     for scene in arguments.scenes:
