@@ -75,6 +75,63 @@ def blurred_cube():
     bpy.context.scene.render.use_motion_blur = True
 
 
+def scaled_camera():
+    """Roll the camera, and scale it along its own axes, which changes no picture."""
+    import bpy
+
+    camera = bpy.context.scene.camera
+    camera.rotation_euler.y = 0.4
+    camera.scale = (3, 2, 0.5)
+
+
+def parent_of_one_scale():
+    """Let a parent scale the camera evenly, and so take it to another place."""
+    _parent((1.3, 1.3, 1.3))
+
+
+def mirrored_camera():
+    """Mirror the camera along its own x."""
+    import bpy
+
+    bpy.context.scene.camera.scale.x = -1
+
+
+def mirroring_parent():
+    """Let a parent mirror the camera in the plane x = 0."""
+    _parent((-1, 1, 1))
+
+
+def turning_twice():
+    """Mirror the camera along two axes, which is half a turn, and no mirror."""
+    import bpy
+
+    bpy.context.scene.camera.scale = (-1, -1, 1)
+
+
+def shearing_parent():
+    """Let a parent of two scales shear a rolled camera."""
+    import bpy
+
+    bpy.context.scene.camera.rotation_euler.y = 0.8
+    _parent((2, 1, 1))
+
+
+def flat_camera():
+    """Let the camera have no width."""
+    import bpy
+
+    bpy.context.scene.camera.scale.x = 0
+
+
+def _parent(scale):
+    import bpy
+
+    scene = bpy.context.scene
+    parent = _put(scene.collection, "Parent", None)
+    parent.scale = scale
+    scene.camera.parent = parent
+
+
 def roots(scene):
     """Return the owners of settings, by short names."""
     import bpy

@@ -78,6 +78,34 @@ ROWS = [
         "the YAML has the number",
         "`render: {samples: file}`",
     ),
+    Row(
+        "scale of the camera, or one scale of a parent for all axes",
+        TAKEN,
+        [
+            Case(scenes.scaled_camera),
+            Case(scenes.parent_of_one_scale),
+            Case(scenes.turning_twice),
+        ],
+        "only the place and the direction count",
+    ),
+    Row(
+        "negative scale of the camera or of a parent",
+        REFUSED,
+        [
+            Case(scenes.mirrored_camera, note="the camera Camera is mirrored at frame 1"),
+            Case(scenes.mirroring_parent, note="the camera Camera is mirrored at frame 1"),
+        ],
+        "a pose cannot mirror",
+    ),
+    Row(
+        "different scales of a parent of a turned camera, and a scale of 0",
+        REFUSED,
+        [
+            Case(scenes.shearing_parent, note="the camera Camera is sheared or flat at frame 1"),
+            Case(scenes.flat_camera, note="the camera Camera is sheared or flat at frame 1"),
+        ],
+        "a pose cannot shear",
+    ),
     Row("film exposure", TAKEN, [Case({"cycles.film_exposure": 2})]),
     Row(
         "render border",

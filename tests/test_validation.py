@@ -772,8 +772,8 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
     ),
     "no poses of an exposure": (bad_frame("exposure", {"start": 1}), "exposure: has not the pose"),
     "mirrored axis": (
-        listed(turn([BAD], np.diag([-1.0, 1.0, 1.0]))),
-        "view_0002f: world_matrix: is not that of its position and rotation",
+        bad_frame("world_matrix", np.diag([-1.0, 1.0, 1.0, 1.0]).tolist()),
+        "world_matrix: its first 3 × 3 must be a rotation, and mirrors",
     ),
     "Z-depth beyond 180 degrees": (
         lambda small_dataset: rewrite(small_dataset, recamera({"fov": 190})),

@@ -40,6 +40,9 @@ def inventory_settings(dataset):
         # Like the program, leave out rigs without frames.
         "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
+    if settings["camera_frames"]:
+        # Raise this number when the program takes or refuses other cameras.
+        settings["camera_version"] = 1
     if written.render.light_groups:
         settings["light_groups"] = written.render.light_groups
     return settings

@@ -4,7 +4,7 @@ This is their only reader. `lightfield.dataset.lightfield` makes views of them, 
 `lightfield.geometry.rigs.poses` makes a rig of them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from reprlib import repr as shortened
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -13,13 +13,16 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST
-from lightfield.geometry.rotations import Floats
+from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
 
 # Cameras are at one place if they are nearer to each other than this, in metres.
 ONE_PLACE = 1e-6
 
 # In bytes, because the name becomes a file's.
 LONGEST_NAME = 200
+
+SKEWED = "its first 3 × 3 must be a rotation, without scale"
+MIRRORED = "its first 3 × 3 must be a rotation, and mirrors"
 
 
 class Frame(NamedTuple):
@@ -53,7 +56,16 @@ def read_frames(frames: Any) -> list[Frame]:
         if frame.name in names:
             raise UserError(f"{frame.where}: {frame.name}: is the name of two frames")
         names.add(frame.name)
+    _check_rotations([frame for frame in views if frame.matrix is not None])
     return views
+
+
+def _check_rotations(frames: Sequence[Frame]) -> None:
+    """Raise `UserError` for the first matrix of ``frames`` that scales, shears or mirrors."""
+    turns = np.array([frame.matrix for frame in frames]).reshape(-1, 4, 4)[:, :3, :3]
+    for wrong, problem in ((is_skewed(turns), SKEWED), (is_mirrored(turns), MIRRORED)):
+        if wrong.any():
+            raise UserError(f"{frames[int(np.argmax(wrong))].where}: world_matrix: {problem}")
 
 
 def check_list(frames: Any) -> None:

@@ -6,6 +6,23 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# Files and Blender round numbers. So far may an element of a matrix be from that of a rotation.
+TOLERANCE = 1e-4
+
+
+def is_skewed(matrix: Floats) -> Bools:
+    """Return which matrices (…, 3, 3) scale or shear. NaN does not."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = np.abs(matrix @ matrix.swapaxes(-1, -2) - np.eye(3)).max((-1, -2))
+    return np.asarray(deviation > TOLERANCE)
+
+
+def is_mirrored(matrix: Floats) -> Bools:
+    """Return which matrices (…, 3, 3) turn a right hand into a left hand. NaN does not."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.linalg.det(matrix) < 0)
 
 
 def euler_to_matrix(euler: Floats) -> Floats:

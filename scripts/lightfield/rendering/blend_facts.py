@@ -4,8 +4,10 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
+import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
 from lightfield.rendering import motion_blur
 from lightfield.rendering.cycles import view_layer
 
@@ -13,8 +15,9 @@ from lightfield.rendering.cycles import view_layer
 def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     """Return the open .blend's render settings, and its camera at ``frames``.
 
-    None stands for the frame that the file was saved at. Raises `UserError` if the camera does not
-    have the same lens at all frames.
+    None stands for the frame that the file was saved at. Without ``frames``, no view is the
+    camera's. Raises `UserError` if the camera does not have the same lens at all frames, or if a
+    view cannot have its pose.
     """
     scene = bpy.context.scene
     layer = view_layer(scene)
@@ -23,7 +26,8 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     view = scene.view_settings
     frame = scene.frame_current
     nodes = scene.compositing_node_group
-    camera = _camera([frame if number is None else number for number in frames] or [frame])
+    views = [frame if number is None else number for number in frames]
+    camera = _camera(views or [frame], is_taken=bool(views))
     scene.frame_set(frame)
     return {
         "scenes": [other.name for other in bpy.data.scenes],
@@ -73,10 +77,11 @@ def _samples(cycles: Any, layer: Any) -> int:
     )
 
 
-def _camera(frames: list[int]) -> dict[str, Any] | None:
+def _camera(frames: list[int], is_taken: bool) -> dict[str, Any] | None:
     """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
 
     Return None if the scene has no camera. A marker may change the camera with the frame.
+    ``is_taken`` says whether views have the camera's poses. Raises `UserError` if they cannot.
     """
     scene = bpy.context.scene
     lenses = []
@@ -92,7 +97,11 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
         names.append(scene.camera.name)
         lenses.append(_lens(camera.data))
         clips.append([round(camera.data.clip_start, 6), round(camera.data.clip_end, 6)])
-        matrices[str(frame)] = [list(row) for row in camera.matrix_world.normalized()]
+        # Cycles ignores scale along the camera's own axes, too.
+        matrix = camera.matrix_world.normalized()
+        matrices[str(frame)] = [list(row) for row in matrix]
+        if is_taken:
+            _check_pose(names[-1], frame, np.array(matrix))
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has a different lens at frame {frame} than at frame "
@@ -100,6 +109,24 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
                 "the same lens"
             )
     return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": matrices}
+
+
+def _check_pose(name: str, frame: int, matrix: Floats) -> None:
+    """Raise `UserError` if no view can have the matrix (4, 4) of the camera ``name`` as its pose.
+
+    Cycles mirrors or shears the picture of such a camera, and a pose is a rotation.
+    """
+    turn = matrix[:3, :3]
+    if is_skewed(turn):
+        raise UserError(
+            f"the camera {name} is sheared or flat at frame {frame}, which a view's pose cannot "
+            "be; give each of its parents one scale for all axes, or apply the scales in Blender"
+        )
+    if is_mirrored(turn):
+        raise UserError(
+            f"the camera {name} is mirrored at frame {frame}, which a view's pose cannot be; "
+            "make the negative scale of the camera or of its parent positive"
+        )
 
 
 def _lens(camera: Any) -> dict[str, Any]:

@@ -59,7 +59,10 @@ def write_of_datasets(
     contents: dict[str, Any] = {}
     if chosen.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
-        contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+        try:
+            contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
     if written and written.render and written.render.motion_blur is not None:
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)

@@ -24,6 +24,8 @@ from lightfield.core.files import read_json, read_problem, read_text
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.frames import (
+    MIRRORED,
+    SKEWED,
     Frame,
     check_list,
     check_mapping,
@@ -33,8 +35,11 @@ from lightfield.geometry.frames import (
 )
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
 from lightfield.geometry.rotations import (
+    TOLERANCE,
     Floats,
     euler_to_matrix,
+    is_mirrored,
+    is_skewed,
     matrix_to_euler,
     quaternion_to_matrix,
 )
@@ -42,8 +47,6 @@ from lightfield.geometry.rotations import (
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
-# Files round numbers. So far may a matrix be from a rotation, and one form of a pose from another.
-TOLERANCE = 1e-4
 # In bytes. It is enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
 
@@ -174,14 +177,12 @@ def _check_poses(
     refuse(far, f"position: must be within {FARTHEST:g} metres of the origin")
     turns = matrices[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        skew = np.abs(turns @ turns.swapaxes(-1, -2) - np.eye(3)).max((-1, -2))
-        mirrored = np.linalg.det(turns) < 0
         last_row = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(-1)
         angle_gap = np.abs(turns - euler_to_matrix(rotations)).max((-1, -2))
         place_gap = np.abs(matrices[:, :3, 3] - positions).max(-1)
     # NaN, of a missing form, is never more than the tolerance.
-    refuse(skew > TOLERANCE, f"{matrix_key}: its first 3 × 3 must be a rotation, without scale")
-    refuse(mirrored, f"{matrix_key}: its first 3 × 3 must be a rotation, and mirrors")
+    refuse(is_skewed(turns), f"{matrix_key}: {SKEWED}")
+    refuse(is_mirrored(turns), f"{matrix_key}: {MIRRORED}")
     refuse(last_row > TOLERANCE, f"{matrix_key}: its last row must be 0, 0, 0, 1")
     refuse(angle_gap > TOLERANCE, "world_matrix and rotation: must be the same rotation")
     refuse(
