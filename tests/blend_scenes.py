@@ -238,3 +238,45 @@ def _make_linear(block):
     for curve in animation.curves(block):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
+
+
+def go_between_frames():
+    """Save the file at frame 1.5."""
+    import bpy
+
+    bpy.context.scene.frame_set(1, subframe=0.5)
+
+
+def move_the_camera():
+    """Let the camera travel 0.3 m to its right while the shutter is open, as artists do: by keys.
+
+    The keys lie on whole frames before and after, so they need no knowledge of the shutter.
+    """
+    import bpy
+
+    scene = bpy.context.scene
+    camera = scene.camera
+    here = camera.location.x
+    frame = scene.frame_current_final
+    speed = 0.3 / (scene.render.motion_blur_shutter * scene.render.frame_map_old)
+    speed *= scene.render.frame_map_new
+    for offset in (-10, 0, 10):
+        camera.location.x = here + offset * speed
+        camera.keyframe_insert("location", frame=frame + offset)
+    _make_linear(camera)
+    if not scene.render.use_motion_blur:
+        for thing in scene.objects:
+            thing.cycles.use_motion_blur = thing == camera
+    scene.render.use_motion_blur = True
+    scene.frame_set(1)
+
+
+def open_the_shutter_late():
+    import bpy
+
+    curve = bpy.context.scene.render.motion_blur_shutter_curve
+    points = curve.curves[0].points
+    points[0].location = (0, 0)
+    points[1].location = (0.7, 0)
+    points[2].location = (1, 1)
+    curve.update()

@@ -34,7 +34,7 @@ class Case:
       function that changes the open file. `blend_scenes.roots` has the owners.
     - ``scene``: the function that makes the scene.
     - ``yaml``: blocks of the scene YAML, which are merged with the usual ones.
-    - ``by_hand``: a change that gives Blender's own picture what ``yaml`` asks for. None if
+    - ``by_hand``: a function that gives Blender's own picture what ``yaml`` asks for. None if
       nothing is needed.
     - ``note``: a part of the note or of the error. None if nothing needs to be said.
     - ``outcome``: what becomes of the change, if it is not the row's.
@@ -44,7 +44,7 @@ class Case:
     change: Mapping[str, Any] | Callable[[], None]
     scene: Callable[[], None] = scenes.studio
     yaml: Mapping[str, Any] = field(default_factory=dict)
-    by_hand: Mapping[str, Any] | Callable[[], None] | None = None
+    by_hand: Callable[[], None] | None = None
     note: str | None = None
     outcome: str | None = None
     format: str = "OPEN_EXR"
@@ -70,7 +70,98 @@ class Row:
     key: str = ""
 
 
+FILES_FRAME = {"scene": {"frame": "file"}}
+CAMERA_TRAVELS = {"render": {"camera_motion": {"travel": [0.3, 0, 0]}}}
+
 ROWS = [
+    Row(
+        "frame",
+        IGNORED,
+        [
+            Case(scenes.go_between_frames, scenes.moving_cube),
+            Case(
+                scenes.go_between_frames,
+                scenes.moving_cube,
+                FILES_FRAME,
+                note="frame 1.5, the file's",
+                outcome=TAKEN,
+            ),
+        ],
+        "frame 1",
+        "`scene: {frame: 24}`, or `file`, which may lie between two frames",
+    ),
+    Row(
+        "frames remapped (*Time Stretching*)",
+        TAKEN,
+        [
+            Case({"render.frame_map_new": 50}, scenes.moving_cube, note="frames remapped"),
+            Case(
+                {"render.frame_map_new": 200},
+                scenes.moving_cube,
+                CAMERA_TRAVELS,
+                by_hand=scenes.move_the_camera,
+            ),
+            Case(
+                {"render.frame_map_new": 200},
+                scenes.blurred_cube,
+                CAMERA_TRAVELS,
+                by_hand=scenes.move_the_camera,
+            ),
+        ],
+    ),
+    Row(
+        "motion blur",
+        TAKEN,
+        [
+            Case({"render.use_motion_blur": True}, scenes.moving_cube, note="motion blur ON"),
+            Case(
+                {"render.use_motion_blur": True},
+                scenes.moving_cube,
+                {"render": {"motion_blur": False}},
+                outcome=IGNORED,
+                note="motion blur off",
+            ),
+            Case({"render.motion_blur_shutter": 1}, scenes.blurred_cube),
+            Case({"cube_cycles.use_motion_blur": False}, scenes.blurred_cube),
+            Case({"layer.use_motion_blur": False}, scenes.blurred_cube),
+        ],
+        key="`render: {motion_blur: …}`",
+    ),
+    Row(
+        "motion blur: position (*Start on Frame*, *End on Frame*), rolling shutter, shutter curve",
+        IGNORED,
+        [
+            Case(
+                {"render.motion_blur_position": "START"},
+                scenes.blurred_cube,
+                note="shutter position start ignored",
+            ),
+            Case(
+                {"render.motion_blur_position": "END"},
+                scenes.blurred_cube,
+                CAMERA_TRAVELS,
+                scenes.move_the_camera,
+            ),
+            Case(
+                {"cycles.rolling_shutter_type": "TOP"}, scenes.blurred_cube, note="rolling shutter"
+            ),
+            Case(
+                {"cycles.rolling_shutter_type": "TOP"},
+                scenes.blurred_cube,
+                CAMERA_TRAVELS,
+                scenes.move_the_camera,
+            ),
+            Case(scenes.open_the_shutter_late, scenes.blurred_cube, note="shutter curve"),
+            Case(
+                scenes.open_the_shutter_late,
+                scenes.blurred_cube,
+                CAMERA_TRAVELS,
+                scenes.move_the_camera,
+            ),
+        ],
+        "the exposure is even, and its middle is at the frame, where depth is",
+        "`render: {camera_motion: {rolling: …}}`",
+    ),
     Row(
         "samples of the scene and of the view layer",
         IGNORED,

@@ -41,7 +41,7 @@ from lightfield.dataset.exports import settings_of
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.presence import check_external_files, external_changed
+from lightfield.dataset.presence import check_external_files, inventory_outdated
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
@@ -228,8 +228,11 @@ def inventory(_):
     lens |= {"sensor_height": 24.0, "shift_x": 0.1, "shift_y": 0.0, "depth_of_field": False}
     camera = {"name": "Camera", "lens": lens, "clip": [0.1, 1000.0]}
     camera["matrices"] = {"1": np.eye(4).tolist(), "3": np.eye(4).tolist()}
+    blend = {"scene": "Scene", "frame": 3, "samples": 64, "camera": camera, "layers": ["a"]}
+    blend |= {"motion_blur": True, "shutter": 0.5, "shutter_position": "START", "remapped": [1, 2]}
+    blend |= {"shutter_curve": False, "rolling_shutter": False}
     return {
-        "blend": {"scene": "Scene", "frame": 3, "samples": 64, "camera": camera, "layers": ["a"]},
+        "blend": blend,
         "external_files": [{"path": "a.png", "sha256": "0" * 64, "bytes": 7, "mtime_ns": 7}],
         "missing": [{"kind": "image", "name": "a", "path": "a.png", "problem": "missing"}],
         "volumes": ["fog"],
@@ -239,7 +242,7 @@ def inventory(_):
 
 
 def read_scene_inventory(path, dataset):
-    external_changed(dataset, None)
+    inventory_outdated(dataset, None)
     dataset.estimate.memory_bytes(100)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):

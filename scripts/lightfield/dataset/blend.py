@@ -66,9 +66,35 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
     return settings.model_copy(update={"principal_point": point})
 
 
+def is_blurred(blend: Settings, render: Settings) -> bool:
+    """Return whether views are blurred by the motion of objects or of the camera."""
+    return bool(render.get("motion_blur", blend["motion_blur"]) or "camera_motion" in render)
+
+
+def lacks_exposure(blend: Settings, render: Settings) -> bool:
+    """Return whether blurred views need to know the .blend's exposure, which is not in ``blend``.
+
+    Inventories of earlier versions lack it.
+    """
+    return is_blurred(blend, render) and "shutter" not in blend
+
+
+def is_shutter_reset(blend: Settings, render: Settings) -> bool:
+    """Return whether views are blurred at other times than a render of the .blend itself."""
+    if not is_blurred(blend, render) or "shutter" not in blend:
+        return False
+    old, new = blend["remapped"]
+    return bool(
+        blend["shutter_position"] != "CENTER"
+        or blend["shutter_curve"]
+        or blend["rolling_shutter"]
+        or ("camera_motion" in render and old != new)
+    )
+
+
 def usage_notes(
     inventory: Settings,
-    frames: Sequence[int],
+    frames: Sequence[float],
     render: Settings,
     uses_camera: bool,
 ) -> list[str]:
@@ -83,18 +109,23 @@ def usage_notes(
         *_camera(blend["camera"], uses_camera),
         *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
         *_switches(blend, render),
+        *_exposure(blend, render),
         *_display(blend),
         *_film(blend, render),
         *_missing(inventory["missing"]),
     ]
 
 
-def _scene(blend: Settings, frames: Sequence[int], render: Settings) -> Iterator[str]:
+def _scene(blend: Settings, frames: Sequence[float], render: Settings) -> Iterator[str]:
     """Yield notes on the rendered scene, frames, view layers, and samples."""
     layers = blend["layers"]
     if len(blend["scenes"]) > 1:
         yield f"scene {blend['scene']} of {len(blend['scenes'])}"
     yield _frames(frames, blend["frame"])
+    # Inventories of earlier versions lack this key.
+    old, new = blend.get("remapped", (1, 1))
+    if old != new:
+        yield f"frames remapped from {old} to {new}"
     if blend["view_layers"] > 1:
         together = "" if len(layers) == 1 else " in one picture"
         name = "view layer" if len(layers) == 1 else "view layers"
@@ -132,6 +163,20 @@ def _switches(blend: Settings, render: Settings) -> Iterator[str]:
     ):
         if is_on or is_on_in_blend:
             yield f"{name} {'ON' if is_on else 'off'}"
+
+
+def _exposure(blend: Settings, render: Settings) -> Iterator[str]:
+    """Yield notes on the .blend's exposure, if anything is blurred by motion."""
+    # Inventories of earlier versions lack its keys.
+    if not is_blurred(blend, render) or "shutter" not in blend:
+        return
+    yield f"shutter open for {blend['shutter']:g} frames"
+    if blend["shutter_position"] != "CENTER":
+        yield f"shutter position {blend['shutter_position'].lower()} ignored, it is centred"
+    if blend["shutter_curve"]:
+        yield "shutter curve ignored"
+    if blend["rolling_shutter"]:
+        yield "rolling shutter ignored"
 
 
 def _display(blend: Settings) -> Iterator[str]:
@@ -176,7 +221,7 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
         yield "scripts and drivers in Python not run"
 
 
-def _frames(frames: Sequence[int], file_frame: int) -> str:
+def _frames(frames: Sequence[float], file_frame: float) -> str:
     text = f"frame {frames[0]}" if len(frames) == 1 else f"frames {frames[0]} to {frames[-1]}"
     if list(frames) == [file_frame]:
         return f"{text}, the file's"

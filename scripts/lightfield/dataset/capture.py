@@ -59,12 +59,15 @@ class Capture:
         with reading(inventory, "inventory"):
             facts = content["blend"]
             external_files = [(file["path"], file["sha256"]) for file in content["external_files"]]
-            frame = int(facts["frame"] if self.source.frame == FILE else self.source.frame)
+            frame: float = facts["frame"] if self.source.frame == FILE else self.frame
             render = dict(self.render)
             rig = self.rig
             if render.get("samples") == FILE:
                 most = render.pop("most_samples", facts["samples"])
                 render["samples"] = min(facts["samples"], most)
+            if blend.is_shutter_reset(facts, render):
+                # Earlier versions rendered these views otherwise: they need another key.
+                render["shutter"] = "centred"
             if render.get("depth_of_field"):
                 blend.camera_of(facts)
             if isinstance(rig, BlendCamera):
@@ -80,6 +83,12 @@ class Capture:
                 rig=rig,
                 external_files=external_files,
             )
+
+    @property
+    def frame(self) -> float:
+        """The rendered frame. That of a .blend is known once the capture is `resolved`."""
+        assert not isinstance(self.source.frame, str)
+        return self.source.frame
 
     @property
     def depth(self) -> str | None:
@@ -117,11 +126,14 @@ class Capture:
         origin: dict[str, Any] = {"depth": self.depth}
         if self.rig.stereo and self.rig.is_omnidirectional:
             origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
-        origin["frame"] = self.source.frame
+        origin["frame"] = self.frame
         origin["scene"] = {
             "name": self.scene_name,
             **self.source.model_dump(
-                include=MODEL_SOURCE_KEYS if self.source.model else SOURCE_KEYS, exclude_none=True
+                include=MODEL_SOURCE_KEYS if self.source.model else SOURCE_KEYS,
+                exclude_none=True,
+                # A .blend's own frame may have a fraction, which a scene YAML's has not.
+                warnings=False,
             ),
             "fingerprint": self.fingerprint,
         }

@@ -9,7 +9,6 @@ from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.names import MESH, VIEWS
 from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.dataset.reprojections import LIGHT_GROUPS
-from lightfield.dataset.scene_source import FILE
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
@@ -233,13 +232,13 @@ class DatasetPaths(Description):
         """The rig. A random rig and a .blend's camera have the path of the file of their places."""
         if isinstance(self.rig, BlendCamera):
             frame = self.source.frame
-            return self.rig.placed(str(self.inventory), None if frame == FILE else int(frame))
+            return self.rig.placed(str(self.inventory), frame if isinstance(frame, int) else None)
         if isinstance(self.rig, Random):
             return self.rig.placed(str(self.places))
         return self.rig
 
     @property
-    def camera_frames(self) -> list[int | None]:
+    def camera_frames(self) -> list[float | None]:
         """The frames of a rig of the .blend's camera. None is the file's own frame."""
         rig = self.placed_rig
         return rig.path if isinstance(rig, BlendCamera) else []

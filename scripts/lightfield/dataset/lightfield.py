@@ -255,9 +255,12 @@ class LightField:
         return np.array([view.matrix for view in self.views]).reshape(-1, 4, 4)
 
     @property
-    def frame(self) -> int:
-        """The frame of the scene that was rendered."""
-        frame: int = self._key("frame", int, "a whole number")
+    def frame(self) -> float:
+        """The frame of the scene that was rendered.
+
+        Only a .blend's own frame may have a fraction: `frame: file` of a file saved between two.
+        """
+        frame: float = self._key("frame", (int, float), "a number")
         return frame
 
     @property
@@ -312,7 +315,7 @@ class LightField:
     def _render(self) -> Mapping[str, Any]:
         return self.render if "render" in self.content else {}
 
-    def _key(self, key: str, kind: type = Mapping, kind_name: str = "a mapping") -> Any:
+    def _key(self, key: str, kind: Any = Mapping, kind_name: str = "a mapping") -> Any:
         """Return the value of a key. Raises `UserError` if it is missing or of another kind."""
         if key not in self.content:
             raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")

@@ -8,7 +8,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, is_outdated, size_and_time, unreadable
-from lightfield.dataset import scene_yaml, shard_files
+from lightfield.dataset import blend, scene_yaml, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.view_store import ViewStore
 
@@ -64,16 +64,19 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
     return False
 
 
-def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
+def inventory_outdated(dataset: Dataset, store: ViewStore | None) -> bool:
     """Return whether a file that the user's .blend reads differs from its inventory.
 
-    With a view store, also return True if the store has lost such a file.
+    Also return True if a view store has lost such a file, or if an earlier version wrote the
+    inventory without the exposure of blurred views.
     """
     if not dataset.source.blend:
         return False
     home = Path(dataset.source.blend).parent
 
     def differs(inventory: Mapping[str, Any]) -> bool:
+        if blend.lacks_exposure(inventory["blend"], dataset.render):
+            return True
         for file in inventory["external_files"]:
             if _has_changed(home, file):
                 return True

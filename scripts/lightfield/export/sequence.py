@@ -64,7 +64,7 @@ class SourceSequence:
                 raise UserError(
                     f"{lightfield.path}: has another lens or other views than the first"
                 )
-        numbers = [frame.lightfield.frame for frame in frames]
+        numbers = [int(frame.lightfield.frame) for frame in frames]
         return cls(rig, frames, numbers)
 
     @property

@@ -8,14 +8,14 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
-from lightfield.rendering import motion_blur
+from lightfield.rendering import frames, motion_blur
 from lightfield.rendering.cycles import view_layer
 
 
-def facts(frames: Iterable[int | None]) -> dict[str, Any]:
-    """Return the open .blend's render settings, and its camera at ``frames``.
+def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
+    """Return the open .blend's render settings, and its camera at some frames.
 
-    None stands for the frame that the file was saved at. Without ``frames``, no view is the
+    None stands for the frame that the file was saved at. Without ``camera_frames``, no view is the
     camera's. Raises `UserError` if the camera does not have the same lens at all frames, or if a
     view cannot have its pose.
     """
@@ -24,11 +24,11 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     render = scene.render
     cycles = scene.cycles
     view = scene.view_settings
-    frame = scene.frame_current
+    frame = frames.current()
     nodes = scene.compositing_node_group
-    views = [frame if number is None else number for number in frames]
+    views = [frame if each is None else each for each in camera_frames]
     camera = _camera(views or [frame], is_taken=bool(views))
-    scene.frame_set(frame)
+    frames.go_to(frame)
     return {
         "scenes": [other.name for other in bpy.data.scenes],
         "scene": scene.name,
@@ -39,6 +39,7 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "adaptive_sampling": bool(cycles.use_adaptive_sampling),
         "denoising": bool(cycles.use_denoising and layer.cycles.use_denoising),
         "motion_blur": motion_blur.is_on(),
+        **_exposure(scene),
         "compositor": bool(render.use_compositing and nodes and nodes.nodes),
         "sequencer": bool(
             render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips
@@ -64,6 +65,19 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     }
 
 
+def _exposure(scene: Any) -> dict[str, Any]:
+    """Return what decides when the shutter is open: on which frames, and how long."""
+    render = scene.render
+    heights = {point.location.y for point in render.motion_blur_shutter_curve.curves[0].points}
+    return {
+        "remapped": [render.frame_map_old, render.frame_map_new],
+        "shutter": round(render.motion_blur_shutter, 6),
+        "shutter_position": render.motion_blur_position,
+        "shutter_curve": len(heights) > 1,
+        "rolling_shutter": scene.cycles.rolling_shutter_type != "NONE",
+    }
+
+
 def _samples(cycles: Any, layer: Any) -> int:
     """Return the samples per pixel. A view layer may set another number, or an upper bound."""
     layer_samples = int(layer.samples)
@@ -77,7 +91,7 @@ def _samples(cycles: Any, layer: Any) -> int:
     )
 
 
-def _camera(frames: list[int], is_taken: bool) -> dict[str, Any] | None:
+def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None:
     """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
 
     Return None if the scene has no camera. A marker may change the camera with the frame.
@@ -88,8 +102,8 @@ def _camera(frames: list[int], is_taken: bool) -> dict[str, Any] | None:
     matrices = {}
     names = []
     clips = []
-    for frame in sorted(set(frames)):
-        scene.frame_set(frame)
+    for frame in sorted(set(camera_frames)):
+        frames.go_to(frame)
         # Blender lets any object be the camera. Only a camera has a lens.
         if scene.camera is None or scene.camera.type != "CAMERA":
             return None
@@ -105,13 +119,13 @@ def _camera(frames: list[int], is_taken: bool) -> dict[str, Any] | None:
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has a different lens at frame {frame} than at frame "
-                f"{min(frames)}, and all views of a dataset share one lens; choose frames with "
-                "the same lens"
+                f"{min(camera_frames)}, and all views of a dataset share one lens; choose frames "
+                "with the same lens"
             )
     return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": matrices}
 
 
-def _check_pose(name: str, frame: int, matrix: Floats) -> None:
+def _check_pose(name: str, frame: float, matrix: Floats) -> None:
     """Raise `UserError` if no view can have the matrix (4, 4) of the camera ``name`` as its pose.
 
     Cycles mirrors or shears the picture of such a camera, and a pose is a rotation.

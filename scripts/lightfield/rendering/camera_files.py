@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from lightfield.core.errors import UserError
@@ -11,8 +10,7 @@ from lightfield.core.files import write_json
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.job_settings import FreePlacesSettings
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_source import FILE
-from lightfield.rendering import blend_file, clearance, drawings
+from lightfield.rendering import blend_file, clearance, drawings, frames
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings
 
@@ -24,8 +22,8 @@ def write_places(
     rig = settings.rig
     contents = read_inventory(inventory, "external_files") if inventory else None
     blend_file.open_scene(blend, settings.model_dump(), contents)
-    if settings.frame != FILE:
-        bpy.context.scene.frame_set(settings.frame)
+    if isinstance(settings.frame, int):
+        frames.go_to(settings.frame)
     clearance.show_what_is_rendered()
     places = clearance.free_places(rig)
     write_json(output, {"box": rig.box, "places": places.tolist()})
@@ -42,7 +40,7 @@ def write_clearance(blend: Path, path: Path, inventory: Path | None, output: Pat
     positions = np.array([view.position for view in lightfield.views])
     contents = read_inventory(inventory, "external_files") if inventory else None
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), contents)
-    bpy.context.scene.frame_set(lightfield.frame)
+    frames.go_to(lightfield.frame)
     clearance.show_what_is_rendered()
     distances, box = clearance.surroundings(positions)
     enclosures = clearance.enclosures(positions, box)

@@ -16,6 +16,7 @@ from lightfield.rendering import (
     animation,
     blend_file,
     drawings,
+    frames,
     ids,
     instances,
     light_groups,
@@ -72,7 +73,7 @@ def set_up(
         ids.assign(kind)
     scene = bpy.context.scene
     # A marker may choose the artist's camera at this frame. Remove all markers' cameras afterwards.
-    scene.frame_set(lightfield.frame)
+    frames.go_to(lightfield.frame)
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
         marker.camera = None
@@ -125,6 +126,7 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles.use_distance_cull = False
     if "filter_width" in settings:
         cycles.filter_width = settings["filter_width"]
+    motion_blur.centre()
     if "motion_blur" in settings:
         motion_blur.turn(settings["motion_blur"])
 

@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import animation, cycles, motion_blur, pruning
+from lightfield.rendering import animation, cycles, frames, motion_blur, pruning
 from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
@@ -40,10 +40,10 @@ IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
 MOST_FRAMES = 8
 
 
-def inventory(frames: Sequence[int]) -> dict[str, Any]:
+def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
     """Return what the open scene contains at any frame. Removes all else from the open file.
 
-    Objects and triangles are counted at the rendered ``frames``.
+    Objects and triangles are counted at the ``rendered_frames``.
     """
     scene = bpy.context.scene
     hidden = pruning.removable_objects()
@@ -80,8 +80,8 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         features["hair"].add("objects")
     features["volumes"] |= {obj.name_full for obj in objects if obj.type == "VOLUME"}
     return {
-        "frames": list(frames),
-        **_fullest(frames),
+        "frames": list(rendered_frames),
+        **_fullest(rendered_frames),
         "lights": sorted(light.name_full for light in lights),
         **{name: sorted(features[name]) for name in FEATURES},
         "sampling": cycles.sampling(),
@@ -94,15 +94,16 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _fullest(frames: Sequence[int]) -> dict[str, int]:
+def _fullest(rendered_frames: Sequence[float]) -> dict[str, Any]:
     """Return the frame with most triangles as ``fullest_frame``, and its counts.
 
     Evaluates at most `MOST_FRAMES` frames, because each takes time.
     """
     counts = []
-    for place in np.linspace(0, len(frames) - 1, min(len(frames), MOST_FRAMES)):
-        frame = frames[round(place)]
-        bpy.context.scene.frame_set(frame)
+    last = len(rendered_frames) - 1
+    for place in np.linspace(0, last, min(last + 1, MOST_FRAMES)):
+        frame = rendered_frames[round(place)]
+        frames.go_to(frame)
         counts.append({"fullest_frame": frame, **in_render(_triangles)})
     return max(counts, key=lambda count: count["triangles"])
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import bpy
-
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, scene_yaml
@@ -20,6 +18,7 @@ from lightfield.rendering import (
     blend_facts,
     blend_file,
     external_files,
+    frames,
     light,
     motion_blur,
     pruning,
@@ -53,9 +52,10 @@ def write_of_datasets(
     """
     chosen = written.scene.model_dump() if written else {}
     layers = blend_file.open_scene(path, chosen)
-    saved_frame = bpy.context.scene.frame_current
-    chosen_frames = rendered_frames(datasets) or [saved_frame]
-    frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
+    saved_frame = frames.current()
+    chosen_frames = rendered_frames(datasets)
+    shown_frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
+    shown_frames = shown_frames or [saved_frame]
     contents: dict[str, Any] = {}
     if chosen.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
@@ -66,7 +66,7 @@ def write_of_datasets(
     if written and written.render and written.render.motion_blur is not None:
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
-    contents |= inventory(frames)
+    contents |= inventory(shown_frames)
     if contents["missing"] and not chosen.get("allow_missing"):
         raise UserError(_refusal(path, contents["missing"]))
     if not light.may_be_lit():
@@ -80,7 +80,7 @@ def write_of_datasets(
         resolved(written.render.light_groups, contents["emitters"])
     if store := ViewStore.configured():
         external_files.put(path, contents["external_files"], store)
-    warnings = list(simulations.warnings(frames))
+    warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
     # Close the scene, because the measurement opens it again.
@@ -105,7 +105,7 @@ def _print_notes(
 ) -> None:
     """Print what a user's .blend says, and what the ``datasets`` take from it."""
     resolved = [dataset.resolved(inventory_file) for dataset in datasets]
-    shown = sorted({int(dataset.source.frame) for dataset in resolved})
+    shown = sorted({dataset.frame for dataset in resolved})
     own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
     notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera)
     print(f"note: {path}: {' · '.join(notes)}")

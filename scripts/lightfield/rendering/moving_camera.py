@@ -8,7 +8,7 @@ import mathutils
 import numpy as np
 
 from lightfield.geometry.exposure import pose_at
-from lightfield.rendering import motion_blur
+from lightfield.rendering import frames, motion_blur
 
 Array = np.ndarray[Any, Any]
 
@@ -30,7 +30,6 @@ def set_up(motion: Mapping[str, Any] | None) -> None:
         for obj in bpy.data.objects:
             obj.cycles.use_motion_blur = obj == scene.camera
     motion_blur.turn(True)
-    scene.render.motion_blur_position = "CENTER"
     if "rolling" in motion:
         scene.cycles.rolling_shutter_type = "TOP"
         scene.cycles.rolling_shutter_duration = motion["rolling"]
@@ -49,6 +48,9 @@ def place_camera(world_matrix: Array) -> None:
         return
     middle = np.asarray(world_matrix, np.float64)
     travel, turn = _motion["travel"], _motion["turn"]
+    render = scene.render
+    # Blender remaps frames before it reads keys.
+    shutter = render.motion_blur_shutter * render.frame_map_old / render.frame_map_new
     # The keys have the same frames for each view, so they replace those of the view before.
     for time in (-0.5, 0.0, 0.5):
         pose = mathutils.Matrix(pose_at(middle, travel, turn, time).tolist())
@@ -57,7 +59,7 @@ def place_camera(world_matrix: Array) -> None:
             rotation.make_compatible(camera.rotation_quaternion)
         camera.location = pose.translation
         camera.rotation_quaternion = rotation
-        frame = scene.frame_current + time * scene.render.motion_blur_shutter
+        frame = scene.frame_current_final + time * shutter
         camera.keyframe_insert("location", frame=frame)
         camera.keyframe_insert("rotation_quaternion", frame=frame)
-    scene.frame_set(scene.frame_current)
+    frames.go_to(frames.current())

@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from lightfield.rendering import animation
+from lightfield.rendering import animation, frames
 from lightfield.rendering.render_graph import in_render
 
 
@@ -32,17 +32,17 @@ def _is_fluid_baked(settings: Any) -> bool:
     return bool(settings.has_cache_baked_data)
 
 
-def warnings(frames: Sequence[int]) -> Iterator[str]:
+def warnings(rendered_frames: Sequence[float]) -> Iterator[str]:
     """Yield a line if rendered objects of the open scene have unbaked simulations.
 
-    Blender goes to each of the ``frames`` directly. A simulation has no past there: its object
-    stays in place, or falls in one step. A simulation's first frame is right.
+    Blender goes to each of the ``rendered_frames`` directly. A simulation has no past there: its
+    object stays in place, or falls in one step. A simulation's first frame is right.
     """
-    last = max(frames)
+    last = max(rendered_frames)
     unbaked = {str(obj.name_full): kind for obj, kind, first in _unbaked(last) if last > first}
     if not unbaked:
         return
-    bpy.context.scene.frame_set(last)
+    frames.go_to(last)
     shown = sorted(in_render(_rendered_objects) & unbaked.keys())
     if not shown:
         return
@@ -54,7 +54,7 @@ def warnings(frames: Sequence[int]) -> Iterator[str]:
     )
 
 
-def _unbaked(frame: int) -> Iterator[tuple[Any, str, int]]:
+def _unbaked(frame: float) -> Iterator[tuple[Any, str, int]]:
     """Yield each object with an unbaked simulation, the simulation's kind, and its first frame."""
     world = bpy.context.scene.rigidbody_world
     if world and world.enabled and world.collection and not world.point_cache.is_baked:
@@ -113,7 +113,7 @@ def _is_simulation(node: Any) -> bool:
     return node is not None and node.bl_idname == "GeometryNodeSimulationOutput"
 
 
-def _depends_on_history(obj: Any, first: int, frame: int) -> bool:
+def _depends_on_history(obj: Any, first: int, frame: float) -> bool:
     """Return whether an object's extent at a frame depends on the frames before.
 
     Blender does not tell whether geometry nodes are baked. Baked nodes have one result per frame.
@@ -121,7 +121,7 @@ def _depends_on_history(obj: Any, first: int, frame: int) -> bool:
     extents = []
     for history in ((first, frame), (first, frame - 1, frame)):
         for step in history:
-            bpy.context.scene.frame_set(step)
+            frames.go_to(step)
         extents.append(in_render(lambda depsgraph: _extents(depsgraph, obj.name_full)))
     return extents[0] != extents[1]
 

@@ -1,5 +1,6 @@
 """The .blend's own camera: its pose at each of some frames of the animation."""
 
+import math
 from pathlib import Path
 from typing import Literal, Self
 
@@ -31,7 +32,8 @@ class BlendCamera(Rig):
         "with the camera's pose at scene.frame.",
     )
     file: SkipJsonSchema[str | None] = None
-    rendered: SkipJsonSchema[int | None] = None
+    # Pydantic keeps a whole number whole.
+    rendered: SkipJsonSchema[int | float | None] = None
     max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
     @property
@@ -40,7 +42,7 @@ class BlendCamera(Rig):
         return
 
     @property
-    def path(self) -> list[int | None]:
+    def path(self) -> list[float | None]:
         """The frame of each view; None is the .blend's own."""
         if self.frames is None:
             return [self.rendered]
@@ -52,7 +54,7 @@ class BlendCamera(Rig):
     def positions(self) -> int:
         return len(self.path)
 
-    def placed(self, file: Path | str, rendered: int | None) -> Self:
+    def placed(self, file: Path | str, rendered: float | None) -> Self:
         """Return the rig with its cameras where a .blend's inventory has them."""
         return self.model_copy(update={"file": str(file), "rendered": rendered})
 
@@ -71,7 +73,7 @@ class BlendCamera(Rig):
                 if str(frame) not in matrix_at_frame:
                     raise UserError(f"{self.file}: blend: has no camera at frame {frame}")
             matrices: Floats = np.array([matrix_at_frame[str(frame)] for frame in frames])
-            names = [f"view_{frame:04d}f" for frame in frames]
+            names = [f"view_{math.floor(frame):04d}f" for frame in frames]
             rotations = matrix_to_euler(matrices[:, :3, :3])
             return UnitPoses(names, np.arange(len(names)), matrices[:, :3, 3], rotations)
 
