@@ -226,8 +226,84 @@ def _transforms(folder, applied=None):
     return "transforms.json"
 
 
+TURNED = [[0, 1, 0, 2], [-1, 0, 0, 0], [0, 0, 1, -1]]
+ENLARGED = [[0, 3, 0, 2], [-3, 0, 0, 0], [0, 0, 3, -1]]
+MIRRORED = [[0, 1, 0, 2], [1, 0, 0, 0], [0, 0, 1, -1]]
+
+
+STRETCHED = [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]]
+
+
 def _applied(folder):
-    return _transforms(folder, [[0, 1, 0, 2], [-1, 0, 0, 0], [0, 0, 1, -1]])
+    return _transforms(folder, TURNED)
+
+
+def _changed(folder, applied=None, change=None, **keys):
+    """Write a transforms.json, ``change`` each of its matrices, and add ``keys``."""
+    file = folder / _transforms(folder, applied)
+    content = json.loads(file.read_text())
+    for frame in content["frames"]:
+        matrix = np.array(frame["transform_matrix"])
+        if change:
+            change(matrix)
+        frame["transform_matrix"] = matrix.tolist()
+    file.write_text(json.dumps(content | keys))
+    return file.name
+
+
+def _scaled(folder):
+    """nerfstudio scales what its applied_transform has made, and only places."""
+
+    def scale(matrix):
+        matrix[:3, 3] *= 0.25
+
+    return _changed(folder, TURNED, scale, applied_scale=0.25)
+
+
+def _enlarged_with_axes(folder):
+    """An applied_transform may scale whole matrices, as nerfstudio's programs apply it."""
+    return _changed(folder, ENLARGED)
+
+
+def _enlarged(folder):
+    """It may also scale only the places."""
+
+    def normalise(matrix):
+        matrix[:3, :3] /= 3
+
+    return _changed(folder, ENLARGED, normalise)
+
+
+def _mirrored(folder):
+    return _changed(folder, MIRRORED)
+
+
+def _opencv(folder):
+    """MapAnything's cameras look along z, with y down."""
+
+    def turn(matrix):
+        matrix[:3, 1:3] *= -1
+
+    return _changed(folder, None, turn, camera_convention="opencv")
+
+
+def _with_keys_that_place_no_camera(folder):
+    """These say how pictures are shown, where instant-ngp trains, and how nerfstudio centres."""
+    return _changed(
+        folder,
+        scale=0.1,
+        offset=[0.5, 0.5, 0.2],
+        aabb_scale=16,
+        aabb=[[0, 0, 0], [1, 1, 1]],
+        up=[0, 1, 0],
+        n_frames=2,
+        orientation_override="none",
+        from_mitsuba=False,
+        camera_model="OPENCV",
+        k1=0.1,
+        integer_depth_scale=0.001,
+        ply_file_path="points.ply",
+    )
 
 
 def _images():
@@ -264,12 +340,63 @@ def _colmap_binary(folder):
 
 @pytest.mark.parametrize(
     "write",
-    [_csv, _transforms, _applied, _colmap_text, _colmap_text_without_points, _colmap_binary],
+    [
+        _csv,
+        _transforms,
+        _applied,
+        _scaled,
+        _enlarged,
+        _enlarged_with_axes,
+        _mirrored,
+        _opencv,
+        _with_keys_that_place_no_camera,
+        _colmap_text,
+        _colmap_text_without_points,
+        _colmap_binary,
+    ],
 )
 def test_poses_of_each_format_are_read(write, tmp_path):
     rig = from_settings({"type": "poses", "file": str(tmp_path / write(tmp_path))})
     assert [pose.name for pose in rig.poses()] == ["v0", "v1", "v2"]
     np.testing.assert_allclose(matrices(rig), POSES, atol=3e-6)
+
+
+def _rotations(matrix):
+    """Make the first 3 × 3 of a matrix a rotation, as programs do that know only rotations."""
+    matrix[:3, :3] = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("applied", "change", "keys", "expected"),
+    [
+        (STRETCHED, _rotations, {}, "applied_transform: its first 3 × 3 must be a rotation"),
+        (MIRRORED, _rotations, {}, "applied_transform: its first 3 × 3 must be a rotation"),
+        (np.zeros((3, 4)).tolist(), None, {}, "applied_transform: cannot be inverted"),
+        (None, None, {"applied_scale": 0}, "applied_scale: is 0; must be above 0"),
+        (None, None, {"applied_scale": [2]}, "applied_scale: must be a finite number"),
+        (None, None, {"applied_scale": 1e-300}, r"frames\[0\]: position: must be within"),
+        (None, None, {"from_mitsuba": True}, "from_mitsuba: has other axes"),
+        (None, None, {"camera_convention": ["opencv"]}, "camera_convention: is .*; must be opengl"),
+        (None, None, {"camera_convention": "blender"}, "camera_convention: is 'blender'; must be"),
+    ],
+)
+def test_what_was_done_to_poses_is_named_if_it_cannot_be_undone(
+    applied, change, keys, expected, tmp_path
+):
+    file = tmp_path / _changed(tmp_path, applied, change, **keys)
+    with pytest.raises(UserError, match=rf"transforms\.json: {expected}") as error:
+        from_settings({"type": "poses", "file": str(file)}).poses()
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("more", [{}, {"transform_matrix": np.eye(4).tolist()}])
+def test_a_camera_that_moves_while_it_exposes_is_refused(more, tmp_path):
+    start = np.eye(4).tolist()
+    frame = {"file_path": "a.png", "transform_matrix_start": start, "transform_matrix_end": start}
+    file = tmp_path / "transforms.json"
+    file.write_text(json.dumps({"frames": [frame | more]}))
+    with pytest.raises(UserError, match=r"frames\[0\]: transform_matrix_start: is of a camera"):
+        from_settings({"type": "poses", "file": str(file)}).poses()
 
 
 def test_colmaps_pose_puts_a_point_before_the_camera_that_sees_it():

@@ -47,6 +47,8 @@ from lightfield.geometry.rotations import (
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
+# The axes of a camera in ours, by the camera_convention of a transforms.json.
+CAMERA_AXES = {"opengl": np.eye(4), "opencv": np.diag([1.0, -1.0, -1.0, 1.0])}
 # In bytes. It is enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
 
@@ -238,7 +240,8 @@ def _read_json(path: Path) -> Listing:
     frames = content.get("frames") if isinstance(content, dict) else None
     try:
         check_list(frames)
-        if frames and isinstance(frames[0], dict) and "transform_matrix" in frames[0]:
+        first = frames[0] if frames and isinstance(frames[0], dict) else {}
+        if "transform_matrix" in first or "transform_matrix_start" in first:
             return Listing(Poses.shape, "transform_matrix", _transforms_frames(content))
         lf_type = content.get("lf_type", Poses.shape)
         if lf_type not in LF_TYPES:
@@ -249,27 +252,73 @@ def _read_json(path: Path) -> Listing:
 
 
 def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
-    """Return the poses of a transforms.json, whose axes are ours.
+    """Return the poses of a transforms.json, whose axes are ours unless it says otherwise.
 
-    Undoes nerfstudio's applied_transform. Source: nerfstudio's data conventions; instant-ngp's
-    nerf_dataset_tips.md.
+    Undoes nerfstudio's applied_transform and applied_scale. Source: nerfstudio's
+    nerfstudio_dataparser.py and base_dataparser.py; instant-ngp's nerf_loader.cu; MapAnything's
+    data_processing/README.md.
     """
-    undo = np.eye(4)
+    if content.get("from_mitsuba"):
+        raise UserError("from_mitsuba: has other axes; write the poses without it")
+    convention = content.get("camera_convention", "opengl")
+    if not isinstance(convention, str) or convention not in CAMERA_AXES:
+        allowed = " or ".join(CAMERA_AXES)
+        raise UserError(f"camera_convention: is {convention!r}; must be {allowed}")
+    applied = np.eye(4)
     if "applied_transform" in content:
         key = "applied_transform"
-        applied = np.eye(4)
         applied[:3] = read_numbers(key, content[key], (3, 4))
         if abs(np.linalg.det(applied)) < 1e-12:
             raise UserError(f"{key}: cannot be inverted")
-        undo = np.linalg.inv(applied)
-    frames = []
+    scale = 1.0
+    if "applied_scale" in content:
+        scale = float(read_numbers("applied_scale", content["applied_scale"], ()))
+        if scale <= 0:
+            raise UserError(f"applied_scale: is {scale:g}; must be above 0")
+    names = []
+    matrices = []
     for index, frame in enumerate(content["frames"]):
         where = f"frames[{index}]"
         check_mapping(where, frame)
+        if "transform_matrix_start" in frame:
+            raise UserError(
+                f"{where}: transform_matrix_start: is of a camera that moves; give each frame one "
+                "transform_matrix"
+            )
         key = "transform_matrix"
-        matrix = undo @ read_numbers(f"{where}: {key}", frame.get(key), (4, 4))
-        frames.append(Frame(where, _view_name(where, frame.get("file_path")), matrix))
-    return frames
+        matrices.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))
+        names.append(_view_name(where, frame.get("file_path")))
+    originals = _unapplied(np.array(matrices) @ CAMERA_AXES[convention], applied, scale)
+    return [
+        Frame(f"frames[{index}]", name, matrix)
+        for index, (name, matrix) in enumerate(zip(names, originals, strict=True))
+    ]
+
+
+def _unapplied(matrices: Floats, applied: Floats, scale: float) -> Floats:
+    """Return camera-to-world matrices (n, 4, 4) before a transform and then a scale were applied.
+
+    The scale changed only the positions. A transform (4, 4) that scales, too, changed either the
+    positions alone, or the whole matrices. Raises `UserError` if no rotation can have been before.
+    """
+    unscaled = matrices.copy()
+    with np.errstate(over="ignore"):
+        unscaled[:, :3, 3] /= scale
+        originals: Floats = np.linalg.inv(applied) @ unscaled
+    are_rotations = _are_rotations(matrices)
+    originals[are_rotations, :3, :3] *= abs(np.linalg.det(applied)) ** (1 / 3)
+    if (are_rotations & ~_are_rotations(originals)).any():
+        raise UserError(
+            "applied_transform: its first 3 × 3 must be a rotation, or one with a scale that is "
+            "the same along each axis"
+        )
+    return originals
+
+
+def _are_rotations(matrices: Floats) -> NDArray[np.bool_]:
+    """Return which matrices (n, 4, 4) neither scale nor shear nor mirror."""
+    turns = matrices[:, :3, :3]
+    return ~is_skewed(turns) & ~is_mirrored(turns)
 
 
 def _read_colmap(path: Path) -> Listing:
