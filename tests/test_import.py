@@ -187,6 +187,50 @@ def test_views_with_data_windows_are_reprojected_as_viewers_show_them(
             np.testing.assert_array_equal(shown[name][channel], plane, err_msg=name)
 
 
+def change(lightfield, frame_keys, **keys):
+    """Add keys to a lightfield.json, and to its frames, one after the other."""
+    content = json.loads(lightfield.read_text())
+    for frame, more in zip(content["frames"], frame_keys, strict=True):
+        frame.update(more)
+    lightfield.write_text(json.dumps(content | keys))
+
+
+def test_each_key_of_a_lightfield_json_is_used_or_named(published, tmp_path, run_program):
+    parts = ["train", "test", "validation", "train"]
+    exposure = {"start": np.eye(4).tolist(), "end": np.eye(4).tolist()}
+    change(
+        published / "lightfield.json",
+        [{"split": part, "exposure": exposure} for part in parts],
+        render={"transparent": True, "samples": 4, "depth": "auto"},
+        frame=7,
+        gamma=2,
+    )
+    output = tmp_path / "lightfield.json"
+    arguments = ["--scene", "theirs", "--rig", "LFPlane", "--output", output]
+    said = run_program("make_lightfield.py", *arguments, cwd=tmp_path)
+    named = "lightfield.json: is imported without frame, gamma, render, frames.exposure\n"
+    assert said.stdout.startswith("note: ") and said.stdout.endswith(named)
+    content = json.loads(output.read_text())
+    assert [frame["split"] for frame in content["frames"]] == parts
+    assert content["render"]["transparent"] is True
+    assert content["depth"] == "z"
+
+
+def test_imported_views_of_one_part_need_no_rig_of_another(published, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    change(published / "lightfield.json", [{"split": "test"}] * 4)
+    (dataset,) = scene_datasets("theirs")
+    assert {pose.split for pose in dataset.rig.poses()} == {None}
+
+
+def test_views_without_a_centre_are_not_imported(published, tmp_path, monkeypatch):
+    """Reprojections and exports of them would be wrong."""
+    monkeypatch.chdir(tmp_path)
+    change(published / "lightfield.json", [{}] * 4, omnidirectional_stereo=0.064)
+    with pytest.raises(UserError, match=r"omnidirectional_stereo: its views have no centre"):
+        scene_datasets("theirs")
+
+
 @pytest.mark.parametrize(("side", "fewest", "most"), [(64, 1, 1), (2048, 4, 20)])
 def test_a_shard_takes_over_enough_views_to_be_worth_a_start(
     published, tmp_path, monkeypatch, side, fewest, most

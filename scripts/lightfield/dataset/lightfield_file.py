@@ -6,7 +6,7 @@ from typing import Any
 
 from lightfield.core import machine
 from lightfield.core.errors import UserError
-from lightfield.dataset import light_groups, passes
+from lightfield.dataset import light_groups, passes, published
 from lightfield.dataset.capture import LightfieldSettings, panorama_rig
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import MACHINE, LightField
@@ -45,7 +45,11 @@ def from_settings(
         capture = replace(capture, rig=capture.rig.placed(places))
     keys = capture.origin(render)
     # Imported views were rendered on another machine.
-    if not capture.imported:
+    if capture.imported:
+        assert isinstance(capture.rig, rigs.Poses)
+        if unused_keys := published.unused_keys(capture.rig):
+            print(f"note: {capture.rig.file}: is imported without {', '.join(unused_keys)}")
+    else:
         keys[MACHINE] = machine.describe(render["denoise"])
     lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
     if settings.flow:

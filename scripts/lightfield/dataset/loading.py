@@ -284,11 +284,11 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
 
     With a ``target_error``, the calibration will choose samples, threshold and denoising. The
     preset limits its choice by ``most_samples`` and ``denoise``. For views that exist already, only
-    the meaning of their depth is known.
+    the meaning of their depth and alpha is known.
     """
     if render is None:
         assert isinstance(rig, Poses)
-        return {"depth": published.depth(rig)}
+        return published.render(rig)
     content = render.model_dump(exclude_none=True)
     if render.samples is None:
         # The calibration chooses these.

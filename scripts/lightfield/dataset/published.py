@@ -4,12 +4,19 @@ Each is a folder that has its rig's name. It has lightfield.json, and the views 
 Z as half floats, Z along the optical axis in metres. Source: the SILVR paper, section 3.2.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.rigs import Poses
+
+# What an import uses of a lightfield.json, beside the poses.
+_USED_KEYS = {"camera", "lf_type", "resolution", "sensor_size", "depth"}
+_USED_KEYS_OF_RENDER = {"transparent", "depth"}
+_USED_KEYS_OF_FRAMES = {"split"}
 
 
 def lightfields(dataset: str) -> dict[str, Path]:
@@ -28,18 +35,48 @@ def lightfields(dataset: str) -> dict[str, Path]:
 
 
 def rigs(dataset: str) -> dict[str, Poses]:
-    """Return the rigs of a folder of light fields by their names. Raises `UserError`."""
+    """Return the rigs of a folder of light fields by their names.
+
+    Raises `UserError` for a file that cannot be read, and for views without a centre.
+    """
     rigs = {}
     for name, path in lightfields(dataset).items():
-        camera = LightField.read(path).lens.settings()
-        settings = {"type": "poses", "file": str(path.resolve()), "camera": camera}
+        lightfield = LightField.read(path)
+        lightfield.require_centre()
+        settings = {
+            "type": "poses",
+            "file": str(path.resolve()),
+            "camera": lightfield.lens.settings(),
+            **_split(lightfield.views),
+        }
         rigs[name] = Poses.model_validate(settings)
     return rigs
 
 
-def depth(rig: Poses) -> str:
-    """Return what channel Z of a rig's views holds: "z", "distance" or "none"."""
-    return LightField.read(rig.file).depth or "none"
+def _split(views: Sequence[View]) -> dict[str, Any]:
+    """Return the key ``split`` of a rig with these views. Empty if all are for one part."""
+    names = {
+        part: [view.name for view in views if view.split == part] for part in ("validation", "test")
+    }
+    is_split = 0 < sum(map(len, names.values())) < len(views)
+    return {"split": names} if is_split else {}
+
+
+def render(rig: Poses) -> dict[str, Any]:
+    """Return the ``render`` block of a rig's views: the meaning of their channels Z and A."""
+    lightfield = LightField.read(rig.file)
+    alpha = {"transparent": True} if lightfield.transparent else {}
+    return {"depth": lightfield.depth or "none", **alpha}
+
+
+def unused_keys(rig: Poses) -> list[str]:
+    """Return the keys of a rig's lightfield.json that an import does not use."""
+    lightfield = LightField.read(rig.file)
+    keys = lightfield.content.keys() - _USED_KEYS
+    if "render" in keys and lightfield.render.keys() <= _USED_KEYS_OF_RENDER:
+        keys.remove("render")
+    of_frames = {key for view in lightfield.views for key in view.others} - _USED_KEYS_OF_FRAMES
+    return sorted(keys) + [f"frames.{key}" for key in sorted(of_frames)]
 
 
 def fingerprint(dataset: str) -> list[list[str]]:
