@@ -47,9 +47,10 @@ def main() -> None:
         # The numbers follow from the objects that a render keeps.
         hidden = inventory["hidden"] if inventory else pruning.removable_objects()
         pruning.remove_objects(hidden)
-        ids.assign("object")
     if settings.frame != FILE:
         bpy.context.scene.frame_set(settings.frame)
+    if settings.numbered:
+        ids.assign(["object"])
     frame = bpy.context.scene.frame_current
     surface = visible_surface(settings.numbered)
     files = export.replace_folder(

@@ -5,7 +5,8 @@ file that maps names to [scene, content of a lightfield.json]. FOLDER/views.npz 
 first view:
 
 - "<name>.z" as in the dataset, and "<name>.normal" in world space;
-- "<name>.objects" and "<name>.materials";
+- "<name>.objects" and "<name>.materials", their places in "<name>.object_names" and
+  "<name>.material_names", from 1;
 - "<name>.colour" rendered after these, and "<name>.alone", the same without geometry before it.
 """
 
@@ -18,7 +19,7 @@ import bpy
 import numpy as np
 
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file, cycles, shard
+from lightfield.rendering import blend_file, cycles, ids, shard
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 
@@ -183,6 +184,8 @@ def main(folder: Path, cases: Path) -> None:
         results[f"{name}.normal"] = geometry.normal
         results[f"{name}.objects"] = geometry.objects
         results[f"{name}.materials"] = geometry.materials
+        for kind in ("object", "material"):
+            results[f"{name}.{kind}_names"] = np.array(list(ids.names(kind)))
         results[f"{name}.colour"] = colour.pixels
     np.savez(folder / "views.npz", **results)
 

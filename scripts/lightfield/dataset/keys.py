@@ -31,6 +31,8 @@ SURFACES_VERSION = 2
 PART_VERSION = 1
 # The same for the views of a user's .blend.
 BLEND_VERSION = 1
+# The same for those of them with a pass of numbers, which once replaced what shaders read.
+NUMBERS_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
 MODEL_VERSION = 2
 # The same for models in softboxes.
@@ -100,6 +102,8 @@ def render_key(lightfield: LightField, view: View) -> str:
         key.append(["part", PART_VERSION])
     if _is_of_blend(lightfield):
         key.append(["blend", BLEND_VERSION])
+        if any(view_pass.kind == "id" for view_pass in lightfield.passes):
+            key.append(["numbers", NUMBERS_VERSION])
     return _digest(key)
 
 

@@ -111,6 +111,14 @@ def mute(block: Any, prefixes: tuple[str, ...]) -> None:
             curve.mute = True
 
 
+def driver_targets(block: Any) -> Iterator[Any]:
+    """Yield what the drivers of a data-block read."""
+    data = getattr(block, "animation_data", None)
+    for curve in data.drivers if data else ():
+        for variable in curve.driver.variables:
+            yield from variable.targets
+
+
 def uses_visibility() -> list[str]:
     """Return the names of the data-blocks that depend on which objects the viewport shows.
 
@@ -181,12 +189,9 @@ def _all_strips(strips: Iterable[Any]) -> Iterator[Any]:
 
 def _driver_inputs(block: Any) -> Iterator[tuple[Any, str]]:
     """Yield the inputs of a data-block's drivers: where a path begins, and the path."""
-    data = getattr(block, "animation_data", None)
-    for curve in data.drivers if data else ():
-        for variable in curve.driver.variables:
-            for target in variable.targets:
-                # A target without a block reads the current scene.
-                yield target.id or bpy.context.scene, str(target.data_path)
+    for target in driver_targets(block):
+        # A target without a block reads the current scene.
+        yield target.id or bpy.context.scene, str(target.data_path)
 
 
 def _objects_on(start: Any, path: str) -> Iterator[Any]:

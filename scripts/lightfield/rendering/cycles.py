@@ -69,11 +69,10 @@ def set_up(
     elif numbered and not inventory:
         # Remove the same objects as with an inventory, so that the numbers are the same.
         pruning.remove_objects(pruning.removable_objects())
-    for kind in {"object" if kind == "instance" else kind for kind in numbered}:
-        ids.assign(kind)
     scene = bpy.context.scene
     # A marker may choose the artist's camera at this frame. Remove all markers' cameras afterwards.
     frames.go_to(lightfield.frame)
+    ids.assign({"object" if kind == "instance" else kind for kind in numbered})
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
         marker.camera = None

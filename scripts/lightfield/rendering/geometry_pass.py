@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import instances, volumes
+from lightfield.rendering import ids, instances, volumes
 from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
 from lightfield.rendering.render_graph import changed
 from lightfield.rendering.view import Array, render_view
@@ -45,7 +45,8 @@ class Geometry:
     - ``depth`` (height, width): float32 in metres, inf for a miss. Z-depth for a perspective
       camera, distance for any other.
     - ``normal`` (height, width, 3): float32, the shading normal in world space, towards the camera.
-    - ``objects``, ``materials`` (height, width): uint16, their pass indices.
+    - ``objects``, ``materials`` (height, width): uint16, their numbers of
+      `lightfield.rendering.ids`. Only if Cycles was set up for a pass of numbers.
     - ``instances`` (height, width): uint32, the numbers of `lightfield.rendering.instances`. None
       if not requested.
     - ``motion`` (height, width, 4): float32, the offsets x, y to the surface's places in the
@@ -79,16 +80,18 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
     depth = rendered.passes["Depth"]
     # Cycles leaves NaN where the lens sees nothing.
     hit = depth < MISS
-    normal, objects, materials = (
+    normal, object_indices, material_indices = (
         np.where(hit, rendered.passes[name], np.float32(0))
         for name in ("Normal", "Object Index", "Material Index")
     )
+    objects = ids.numbers("object")[object_indices[..., 0].astype(np.uint16)]
+    materials = ids.numbers("material")[material_indices[..., 0].astype(np.uint16)]
     return Geometry(
         np.where(hit, depth, np.float32(np.inf))[..., 0],
         normal,
-        objects[..., 0].astype(np.uint16),
-        materials[..., 0].astype(np.uint16),
-        instances.decoded(rendered.passes, objects[..., 0].astype(int)) if apart else None,
+        objects,
+        materials,
+        instances.decoded(rendered.passes, objects.astype(int)) if apart else None,
         np.where(hit, rendered.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
         rendered.render_seconds,
         rendered.synchronization_seconds,

@@ -4,7 +4,7 @@ Blender gives each instance a random number. It depends only on the names and th
 that lead to the instance. So it is the same in every view, frame, process and machine. Cycles
 passes it to shaders as Object Info's Random. Here every material writes it into extra passes. As a
 float it has 24 bits: of n instances of an object, about n² / 5e7 pairs share a number. An object
-that is not an instance has its pass index as number.
+that is not an instance has its number of `lightfield.rendering.ids`.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.rendering import ids
 from lightfield.rendering.ids import has_no_surface
 from lightfield.rendering.render_graph import in_render
 
@@ -37,8 +38,8 @@ class Instances:
 
     - ``names``: the number of each by its name.
     - ``numbers`` (n,): the same numbers in order.
-    - ``objects`` (n,): the indices of their objects.
-    - ``shown_itself``: by an object's index, its number if the object itself is shown, else 0.
+    - ``objects`` (n,): the numbers of their objects.
+    - ``shown_itself``: by an object's number, that number if the object itself is shown, else 0.
     """
 
     names: dict[str, int]
@@ -93,44 +94,42 @@ def _node_group() -> Any:
 def shown() -> Instances:
     """Return what the open scene shows at its frame."""
     entries = in_render(_entries)
-    shown_itself = np.zeros(
-        max((obj.pass_index for obj in bpy.data.objects), default=0) + 1, np.uint32
-    )
-    for number, index, is_instance in entries.values():
+    shown_itself = np.zeros(len(ids.names("object")) + 1, np.uint32)
+    for number, object_number, is_instance in entries.values():
         if not is_instance:
-            shown_itself[index] = number
+            shown_itself[object_number] = number
     names = {name: number for name, (number, *_) in sorted(entries.items())}
-    pairs = sorted((number, index) for number, index, _ in entries.values())
+    pairs = sorted((number, object_number) for number, object_number, _ in entries.values())
     numbers, objects = np.array(pairs, np.int64).reshape(-1, 2).T
     return Instances(names, numbers, objects, shown_itself)
 
 
 def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
-    """Return by name the number, the object's index, and whether it is an instance."""
+    """Return by name the number, the object's number, and whether it is an instance."""
     entries = {}
     for entry in depsgraph.object_instances:
         if not has_no_surface(entry.object.original):
-            name, number, index = name_and_numbers(entry)
-            entries[name] = (number, index, bool(entry.is_instance))
+            name, number, object_number = name_and_numbers(entry)
+            entries[name] = (number, object_number, bool(entry.is_instance))
     return entries
 
 
 def name_and_numbers(entry: Any) -> tuple[str, int, int]:
-    """Return the name, the number and the object's index of an entry of a dependency graph."""
+    """Return the name, the number and the object's number of an entry of a dependency graph."""
     obj = entry.object.original
     name = str(obj.name_full)
-    index = int(obj.pass_index)
+    object_number = int(ids.numbers("object")[obj.pass_index])
     if not entry.is_instance:
-        return name, index, index
+        return name, object_number, object_number
     places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
     name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
-    return name, min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST), index
+    return name, min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST), object_number
 
 
 def decoded(passes: dict[str, Array], objects: Array) -> Array:
     """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
 
-    ``passes`` are those of `CYCLES_PASSES`. ``objects`` (height, width) are the objects' indices.
+    ``passes`` are those of `CYCLES_PASSES`. ``objects`` (height, width) are the objects' numbers.
     Surfaces without a material, and those beyond the last layer, write no number. They get the
     object's number, if the object itself is shown.
     """

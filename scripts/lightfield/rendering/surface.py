@@ -34,7 +34,7 @@ _ONLY_VOLUME = "has materials that are only volumes"
 def visible_surface(numbered: bool) -> Surface:
     """Return what cameras can see of the open scene at its frame.
 
-    ``numbered`` says whether the objects have the numbers of the id passes: see `ids.assign`.
+    ``numbered`` says whether the objects have the indices of the id passes: see `ids.assign`.
     """
     return in_render(lambda depsgraph: _Reader(numbered).read(depsgraph))
 
