@@ -56,8 +56,8 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     add(
         "--depth-dir",
         type=Path,
-        help="folder for depth maps (16-bit PNG, in millimetres), which are made from channel Z of "
-        "the .exr views",
+        help="folder for depth maps (16-bit PNG in steps of integer_depth_scale), which are made "
+        "from channel Z of the .exr views",
     )
     add(
         "--scale",

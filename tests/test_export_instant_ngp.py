@@ -15,8 +15,8 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import instant_ngp
-from lightfield.export.source import millimetres
 from lightfield.geometry import lenses
+from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images
 
 RIG: dict[str, Any] = {
@@ -357,7 +357,42 @@ def test_exr_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
 
 def test_a_depth_map_has_millimetres_and_0_without_depth() -> None:
     depth = np.array([2.0, 0.001, 0.0004, 65.535, 65.5361, np.inf, np.nan])
-    assert millimetres(depth).tolist() == [2000, 1, 0, 65535, 0, 0, 0]
+    steps, lost = in_16_bits(depth / 0.001)
+    assert steps.tolist() == [2000, 1, 0, 65535, 0, 0, 0]
+    assert lost == 2
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, WIDE, PANORAMA])
+@pytest.mark.parametrize("distance", [3.0, 64.0, 200.0, 950.0])
+def test_the_loader_finds_a_far_background_where_it_is(
+    dataset: Dataset, capsys: Any, camera: Any, distance: float
+) -> None:
+    """The loader multiplies a depth map by integer_depth_scale, and by the length of the ray."""
+    meaning = "z" if camera is PERSPECTIVE else "distance"
+    content = dataset.write(camera, depth=meaning)
+    dataset.render(content, camera, meaning, distance)
+    transforms = dataset.export("--depth-dir", dataset.folder / "depth")
+    scale = transforms["integer_depth_scale"]
+    # It is as exact as 16 bits allow.
+    assert scale == max(0.001, scale) <= max(0.001, distance / 65535 * 1.001)
+    for frame in transforms["frames"]:
+        depth = images.read_image(dataset.folder / frame["depth_path"]).channels["Y"] * scale
+        true = images.read_image(dataset.folder / f"{Path(frame['file_path']).stem}.exr")
+        far = true.channels["Z"]
+        np.testing.assert_allclose(depth[np.isfinite(far)], far[np.isfinite(far)], atol=scale)
+        assert (depth[~np.isfinite(far)] == 0).all()
+    assert "depths are 0" not in capsys.readouterr().out
+
+
+def test_depths_that_no_16_bits_hold_beside_near_ones_are_counted(
+    dataset: Dataset, capsys: Any
+) -> None:
+    dataset.render(dataset.write(FISHEYE, depth="distance"), FISHEYE, "distance", 20_000.0)
+    transforms = dataset.export("--depth-dir", dataset.folder / "depth")
+    assert transforms["integer_depth_scale"] * 65535 == pytest.approx(999.9)
+    has_ray = np.isfinite(lenses.from_camera(FISHEYE).pixel_rays()[..., 0])
+    (note,) = re.findall(r"note: .*: (\d+) of (\d+) depths are 0", capsys.readouterr().out)
+    assert tuple(map(int, note)) == (6 * has_ray.sum(), 6 * has_ray.size)
 
 
 def test_the_scenes_box_holds_all_cameras_and_nine_tenths_of_the_points() -> None:

@@ -400,6 +400,45 @@ def of_disparity(levels, camera, bits):
     return 1 / (1 / far + levels / (2**bits - 1) * (1 / near - 1 / far))
 
 
+def test_nerfstudio_says_how_many_depths_are_too_far_for_its_millimetres(tmp_path, capsys):
+    """nerfstudio's unit is an option of its parser, so no file can give another."""
+
+    def with_far_half(lens, matrix):
+        colour, distance = look(lens, matrix)
+        distance[: lens.height // 2] = 200
+        distance[:3] = np.inf
+        return colour, distance
+
+    for name, see in (("near", look), ("far", with_far_half)):
+        write_views(tmp_path / name / "dataset", LENSES["panorama"], RIG, see=see)
+        folder = tmp_path / name / "dataset"
+        made = exported(folder, "nerfstudio", "views", tmp_path / name, depth=True, points=50)
+        said = capsys.readouterr().out
+        if name == "near":
+            assert "depths are 0" not in said
+            continue
+        maps = [images.read_image(path).channels["Y"] for path in (made / "depths").iterdir()]
+        unknown = np.array(maps) == 0
+        lost = unknown.sum() - 3 * 64 * len(maps)
+        assert f"note: {made}: {lost} of {unknown.size} depths are 0, unknown" in said
+        assert unknown.sum() == 16 * 64 * len(maps)
+
+
+@pytest.mark.parametrize("name", ["opendibr", "miv"])
+def test_disparity_says_how_many_depths_are_moved_to_its_farthest(tmp_path, name, capsys):
+    def with_far_half(lens, matrix):
+        colour, distance = look(lens, matrix)
+        distance[: lens.height // 2] = 2000
+        distance[:3] = np.inf
+        return colour, distance
+
+    write_views(tmp_path / "dataset", LENSES["panorama"], RIG, see=with_far_half)
+    folder = exported(tmp_path / "dataset", name, "views", tmp_path)
+    moved, pixels = 12 * 13 * 64, 12 * 32 * 64
+    note = f"note: {folder}: {moved} of {pixels} depths are farther than 999.9 m"
+    assert note in capsys.readouterr().out
+
+
 def opengl_points(camera, depth):
     """Return the points of all pixels in OpenGL's world, as OpenDIBR's vertex shader does."""
     width, height = camera["Resolution"]

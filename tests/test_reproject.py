@@ -175,7 +175,7 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
 
 
-def test_depth_beyond_the_range_of_a_png_is_missing_there(dataset, run):
+def test_depth_beyond_the_range_of_a_png_is_missing_there(dataset, run, capsys):
     run(*PERSPECTIVE, "--exr", "--depth-png", "40000")
     z = read_image(dataset / "out" / "view_0000f.exr").channels["Z"].astype(float)
     integers = read_image(dataset / "out" / "view_0000f_depth.png").channels["Y"]
@@ -183,6 +183,14 @@ def test_depth_beyond_the_range_of_a_png_is_missing_there(dataset, run):
     assert 0.1 < (z < 1.638).mean() < 0.9
     assert np.abs(integers - z * 40000)[z < 1.638].max() <= 0.5
     assert not integers[z > 1.639].any()
+    lost = 0
+    for path in (dataset / "out").glob("*_depth.png"):
+        depth = read_image(path.with_name(path.name.replace("_depth.png", ".exr"))).channels["Z"]
+        lost += int((np.isfinite(depth) & (read_image(path).channels["Y"] == 0)).sum())
+    note = (
+        f"{lost} depths are 0, unknown, in 16-bit depth maps, which hold only 2.5e-05 to 1.63837 m"
+    )
+    assert f"note: {dataset / 'out'}: {note}\n" in capsys.readouterr().out
 
 
 def test_a_copy_as_png_has_no_negative_depth_and_no_nan(dataset, run):

@@ -104,8 +104,8 @@ class ReprojectionSettings(ReprojectionOptions):
     depth_png: float | None = Field(
         None,
         gt=0,
-        description="Steps per metre of 16-bit depth maps. Without this key, no such maps are "
-        "written.",
+        description="Steps per metre of 16-bit depth maps. They end at 65535 steps. Without this "
+        "key, no such maps are written.",
         json_schema_extra={"unit": "steps/m"},
     )
     mask: bool = Field(

@@ -1,5 +1,7 @@
 """Depth as normalised disparity, as players and coders of immersive video keep it."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,27 @@ def depth_range(depth: Floats) -> tuple[float, float]:
     # A plane seen head on has one depth, and a range needs two. Neither is beyond the farthest.
     near = min(float(depths.min(initial=FARTHEST)), FARTHEST / 1.001)
     return near, max(float(depths.max(initial=near)), 1.001 * near)
+
+
+class Farther:
+    """Counts the depths that an export moves to `FARTHEST`."""
+
+    def __init__(self) -> None:
+        self._pixels = 0
+        self._farther = 0
+
+    def count(self, depth: Floats) -> None:
+        """Count the depth (h, w) of a view, in metres. A miss, inf, is not moved."""
+        self._pixels += depth.size
+        self._farther += int((np.isfinite(depth) & (depth > FARTHEST)).sum())
+
+    def report(self, place: Path) -> None:
+        """Print how many depths were moved, if any, in the export at ``place``."""
+        if self._farther:
+            print(
+                f"note: {place}: {self._farther} of {self._pixels} depths are farther than "
+                f"{FARTHEST} m, and become {FARTHEST} m, as a miss does"
+            )
 
 
 def levels(

@@ -11,6 +11,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +27,15 @@ from lightfield.core.settings import checked, read_settings
 from lightfield.dataset.exports import (
     BOUNDS_PIXELS,
     BOUNDS_VIEWS,
+    FARTHEST,
     ExportSettings,
     InstantNgp,
 )
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.names import VIEWS
 from lightfield.dataset.view_store import ViewStore
-from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
-from lightfield.geometry.depth import conventional_depth
+from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
+from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -51,6 +53,7 @@ RIG_PART = 0.2
 MASK = "dynamic_mask_{view}.png"
 """The mask beside a PNG view. The loader does not train on pixels where it is above 0."""
 
+_DEPTH_UNIT = 0.001  # metres of a step of depth, unless a surface is too far for such steps
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
 
 
@@ -116,7 +119,7 @@ def write(settings: ExportSettings[InstantNgp], arguments: argparse.Namespace) -
     if options.render_aabb:
         common["render_aabb"] = [list(corner) for corner in options.render_aabb]
     if options.depth:
-        common["integer_depth_scale"] = DEPTH_UNIT
+        common["integer_depth_scale"] = writer.depth_maps.unit
     frames = writer.frames()
     for path, names in view_names.items():
         write_json(path, common | {"frames": [frames[name] for name in names]})
@@ -153,6 +156,9 @@ class _Writer:
         folder = self.output.parent / "instant_ngp"
         self.exr_dir: Path = arguments.exr_dir or folder
         self.depth_dir: Path = arguments.depth_dir or folder / "depth"
+        # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
+        # the axis. All other rays have length 1. The loader ignores a depth of 0.
+        self.meaning = conventional_depth(self.lens)
         keep_apart("--output", self.output, arguments.input_cfg, self.trained_by)
         if self.suffix == ".exr":
             keep_apart("--exr-dir", self.exr_dir, self.image_dir)
@@ -191,9 +197,6 @@ class _Writer:
     def frames(self) -> dict[str, dict[str, Any]]:
         """Write the files of all views. Return their frames by the views' names."""
         progress = Progress(len(self.lightfield.views), "export")
-        # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
-        # the axis. All other rays have length 1. The loader ignores a depth of 0.
-        meaning = conventional_depth(self.lens)
         frames = {}
         missing = []
         for view in self.lightfield.views:
@@ -210,17 +213,28 @@ class _Writer:
             }
             if self.options.depth:
                 path = self.depth_dir / f"{view.name}.png"
-                images.write_png(path, millimetres(self.depth(view, meaning)))
+                self.depth_maps.write(path, self.depth(view, self.meaning))
                 self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
             frames[view.name] = frame
             progress.done()
+        if self.options.depth:
+            self.depth_maps.report(self.output)
         if missing:
             print(
                 f"warning: {len(missing)} images are missing, the first is {missing[0]}",
                 file=sys.stderr,
             )
         return frames
+
+    @cached_property
+    def depth_maps(self) -> DepthMaps:
+        """The writer of depth maps, whose steps reach to the farthest surface within `FARTHEST`."""
+        farthest = 0.0
+        for view in self.lightfield.views:
+            depth = self.depth(view, self.meaning)
+            farthest = max(farthest, float(np.max(depth, where=np.isfinite(depth), initial=0)))
+        return DepthMaps(max(_DEPTH_UNIT, min(farthest, FARTHEST) / LARGEST_STEP))
 
     def relative(self, path: Path) -> str:
         """Return a path relative to the transforms.json."""

@@ -18,7 +18,7 @@ from lightfield.core.files import absolute_path, write_bytes, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
-from lightfield.export.disparity import depth_range, levels
+from lightfield.export.disparity import Farther, depth_range, levels
 from lightfield.export.opendibr import projection
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
@@ -38,9 +38,11 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
     size = f"{lens.width}x{lens.height}"
     views = source.lightfield.views
     camera_entries = []
+    farther = Farther()
     progress = Progress(len(views), "miv", "views")
     for view in views:
         depth = source.depth(view, meaning)
+        farther.count(depth)
         limits = depth_range(depth)
         texture = yuv.of_colour(source.encoded(view), COLOUR_BITS)
         write_bytes(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
@@ -62,6 +64,7 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
             }
         )
         progress.done()
+    farther.report(folder)
     content: dict[str, Any] = {
         "Version": "3.0",
         "Content_name": absolute_path(source.dataset).name,

@@ -5,7 +5,8 @@
 - ``images/``: the views.
 - ``masks/``: 0 means ignored. Either all frames have a mask, or none.
 - ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
-  for all others, whose rays have unit length in nerfstudio.
+  for all others, whose rays have unit length in nerfstudio. 0 for none, and beyond 65.535 m: the
+  unit is an option of nerfstudio's parser, which no file can set.
 - ``points.ply``: a point cloud.
 
 Splatfacto treats every camera as a pinhole: give it perspective views. Source: nerfstudio's
@@ -22,7 +23,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import SourceDataset, millimetres
+from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
@@ -31,6 +32,8 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 POINT_CLOUD = "points.ply"
+# In metres.
+DEPTH_UNIT = 0.001
 
 
 def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
@@ -39,6 +42,7 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
     meaning = conventional_depth(source.lens)
     masked = any(not source.valid(view).all() for view in views)
     frames = []
+    depth_maps = DepthMaps(DEPTH_UNIT)
     progress = Progress(len(views), "nerfstudio", "views")
     for view in views:
         name = f"{view.name}.png"
@@ -53,9 +57,10 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
             images.write_png(folder / "masks" / name, mask)
         if settings.depth:
             frame["depth_file_path"] = f"depths/{name}"
-            images.write_png(folder / "depths" / name, millimetres(source.depth(view, meaning)))
+            depth_maps.write(folder / "depths" / name, source.depth(view, meaning))
         frames.append(frame)
         progress.done()
+    depth_maps.report(folder)
     parts = splits(source.lightfield)
     write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
     paths = {view.name: frame["file_path"] for view, frame in zip(views, frames, strict=True)}

@@ -15,7 +15,7 @@ from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
-from lightfield.export.disparity import depth_range, levels
+from lightfield.export.disparity import Farther, depth_range, levels
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
@@ -39,9 +39,11 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views
     camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
+    farther = Farther()
     progress = Progress(len(views), "opendibr", "views")
     for view in views:
         depth = source.depth(view, meaning)
+        farther.count(depth)
         limits = depth_range(depth)
         disparity = levels(depth, limits, depth_bits, 0)
         names = [f"{view.name}_{kind}{suffix}" for kind in ("texture", "depth")]
@@ -68,6 +70,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
             }
         )
         progress.done()
+    farther.report(folder)
     write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
 
 

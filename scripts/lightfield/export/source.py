@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy
 from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.geometry.depth import (
+    LARGEST_STEP,
+    distance_from_z,
+    in_16_bits,
+    z_from_distance,
+)
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 
@@ -22,9 +27,6 @@ Bools = NDArray[np.bool_]
 # Two distances belong to the same surface if they differ by less than this part. One is that of a
 # pixel's centre, the other that of a point anywhere in the pixel.
 SAME_SURFACE = 0.01
-
-DEPTH_UNIT = 0.001
-"""The metres of one step in a 16-bit depth map. Its depths end at 65.535 m."""
 
 
 @dataclass(frozen=True)
@@ -254,11 +256,28 @@ def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[n
     return column, row, inside
 
 
-def millimetres(depth: Floats) -> NDArray[np.uint16]:
-    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`. 0 means none, or too far."""
-    steps = np.round(depth / DEPTH_UNIT)
-    valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
-    return np.where(valid, steps, 0).astype(np.uint16)
+class DepthMaps:
+    """Writes 16-bit depth maps with steps of ``unit`` metres, and counts the depths they lose."""
+
+    def __init__(self, unit: float) -> None:
+        self.unit = unit
+        self._pixels = 0
+        self._lost = 0
+
+    def write(self, path: Path, depth: Floats) -> None:
+        """Write the depth (h, w) of a view, in metres. 0 means none, too near, or too far."""
+        steps, lost = in_16_bits(depth / self.unit)
+        images.write_png(path, steps)
+        self._pixels += depth.size
+        self._lost += lost
+
+    def report(self, place: Path) -> None:
+        """Print how many depths were lost, if any, in the maps of the export at ``place``."""
+        if self._lost:
+            print(
+                f"note: {place}: {self._lost} of {self._pixels} depths are 0, unknown, because "
+                f"16 bits hold only {self.unit:g} to {LARGEST_STEP * self.unit:g} m"
+            )
 
 
 def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:

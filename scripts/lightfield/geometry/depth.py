@@ -5,9 +5,13 @@ A view stores one of them, and `LightField.depth` says which. `Lens.usual_depth`
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+
+# The largest number of 16 bits.
+LARGEST_STEP = 65535
 
 
 def conventional_depth(lens: Lens) -> str:
@@ -49,6 +53,17 @@ def distance_from_z(z: Array, rays: Array) -> Array:
         distance = z / -rays[..., 2]
         distance = np.where((rays[..., 2] != 0) & (distance >= 0), distance, np.nan)
     return np.where(np.isinf(z) & ~np.isnan(rays[..., 2]), z, distance)
+
+
+def in_16_bits(steps: Array) -> tuple[NDArray[np.uint16], int]:
+    """Return depth (h, w) in ``steps`` as whole numbers of 16 bits, where 0 means none.
+
+    Also returns how many depths were lost: those that are too near or too far for a number.
+    """
+    rounded = np.round(steps)
+    has_depth = np.isfinite(steps) & (steps > 0)
+    fits = has_depth & (rounded >= 1) & (rounded <= LARGEST_STEP)
+    return np.where(fits, rounded, 0).astype(np.uint16), int((has_depth & ~fits).sum())
 
 
 def with_precision(depth: Array, precision: str) -> Array:

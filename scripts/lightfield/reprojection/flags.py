@@ -156,7 +156,7 @@ def add_reproject_flags(parser: argparse.ArgumentParser) -> None:
         type=above_zero,
         metavar="SCALE",
         help="write 16-bit depth maps, <name>_depth.png: depth in metres × SCALE, and 0 where "
-        "there is no depth",
+        "there is no depth, or more than 65535 steps",
     )
     files.add_argument(
         "--mask",

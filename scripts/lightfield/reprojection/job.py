@@ -80,6 +80,8 @@ class Job:
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
+        # For each 16-bit depth map, how many depths no step of it holds.
+        self.lost_depths: list[int] = []
         # The SHA-256 of each image, by its path in the dataset.
         self.source_sums: dict[str, str] = {}
         if arguments.source_record:

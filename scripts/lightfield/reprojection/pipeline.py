@@ -12,6 +12,7 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, sha256
 from lightfield.core.progress import Progress
+from lightfield.geometry.depth import LARGEST_STEP
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Target
@@ -50,6 +51,13 @@ def run(job: Job) -> None:
         # The run's report quotes the last line of the log.
         raise UserError(
             f"{len(failed)} of {len(views)} views could not be reprojected, such as {min(failed)}"
+        )
+    if lost := sum(job.lost_depths):
+        steps = job.settings.depth_png
+        assert steps is not None
+        print(
+            f"note: {arguments.output_dir}: {lost} depths are 0, unknown, in 16-bit depth maps, "
+            f"which hold only {1 / steps:g} to {LARGEST_STEP / steps:g} m"
         )
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
@@ -119,12 +127,17 @@ def _check(job: Job, view: SourceView) -> None:
 
 
 def _identity(view: SourceView) -> str:
-    """Return the identity of the source's content: its render key, or else its checksum."""
+    """Return the identity of the source's content: its render key, or else its checksum.
+
+    A file that stores other pixels than it shows has its window, too.
+    """
     parts = []
     for path in view.paths:
-        is_exr = path.suffix.lower() == ".exr"
-        key = read_header(path).attributes.get(KEY_ATTRIBUTE) if is_exr else None
+        header = read_header(path) if path.suffix.lower() == ".exr" else None
+        key = header.attributes.get(KEY_ATTRIBUTE) if header else None
         parts.append(str(key or sha256(path)))
+        if header and not header.window.is_stored_whole:
+            parts.append(str(header.window))
     return " ".join(parts)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.geometry.depth import with_precision
+from lightfield.geometry.depth import in_16_bits, with_precision
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.halves import narrow, widen
@@ -179,7 +179,8 @@ def write(
                 _write_png(path, image, {**attributes, **PNG_OPTIONS})
             case "depth":
                 assert job.settings.depth_png is not None
-                _write_depth(path, image, job.settings.depth_png, key)
+                lost = _write_depth(path, image, job.settings.depth_png, key)
+                job.lost_depths.append(lost)
             case "mask":
                 mask = np.where(image.empty, 255, 0).astype(np.uint8)
                 write_png(path, mask, {KEY_ATTRIBUTE: key})
@@ -312,14 +313,13 @@ def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:
     write_png(path, pixels, attributes)
 
 
-def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
-    """Write depth times ``scale`` in 16 bits. 0 marks a missing depth, or one that is too large."""
+def _write_depth(path: Path, image: _Image, scale: float, key: str) -> int:
+    """Write depth times ``scale`` in 16 bits, with 0 for none. Return how many depths are lost."""
     if image.depth is None:
         raise UserError("--depth-png: the image has no channel Z")
-    scaled = np.rint(image.depth.astype(np.float64) * scale)
-    # Comparisons with NaN are false.
-    fits = (scaled > 0) & (scaled <= 65535)
-    write_png(path, np.where(fits, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
+    steps, lost = in_16_bits(image.depth.astype(np.float64) * scale)
+    write_png(path, steps, {KEY_ATTRIBUTE: key})
+    return lost
 
 
 def _resampled(
