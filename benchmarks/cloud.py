@@ -169,8 +169,8 @@ class Cloud(Disk):
         return {name: sha256(self.root / DATASET / name) for name in super().published()}
 
     def render_counts(self) -> Counter[str]:
-        """Return how often each view was rendered, from the journals that all jobs left."""
-        return count_renders(self.jobs.rglob("render/*.journal.jsonl"))
+        """Return how often each view was rendered, by all jobs."""
+        return count_renders(self.jobs.iterdir())
 
 
 def check_environment() -> None:

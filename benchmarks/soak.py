@@ -10,7 +10,6 @@ was not found or not mended, or if anything was lost or made twice.
 
 import argparse
 import hashlib
-import json
 import os
 import random
 import resource
@@ -28,6 +27,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+import bookkeeping
 
 from lightfield.core.files import write_json, write_text
 from lightfield.core.progress import Progress
@@ -49,8 +51,9 @@ reprojections:
   perspective:
     camera: {{lens: rectilinear, fov: 60, resolution: [24, 24]}}
 """
-DATASET = Path("results/soak/LFSoak")
-WORK = Path("work/soak/LFSoak")
+NAME = "soak/LFSoak"
+DATASET = Path("results", NAME)
+WORK = Path("work", NAME)
 # No file may exceed this many bytes: from what Snakemake itself needs to less than the scene.
 LIMITS = (32_000, 64_000, 128_000)
 
@@ -200,28 +203,20 @@ class Build:
 
     def finished(self) -> dict[Path, tuple[str, int]]:
         """Return the SHA-256 and the size in bytes of each view that is logged as finished."""
-        views = {}
-        for log in (self.root / WORK).glob("*/*.sums.jsonl"):
-            for line in log.read_text(errors="replace").splitlines():
-                try:
-                    entry = json.loads(line)
-                except ValueError:
-                    continue  # a kill has cut it short
-                views[self.root / DATASET / entry["file"]] = (entry["sha256"], entry["bytes"])
-        return views
+        return bookkeeping.finished_files(self.root, NAME)
 
     def render_counts(self) -> Counter[str]:
         """Return how often each view was rendered."""
-        return count_renders((self.root / WORK).glob("render/*.journal.jsonl"))
+        return count_renders([self.root])
 
 
-def count_renders(journals: Iterable[Path]) -> Counter[str]:
-    """Return how often each view was rendered, from the journals of the render jobs."""
+def count_renders(roots: Iterable[Path]) -> Counter[str]:
+    """Return how often each view was rendered in builds in these folders."""
     counts: Counter[str] = Counter()
-    for journal in journals:
-        for line in journal.read_text(errors="replace").splitlines():
-            if line.startswith('{"view"'):
-                counts[json.loads(line)["view"]] += 1
+    for root in roots:
+        for (shard, view), times in bookkeeping.rendered(root).items():
+            if shard.name == "render":
+                counts[view] += times
     return counts
 
 
@@ -339,14 +334,8 @@ def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
 
 
 def views_to_render_again(paths: Iterable[Path]) -> set[str]:
-    """Return the views whose own file, or log of checksums, is among ``paths``."""
-    views = set()
-    for path in paths:
-        views.add(path.name.partition(".")[0])
-        if path.name.endswith(".sums.jsonl"):
-            for line in path.read_text().splitlines():
-                views.add(Path(json.loads(line)["file"]).stem)
-    return views
+    """Return the views whose own file, or note of what is finished, is among ``paths``."""
+    return set().union(*map(bookkeeping.views_of, paths))
 
 
 def main() -> None:

@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
@@ -124,13 +123,3 @@ def assert_same_bytes(folder, other_folder, dataset=""):
     assert list(first) == list(second)
     different = [n for n in first if not filecmp.cmp(first[n], second[n], shallow=False)]
     assert not different
-
-
-def rendered(folder):
-    """Return how often each view has been rendered, by its journal's folder and its name."""
-    counts = Counter()
-    for journal in folder.glob("work/**/*.journal.jsonl"):
-        lines = [json.loads(line) for line in journal.read_text().splitlines()]
-        # Shards of another size have journals of their own for the same views.
-        counts.update((journal.parent, line["view"]) for line in lines if "view" in line)
-    return counts

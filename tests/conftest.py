@@ -3,10 +3,12 @@
 import compileall
 import fcntl
 import os
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -107,6 +109,17 @@ def mount_disk(folder, options):
     """Mount a small file system at a folder. Return False if that is not allowed."""
     command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
     return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+@contextmanager
+def largest_file(size):
+    """Limit all files to ``size`` bytes, with RLIMIT_FSIZE."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.fixture

@@ -1,19 +1,18 @@
 """One table of faults: the kinds of files in a build, and what can happen to a file.
 
-test_damage.py does every fault to every kind of file.
+promises/test_damage.py does every fault to every kind of file.
 """
 
 import json
 import os
 
+import bookkeeping
 import numpy as np
+from bookkeeping import CUBOID, LATTICE, PLANE
 
 from lightfield.imaging import images
 from soak import delete, empty, folder
 
-CUBOID, PLANE, LATTICE = (
-    f"smoke/{rig}" for rig in ("LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos")
-)
 HDR = f"results/{CUBOID}/perspective_hdr"
 NCORE = f"{HDR}/exports/ncore/views.ncore4.zarr/cameras/camera/frames"
 
@@ -30,19 +29,10 @@ KINDS = {
         f"work/{CUBOID}/perspective/lens_map.npy",
         f"work/{LATTICE}/perspective/lens_map.npy",
     ),
-    "record of views": (f"work/{CUBOID}/render/0-6.json", f"work/{LATTICE}/render/0-2.json"),
-    "record of a reprojection": (
-        f"work/{PLANE}/perspective/0-6.json",
-        f"work/{LATTICE}/perspective/0-2.json",
-    ),
-    "log of checksums": (
-        f"work/{PLANE}/render/0-6.sums.jsonl",
-        f"work/{LATTICE}/render/0-2.sums.jsonl",
-    ),
-    "journal": (
-        f"work/{PLANE}/render/0-6.journal.jsonl",
-        f"work/{LATTICE}/render/0-2.journal.jsonl",
-    ),
+    "record of views": bookkeeping.KINDS["record of views"],
+    "record of a reprojection": bookkeeping.KINDS["record of a reprojection"],
+    "log of checksums": bookkeeping.KINDS["log of checksums"],
+    "journal": bookkeeping.KINDS["journal"],
     "view": (f"results/{CUBOID}/exr/view_b0000f.exr", f"results/{CUBOID}/exr/view_f0000f.exr"),
     "reprojected PNG": (
         f"results/{CUBOID}/perspective/view_l0000f.png",
@@ -88,7 +78,7 @@ KINDS = {
     ),
     "surface": (f"results/{CUBOID}/mesh/scene.glb", f"results/{CUBOID}/mesh/scene.ply"),
     "validation": (f"results/{CUBOID}/validation.json", f"results/{LATTICE}/validation.json"),
-    "sums of work": (f"work/{PLANE}/checksums.txt", f"work/{LATTICE}/checksums.txt"),
+    "sums of work": bookkeeping.KINDS["sums of work"],
     "published sums": (f"results/{CUBOID}/sha256sums.txt", f"results/{LATTICE}/sha256sums.txt"),
     "splits": ("results/smoke/splits.json", f"results/{PLANE}/validation.json"),
     "picture of a report": (
@@ -101,12 +91,9 @@ KINDS = {
         f"work/{CUBOID}/settings/lightfield.json",
         f"work/{LATTICE}/settings/lightfield.json",
     ),
-    "note of shards": ("work/shards.json", f"results/{LATTICE}/report/rig.svg"),
-    "benchmark": (
-        f"work/benchmarks/{PLANE}/render/0-6.tsv",
-        f"work/benchmarks/{LATTICE}/render/0-2.tsv",
-    ),
-    "log": (f"work/logs/{PLANE}/render/0-6.log", f"work/logs/{LATTICE}/render/0-2.log"),
+    "note of shards": bookkeeping.KINDS["note of shards"],
+    "benchmark": bookkeeping.KINDS["benchmark"],
+    "log": bookkeeping.KINDS["log"],
     "array of a Zarr store": (f"{NCORE}/0/image/0", f"{NCORE}/1000000/image/0"),
     "metadata of a Zarr store": (f"{NCORE}/0/image/.zarray", f"{NCORE}/.zattrs"),
 }

@@ -3,20 +3,17 @@
 Snakemake has nothing to do in it. If a test damages a file, Snakemake must plan it again.
 """
 
-import contextlib
 import os
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import bookkeeping
 import numpy as np
 from checkouts import jobs_on, snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.records import ShardRecord
 from lightfield.imaging import images
 
 WHEN = 1_700_000_000
@@ -45,49 +42,8 @@ def build(folder: Path) -> list[Dataset]:
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
-    _note_jobs(folder, datasets, inputs)
+    bookkeeping.note_build(folder, datasets, inputs, WHEN)
     return datasets
-
-
-def note(names: Iterable[str]) -> None:
-    """Write into the ledger that a separate job made each of these files."""
-    jobs = ledger.Ledger(Path("work", ledger.NAME))
-    for name in names:
-        stamps = {name: ledger.Stamp.of(name)}
-        is_history = name.endswith((".jsonl", ".tsv"))
-        files, history = ({}, stamps) if is_history else (stamps, {})
-        jobs.note(ledger.Job([name], files, history, {}))
-
-
-def note_again(folder: Path, output: Path) -> None:
-    """Write into the ledger that the files of an output's job are correct as they are now."""
-    with contextlib.chdir(folder):
-        path = Path("work", ledger.NAME)
-        job = next(job for job in ledger.jobs(path) if str(output) in job.outputs)
-        files = {name: ledger.Stamp.of(name) for name in job.files}
-        ledger.Ledger(path).note(job._replace(files=files))
-
-
-def _note_jobs(folder: Path, datasets: list[Dataset], inputs: Mapping[str, Iterable[str]]) -> None:
-    """Write a ledger in which each file has a job of its own, which read its ``inputs``."""
-    with contextlib.chdir(folder):
-        jobs = ledger.Ledger(Path("work", ledger.NAME))
-        for dataset in datasets:
-            for name in (*dataset.files, *dataset.intermediates):
-                if name in jobs:
-                    continue
-                files = {name: ledger.Stamp.of(name)}
-                history = {}
-                if name in dataset.all_records:
-                    listed = [
-                        f"{dataset.folder}/{view}" for view in shard_files.read_record(Path(name))
-                    ]
-                    files |= {view: ledger.Stamp.of(view) for view in listed}
-                    log = f"{name.removesuffix('.json')}.sums.jsonl"
-                    history[log] = ledger.Stamp.of(log)
-                read = {path: ledger.Stamp.of(path) for path in inputs[name]}
-                jobs.note(ledger.Job([name], files, history, read))
-        os.utime(Path("work", ledger.NAME), (WHEN, WHEN))
 
 
 def planned(folder: Path, *arguments: str) -> set[str]:
@@ -117,7 +73,6 @@ def _views(folder: Path, dataset: Dataset) -> None:
         suffix = reprojection.suffix if reprojection else ".exr"
         images_folder = folder / dataset.folder / (stage if reprojection else "exr")
         for first, end in dataset.shards:
-            record = ShardRecord(folder / dataset.record(stage, first, end), images_folder)
             files = [images_folder / f"{v.name}{suffix}" for v in lightfield.views[first:end]]
             for number, file in enumerate(files):
                 pixels = np.full((4, 4), number + 10 * len(stage), np.uint8)
@@ -126,8 +81,8 @@ def _views(folder: Path, dataset: Dataset) -> None:
                 else:
                     key = {images.KEY_ATTRIBUTE: stage}
                     images.write_exr(file, {"R": pixels.astype(np.float16)}, key)
-                record.add(file, stage)
-            record.write(files)
+            record = folder / dataset.record(stage, first, end)
+            bookkeeping.note_shard(record, images_folder, files, stage)
 
 
 def _write(path: Path, number: int) -> None:

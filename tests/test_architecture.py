@@ -73,6 +73,38 @@ def test_reading_the_rules_imports_nothing_heavy():
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
 
 
+# The modules by which the workflow knows what is finished, outdated or damaged.
+MECHANISMS = [
+    "lightfield.dataset.ledger",
+    "lightfield.dataset.records",
+    "lightfield.dataset.presence",
+    "lightfield.dataset.journal",
+    "lightfield.dataset.shard_counts",
+    "lightfield.dataset.shard_files",
+    "lightfield.dataset.view_store",
+    "lightfield.dataset.member_record",
+    "lightfield.validation.integrity",
+    "lightfield.validation.corpus_integrity",
+]
+# The names of their files.
+NOTES = re.compile(r"ledger\.txt|\.(sums|journal)\.jsonl|shards\.json|/checksums\.txt")
+
+
+def test_promises_are_tested_without_the_mechanisms_that_keep_them():
+    """These tests and their helpers ask tests/bookkeeping.py. So it alone changes with these."""
+    paths = [*ROOT.glob("tests/*.py"), *ROOT.glob("benchmarks/*.py")]
+    helpers = {path.stem: path for path in paths if path.stem != "bookkeeping"}
+    files = [*ROOT.glob("tests/promises/*.py")]
+    assert files
+    # The list grows while it is read.
+    for file in files:
+        names = imported(file)
+        assert not [name for name in names if name.startswith(tuple(MECHANISMS))], file
+        assert not NOTES.search(file.read_text()), file
+        modules = {name.split(".")[0] for name in names}
+        files += [helpers[name] for name in helpers.keys() & modules if helpers[name] not in files]
+
+
 # Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 MODULES = r"\b(?:from|import) snakemake\b(?!\.utils import min_version)"

@@ -323,7 +323,7 @@ def test_the_sums_hold_and_cover_everything(built):
     assert not [*corpus_faults(built)]
 
 
-# Root may read a file without permissions. See `test_damage.py` for these.
+# Root may read a file without permissions. See `promises/test_damage.py` for these.
 @pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"unreadable"}))
 @pytest.mark.parametrize("kind", CORPUS_KINDS)
 def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, fault):

@@ -6,9 +6,11 @@ import subprocess
 import sys
 
 import pytest
-from conftest import SCRIPTS
+from conftest import SCRIPTS, largest_file
 
-from lightfield.dataset.journal import Run, avoided, is_suspect, read
+from lightfield.core import files
+from lightfield.core.errors import UserError
+from lightfield.dataset.journal import Journal, Run, avoided, is_suspect, read
 
 
 def runs(*hosts):
@@ -68,6 +70,20 @@ def test_lines_before_the_first_start_belong_to_no_run(tmp_path):
     (run,) = read(path)
     assert run.start["started"] == 20.0 and run.end is None
     assert [line["view"] for line in run.views] == ["view_0001f"]
+
+
+def test_a_journal_continues_after_a_truncated_line(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    journal = Journal(path)
+    size = path.stat().st_size
+    with (
+        largest_file(size + 5),
+        pytest.raises(UserError, match=r"journal\.jsonl: cannot be written: File too large"),
+    ):
+        journal.append({"view": "lost"})
+    assert path.stat().st_size == size + 5
+    journal.append({"view": "kept"})
+    assert [entry.get("view") for entry in files.read_json_lines(path)] == [None, "kept"]
 
 
 HANG = """

@@ -1,6 +1,10 @@
 """The ledger with many jobs: a file that many jobs share is read once."""
 
+import json
 import os
+
+import pytest
+from faults import FAULTS
 
 from lightfield.core.files import sha256
 from lightfield.dataset import ledger
@@ -57,3 +61,21 @@ def test_a_file_that_a_later_job_replaced_is_outdated_and_not_damaged(tmp_path):
     assert Ledger(path).replaced == planned.replaced
     view.write_bytes(b"damage")
     assert str(view) in Ledger(path).damage
+
+
+def note(path, *files):
+    """Write into a ledger that a job made this file."""
+    stamps = {str(file): ledger.Stamp.of(file) for file in files}
+    ledger.Ledger(path).note(ledger.Job([str(files[0])], stamps, {}, {}))
+
+
+@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"deleted"}))
+def test_the_ledger_names_the_damaged_file_and_what_to_make_again(nobody, fault):
+    path, sound, sibling = (nobody / name for name in ("a.json", "b.json", "c.json"))
+    for number, file in enumerate((path, sound, sibling)):
+        file.write_text(json.dumps({"number": [number] * 10}))
+    note(nobody / "ledger.txt", path, sound)
+    FAULTS[fault][0](path, sibling)
+    (damaged,) = ledger.Ledger(nobody / "ledger.txt").damage.items()
+    assert damaged[0] == str(path) and damaged[1][1] == [str(path)]
+    assert "\n" not in damaged[1][0]

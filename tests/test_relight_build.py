@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from checkouts import checkout, planned, rendered, snakemake
+from bookkeeping import rendered
+from checkouts import checkout, planned, snakemake
 
 pytestmark = pytest.mark.slow
 

@@ -12,17 +12,16 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import bookkeeping
 import forks
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
-from checkouts import checkout, jobs_on, snakemake, with_consumers
+from checkouts import ROOT, checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
 from lightfield.core.files import size_and_time
-from lightfield.dataset import ledger
 
 pytestmark = pytest.mark.slow
-ROOT = Path(__file__).parents[1]
 CAMERA = "{lens: equidistant, fov: 180, resolution: [16, 16]}"
 BUILT = f"""
 description: Cameras in a room
@@ -239,14 +238,6 @@ class Build:
             path.write_text("".join(f"{key}={shlex.quote(names[key])}\n" for key in names))
         return jobs
 
-    def ledger(self):
-        """Return the ledger's last line of each output."""
-        lines = {}
-        for line in (self.folder / "work/ledger.txt").read_text().splitlines():
-            for name in json.loads(line.partition(" ")[2])["outputs"]:
-                lines[name] = line
-        return lines
-
     def settings(self):
         """Return the settings of every job, by file and key."""
         return {
@@ -263,7 +254,7 @@ class Build:
 def pristine(tmp_path_factory):
     folder = tmp_path_factory.mktemp("every_rule")
     build = Build(folder / "plenoforge")
-    # Like a fresh clone, what the tests use has other inodes than the ledger noted.
+    # Like a fresh clone, what the tests use has other inodes than were noted.
     shutil.copytree(build.folder.rename(folder / "pristine"), build.folder)
     return build
 
@@ -362,7 +353,7 @@ def assert_made_from_present_inputs(build, jobs):
     """
     shown_later = build.plan().keys()
     assert {jobs[output]["rule"] for output in shown_later} <= {"page", "index"}
-    lines = build.ledger()
+    noted = bookkeeping.noted(build.folder)
     for first_output, job in jobs.items():
         if first_output in shown_later:
             continue
@@ -376,9 +367,8 @@ def assert_made_from_present_inputs(build, jobs):
             assert identifying_arguments(content["command"]) == identifying_arguments(command), (
                 output
             )
-        line = json.loads(lines[first_output].partition(" ")[2])
-        assert {name: stamp[0] for name, stamp in line["inputs"].items()} == inputs
-        assert line["files"][first_output][0] == build.sha256(first_output)
+        assert noted[first_output].inputs == inputs
+        assert noted[first_output].files[first_output] == build.sha256(first_output)
 
 
 NAMES = ("built", "brought", "imported", "modelled", "moved", "many")
@@ -752,37 +742,20 @@ def levels(jobs):
     return groups.values()
 
 
-def falsified(line, names):
-    """Return a ledger line in which inputs with these names have other bytes and times."""
-    content = json.loads(line.partition(" ")[2])
-    content["inputs"] |= {name: ["0" * 64, 0, 0, 0] for name in names}
-    text = json.dumps(content)
-    return f"{hashlib.sha256(text.encode()).hexdigest()} {text}"
-
-
-def test_each_job_with_another_input_in_the_ledger_runs_again(build):
+def test_each_job_that_read_other_content_runs_again(build):
     """Times do not help here: all else is as if two builds had run beside each other."""
-    path = build.folder / "work/ledger.txt"
-    lines = build.ledger()
     jobs = build.plan("--forceall")
     for outputs in levels(jobs):
-        with_inputs = [output for output in outputs if jobs[output]["input"]]
-        false_lines = {lines[o]: falsified(lines[o], jobs[o]["input"]) for o in with_inputs}
-        present = [false_lines.get(line, line) for line in dict.fromkeys(lines.values())]
-        path.write_text("".join(f"{line}\n" for line in present))
-        assert build.plan().keys() == followers(jobs, with_inputs)
+        read = {output: jobs[output]["input"] for output in outputs if jobs[output]["input"]}
+        with bookkeeping.made_from_other_inputs(build.folder, read):
+            assert build.plan().keys() == followers(jobs, read)
 
 
-def test_each_changed_input_of_each_job_is_noticed(build, monkeypatch, tmp_path):
-    monkeypatch.chdir(build.folder)
+def test_each_changed_input_of_each_job_is_noticed(build, tmp_path):
     inputs = 0
-    for line in {*build.ledger().values()}:
-        content = json.loads(line.partition(" ")[2])
-        for name in content["inputs"]:
-            (tmp_path / "ledger.txt").write_text(falsified(line, [name]) + "\n")
-            noted = ledger.Ledger(tmp_path / "ledger.txt")
-            assert [*noted.outdated_outputs()] == content["outputs"]
-            inputs += 1
+    for outputs, _, outdated in bookkeeping.each_changed_input(build.folder, tmp_path / "notes"):
+        assert outdated == outputs
+        inputs += 1
     assert inputs > 200
 
 

@@ -1,12 +1,10 @@
 """A user's scenes, poses and results in a folder of their own, outside the repository."""
 
 import json
-from pathlib import Path
 
 import forks
 import pytest
-
-ROOT = Path(__file__).resolve().parents[1]
+from checkouts import ROOT
 
 SCENE = """
 scene: {builder: room}

@@ -4,15 +4,15 @@ That metadata lies in .snakemake. A fresh clone beside an old build does not hav
 """
 
 import csv
-import hashlib
 import json
 import os
 import shutil
 import subprocess
 
+import bookkeeping
 import forks
 import pytest
-from checkouts import checkout, planned, snakemake
+from checkouts import checkout, jobs_on, planned, snakemake
 
 pytestmark = pytest.mark.slow
 CUBOID = "LFCuboid_1x1x1"
@@ -65,15 +65,15 @@ def test_a_fresh_clone_beside_an_old_build_has_nothing_to_do(built):
 
 def test_views_of_an_old_scene_are_rendered_again_for_a_new_one(folder):
     """A real run: another colour of the sphere makes another picture."""
-    record = f"work/smoke/{CUBOID}/render/0-6.json"
-    view = "exr/view_r0000f.exr"
-    before = json.loads((folder / record).read_text())["files"][view]
+    record = bookkeeping.shard(f"smoke/{CUBOID}", "render", "0-6")
+    view = folder / f"results/smoke/{CUBOID}/exr/view_r0000f.exr"
+    before = view.read_bytes()
     in_builder(folder)
     blend = (folder / "work/smoke/scene.blend").read_bytes()
     result = snakemake(folder, record)
     assert result.returncode == 0, result.stderr
     assert (folder / "work/smoke/scene.blend").read_bytes() != blend
-    assert before != json.loads((folder / record).read_text())["files"][view]
+    assert view.read_bytes() != before
     again = snakemake(folder, "--dry-run", record)
     assert "Nothing to be done" in again.stdout + again.stderr
     # The published files follow.
@@ -90,63 +90,52 @@ def test_a_plan_between_two_builds_hides_no_change(folder):
     assert planned(folder, "smoke").keys() >= VIEWS
 
 
-def test_files_missing_from_the_ledger_are_made_again(folder):
-    path = folder / "work/ledger.txt"
-    lines = path.read_text().splitlines(keepends=True)
-    kept = [
-        line for line in lines if '"work/smoke/scene.blend"],' not in line.partition('"files"')[0]
-    ]
-    assert len(kept) == len(lines) - 1
-    path.write_text("".join(kept))
+def test_files_that_are_not_noted_are_made_again(folder):
+    bookkeeping.forget(folder, "work/smoke/scene.blend")
     assert {"build_scene", "inventory", "render"} <= planned(folder, "smoke").keys()
 
 
-def test_the_ledger_has_every_file_that_a_job_reads(smoke):
+def test_every_file_that_a_job_reads_is_noted(smoke):
     """An input without a note could change unnoticed, like an ``ancient`` one."""
     summary = snakemake(smoke, "--detailed-summary", "--", "smoke").stdout.splitlines()
     read_by_snakemake = {
         row["output_file"]: set(row["input-file(s)"].split(","))
         for row in csv.DictReader(summary, delimiter="\t")
     }
-    lines = (smoke / "work/ledger.txt").read_text().splitlines()
-    jobs = [json.loads(line.partition(" ")[2]) for line in lines]
-    assert len(jobs) > 30
-    for job in jobs:
-        for output in job["outputs"]:
-            unnoted = read_by_snakemake[output] - job["inputs"].keys() - {"-", ""}
-            # Checksums wait for the page of an invalid dataset, and do not read it.
-            is_page = output.endswith("sha256sums.txt")
-            page = output.replace("sha256sums.txt", "report/index.html")
-            assert unnoted == ({page} if is_page else set()), output
+    noted = bookkeeping.noted(smoke)
+    assert len(noted) > 30
+    for output, job in noted.items():
+        unnoted = read_by_snakemake[output] - job.inputs.keys() - {"-", ""}
+        # Checksums wait for the page of an invalid dataset, and do not read it.
+        is_page = output.endswith("sha256sums.txt")
+        page = output.replace("sha256sums.txt", "report/index.html")
+        assert unnoted == ({page} if is_page else set()), output
 
 
 def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
     """Two builds run beside each other: an export is made while its light field is replaced."""
     folder = copy_of(smoke, tmp_path)
-    path = folder / "work/ledger.txt"
-    lines = path.read_text().splitlines()
-    changed = []
-    for line in lines:
-        content = json.loads(line.partition(" ")[2])
-        if any(name.endswith("colmap/export.json") for name in content["outputs"]):
-            name = next(name for name in content["inputs"] if name.endswith("/lightfield.json"))
-            content["inputs"][name][0] = "0" * 64
-        text = json.dumps(content)
-        changed.append(f"{hashlib.sha256(text.encode()).hexdigest()} {text}\n")
-    path.write_text("".join(changed))
-    assert "export" in planned(folder, "smoke")
+    export = f"results/smoke/{CUBOID}/perspective_hdr/exports/colmap/export.json"
+    lightfield = f"results/smoke/{CUBOID}/perspective_hdr/lightfield.json"
+    assert lightfield in bookkeeping.noted(folder)[export].inputs
+    with bookkeeping.made_from_other_inputs(folder, {export: [lightfield]}):
+        assert "export" in planned(folder, "smoke")
 
 
 def test_damage_is_found_before_its_checksum_is_published(folder):
     """After the plan a digit changes at the same size. It is found before checksums are made."""
-    transforms = folder / f"results/smoke/{CUBOID}/perspective/transforms.json"
-    text = transforms.read_text()
-    transforms.write_text(text.replace("0.", "1.", 1))
-    validate = [forks.python(), "scripts/validate.py", f"results/smoke/{CUBOID}"]
-    paths = ["--ledger", "work/ledger.txt", "--output", "v.json", "--sums", "sums.txt"]
-    sets = ["--reprojection", "perspective", "perspective_hdr"]
-    subprocess.run([*validate, *paths, *sets], cwd=folder, check=True)
-    result = json.loads((folder / "v.json").read_text())
+    dataset = folder / f"results/smoke/{CUBOID}"
+    plan = ("--dry-run", "--forcerun", "validate", "--logger", "jobs", "--")
+    planned_jobs = jobs_on(
+        snakemake(folder, *plan, f"results/smoke/{CUBOID}/sha256sums.txt").stderr
+    )
+    (validate,) = (job for job in planned_jobs if job["rule"] == "validate")
+    transforms = dataset / "perspective/transforms.json"
+    transforms.write_text(transforms.read_text().replace("0.", "1.", 1))
+    path = f"{forks.python().parent}:{os.environ['PATH']}"
+    command = ["bash", "-c", validate["command"]]
+    subprocess.run(command, cwd=folder, env=os.environ | {"PATH": path}, check=True)
+    result = json.loads((dataset / "validation.json").read_text())
     (failed,) = [check for check in result["checks"] if check["name"] == "checksums"]
     assert not result["valid"]
     assert failed["problems"][0].startswith("perspective/transforms.json: has the sha256 ")

@@ -2,15 +2,14 @@
 
 import os
 import re
-import resource
 from contextlib import contextmanager, nullcontext
 
 import numpy as np
 import pytest
+from conftest import largest_file
 
 from lightfield.core import files
 from lightfield.core.errors import UserError
-from lightfield.dataset.journal import Journal
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images, plots
@@ -96,17 +95,6 @@ WRITERS = [
 
 
 @contextmanager
-def largest_file(size):
-    """Limit all files to ``size`` bytes, with RLIMIT_FSIZE."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-@contextmanager
 def nearly_full(disk, blocks):
     """Leave ``blocks`` blocks on a small disk. Without one, limit each file to that size."""
     folder, mounted = disk
@@ -163,17 +151,3 @@ def test_with_space_again_the_file_is_written(write, name, small_disk):
     before = path.read_bytes()
     write(path, 1)
     assert path.read_bytes() != before
-
-
-def test_a_journal_continues_after_a_truncated_line(tmp_path):
-    path = tmp_path / "journal.jsonl"
-    journal = Journal(path)
-    size = path.stat().st_size
-    with (
-        largest_file(size + 5),
-        pytest.raises(UserError, match=r"journal\.jsonl: cannot be written: File too large"),
-    ):
-        journal.append({"view": "lost"})
-    assert path.stat().st_size == size + 5
-    journal.append({"view": "kept"})
-    assert [entry.get("view") for entry in files.read_json_lines(path)] == [None, "kept"]

@@ -9,27 +9,19 @@ import os
 import re
 import shutil
 import signal
-from pathlib import Path
 
+import bookkeeping
 import forks
 import pytest
 import simulated
-from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake
+from bookkeeping import HISTORY, REWRITTEN, WITHOUT_CHECKSUM, rendered
+from checkouts import ROOT, assert_same_bytes, checkout, snakemake, start_snakemake
 from faults import CUBOID, FAULTS, KINDS, flip, spoil
 from waiting import wait_until
 
-from lightfield.core.files import broken, set_aside, sha256
-from lightfield.dataset import ledger
+from lightfield.core.files import sha256
 from lightfield.dataset.loading import scene_datasets
-from lightfield.validation.integrity import Integrity
 
-# These record finished work, and no job can make them again. A run finds only those that it cannot
-# read. `snakemake verify` finds the rest.
-HISTORY = {"log of checksums", "journal", "benchmark"}
-# A job's log has no checksum.
-WITHOUT_CHECKSUM = {"log"}
-# Each plan writes settings, and each run notes its shards.
-REWRITTEN = {"settings", "note of shards"}
 BATCHES = range(len(FAULTS))
 OBSTACLES = {"a folder", "a link to nowhere", "unreadable"}
 
@@ -58,20 +50,20 @@ class Damaged:
 
     def run(self, *arguments):
         """Run Snakemake as a user who obeys permissions, which root does not."""
-        env = {"PYTHONPATH": str(Path(__file__).parent), forks.OBEDIENT: "1"}
+        env = {"PYTHONPATH": str(ROOT / "tests"), forks.OBEDIENT: "1"}
         return forks.run_snakemake(["--cores", "2", *arguments], self.root, env)
 
     def damaged_and_made(self, result):
         """Return the files that a run reports as damaged, and the files that it makes."""
-        named = set(re.findall(r"^([^:\n]+): .*; it is made anew$", result.stderr, re.M))
+        named = bookkeeping.named_in_plan(result.stderr)
         jobs = [json.loads(line) for line in result.stderr.splitlines() if line.startswith("{")]
         return named, {file for job in jobs for file in job["output"]}
 
     def verified(self, monkeypatch):
         """Return the files in which `snakemake verify` finds a fault."""
         monkeypatch.chdir(self.root)
-        folders = [Path(dataset.folder) for dataset in scene_datasets("smoke")]
-        return {str(f.path) for path in folders for f in Integrity(path, Path("work")).faults()}
+        datasets = scene_datasets("smoke")
+        return bookkeeping.problems(dataset.folder for dataset in datasets).keys()
 
 
 def has_same_bytes(first, second, path):
@@ -93,7 +85,7 @@ def test_every_fault_in_every_kind_of_file_is_found(smoke, tmp_path, batch, monk
             assert has_same_bytes(damaged.root, smoke, path)
         elif kind in HISTORY and not is_obstacle:
             assert path in verified, (kind, fault)
-        elif kind not in REWRITTEN | WITHOUT_CHECKSUM or (kind == "log" and is_obstacle):
+        elif kind not in REWRITTEN and (kind not in WITHOUT_CHECKSUM or is_obstacle):
             is_planned_as_missing = fault == "deleted" and path in made
             assert path in named or is_planned_as_missing, (kind, fault)
     # No intact file is reported.
@@ -123,59 +115,31 @@ def test_one_plain_run_mends_every_kind_of_file(smoke, tmp_path, monkeypatch):
     }
 
 
-# ---- the ledger itself ----------------------------------------------------------------------
-
-
-def keep_what_counts(path):
-    """Keep the last line of each job that a plan needs. Other tests have added lines."""
-    last_lines = {}
-    for line in path.read_text().splitlines(keepends=True):
-        outputs = line.partition('"files"')[0].partition(" ")[2]
-        if ".tar" not in outputs:
-            last_lines[outputs] = line
-    path.write_text("".join(last_lines.values()))
+# ---- the notes of finished jobs -------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["a bit", "emptied", "deleted", *sorted(OBSTACLES)])
-def test_after_damage_to_the_ledger_a_run_makes_unknown_files_again(smoke, tmp_path, fault):
+def test_after_damage_to_the_notes_a_run_makes_unknown_files_again(smoke, tmp_path, fault):
     damaged = Damaged(smoke, tmp_path)
-    path = damaged.root / "work/ledger.txt"
-    keep_what_counts(path)
-    FAULTS[fault][0](path, None)
+    # Other tests have added notes, and have made packages.
+    bookkeeping.keep_one_line_a_job(damaged.root, ".tar")
+    FAULTS[fault][0](damaged.root / bookkeeping.NOTES, None)
     result = damaged.run("--dry-run", "--logger", "jobs", "--", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
     named, made = damaged.damaged_and_made(result)
     assert made
-    assert named == ({"work/ledger.txt"} if fault in OBSTACLES else set())
+    assert named == ({bookkeeping.NOTES} if fault in OBSTACLES else set())
     # The next run knows what this run notes.
     lens_map = KINDS["lens map"][1]
     result = damaged.run("--allowed-rules", "lens_map", "--", lens_map)
     assert result.returncode == 0, result.stdout + result.stderr
-    assert lens_map in ledger.read(damaged.root / "work/ledger.txt")
-
-
-def note(path, *files):
-    """Write into a ledger that a job made this file."""
-    stamps = {str(file): ledger.Stamp.of(file) for file in files}
-    ledger.Ledger(path).note(ledger.Job([str(files[0])], stamps, {}, {}))
-
-
-@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"deleted"}))
-def test_the_ledger_names_the_damaged_file_and_what_to_make_again(nobody, fault):
-    path, sound, sibling = (nobody / name for name in ("a.json", "b.json", "c.json"))
-    for number, file in enumerate((path, sound, sibling)):
-        file.write_text(json.dumps({"number": [number] * 10}))
-    note(nobody / "ledger.txt", path, sound)
-    FAULTS[fault][0](path, sibling)
-    (damaged,) = ledger.Ledger(nobody / "ledger.txt").damage.items()
-    assert damaged[0] == str(path) and damaged[1][1] == [str(path)]
-    assert "\n" not in damaged[1][0]
+    assert lens_map in bookkeeping.noted(damaged.root)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_forks")
-def test_a_scene_damaged_before_its_ledger_line_is_built_again(tmp_path):
+def test_a_scene_damaged_before_it_is_noted_is_built_again(tmp_path):
     """Its SHA-256 was not noted before the kill, so no job may use it."""
     folder = checkout(tmp_path / "plenoforge")
     blend, inventory = "work/smoke/scene.blend", "work/smoke/inventory.json"
@@ -183,67 +147,13 @@ def test_a_scene_damaged_before_its_ledger_line_is_built_again(tmp_path):
     wait_until((folder / blend).exists, run)
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
-    assert not (folder / "work/ledger.txt").exists()
+    assert blend not in bookkeeping.noted(folder)
     flip(folder / blend, None)
     rotten = (folder / blend).read_bytes()
     result = snakemake(folder, inventory)
     assert result.returncode == 0, result.stdout + result.stderr
     assert (folder / blend).read_bytes() != rotten
-    sums = ledger.Ledger(folder / "work/ledger.txt").sums
-    assert sums[blend] == sha256(folder / blend)
-
-
-# ---- messages, and where damaged files go ---------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        (b'{"half": [', "is not JSON: "),
-        (b"[1, 2]", "is a list, not a mapping"),
-        (b'{"\xff": 1}', "is not text in UTF-8"),
-        (b"", "is empty"),
-        (b"null", "is a NoneType, not a mapping"),
-        (b"{}", None),
-    ],
-)
-def test_the_message_says_what_is_wrong_with_a_json(content, problem, tmp_path):
-    path = tmp_path / "a.json"
-    assert broken(path) is None
-    path.write_bytes(content)
-    said = broken(path)
-    assert said is problem is None or said.startswith(problem)
-
-
-def test_files_set_aside_are_never_lost(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for content in "ab":
-        Path("results").mkdir(exist_ok=True)
-        Path("results/a.json").write_text(content)
-        set_aside(Path("results/a.json"), Path("work/removed"))
-    assert Path("work/removed/results/a.json").read_text() == "a"
-    assert Path("work/removed/results/a.json.2").read_text() == "b"
-    assert not Path("results/a.json").exists()
-
-
-def test_files_outside_the_folder_are_set_aside_with_all_others(tmp_path, monkeypatch):
-    (tmp_path / "own").mkdir()
-    monkeypatch.chdir(tmp_path / "own")
-    inside = Path("work/removed") / (tmp_path / "a.json").relative_to("/")
-    for path, name in ((tmp_path / "a.json", inside.name), (Path("../a.json"), "a.json.2")):
-        (tmp_path / "a.json").touch()
-        assert set_aside(path, Path("work/removed")) == inside.with_name(name)
-        assert inside.with_name(name).is_file()
-
-
-def test_a_folder_is_set_aside_even_in_place_of_a_broken_link(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a.exr").symlink_to("a.exr")
-    set_aside(Path("a.exr"), Path("removed"))
-    Path("a.exr/inside").mkdir(parents=True)
-    assert set_aside(Path("a.exr"), Path("removed")) == Path("removed/a.exr.2")
-    assert Path("removed/a.exr").is_symlink()
-    assert Path("removed/a.exr.2/inside").is_dir()
+    assert bookkeeping.noted(folder)[blend].files[blend] == sha256(folder / blend)
 
 
 @pytest.mark.slow

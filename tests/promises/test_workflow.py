@@ -11,13 +11,13 @@ import zipfile
 from collections import Counter
 from pathlib import Path
 
+import bookkeeping
 import numpy as np
 import pytest
-import simulated
-from checkouts import assert_same_bytes, checkout, planned, rendered, snakemake, start_snakemake
+from bookkeeping import rendered, unfinished_shards
+from checkouts import assert_same_bytes, checkout, planned, snakemake, start_snakemake
 from waiting import wait_until
 
-from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
 
 CUBOID = Path("results/smoke/LFCuboid_1x1x1")
@@ -116,14 +116,8 @@ def test_an_invalid_dataset_gets_a_page_but_no_checksums_until_it_is_repaired(sm
     channels["G"][20:24, 30:40] = np.nan
     images.write_exr(view, channels, kept)
     # The view is wrong as if it had been rendered so.
-    (record,) = (folder / "work" / CUBOID.relative_to("results") / "render").glob("*-*.json")
-    content = json.loads(record.read_text())
-    content["files"]["exr/view_b0000f.exr"] = {
-        "bytes": view.stat().st_size,
-        "sha256": sha256(view),
-    }
-    write_json(record, content)
-    simulated.note_again(folder, record.relative_to(folder))
+    name = CUBOID.relative_to("results").as_posix()
+    bookkeeping.accept(folder, name, "render", "0-6", "exr/view_b0000f.exr")
     # A stray file is not a fault: it is moved away.
     (dataset / "notes.txt").touch()
 
@@ -191,16 +185,6 @@ def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_p
     assert not re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=.?(?:https?:)?//", html)
 
 
-def unfinished_shards(folder):
-    """Return the journals of unfinished shards that have rendered views."""
-    journals = folder.glob("work/smoke/*/render/*.journal.jsonl")
-    return [
-        path
-        for path in journals
-        if '"view"' in path.read_text() and not path.with_suffix("").with_suffix(".json").exists()
-    ]
-
-
 @pytest.mark.usefixtures("in_forks")
 def test_after_a_kill_during_rendering_the_next_run_continues(smoke, other):
     """The bytes are the same with other shards, and on one core."""
@@ -211,14 +195,14 @@ def test_after_a_kill_during_rendering_the_next_run_continues(smoke, other):
         run = start_snakemake(other, "--cores", "2", "--config", *chosen)
         wait_until(
             lambda views=views: (
-                unfinished_shards(other)
+                unfinished_shards(other, "smoke")
                 and len(list(other.glob("results/smoke/*/exr/*.exr"))) >= views
             ),
             run,
         )
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
-        landed += bool(unfinished_shards(other))
+        landed += bool(unfinished_shards(other, "smoke"))
     assert landed
     succeeding(other, "--cores", "1", "--config", *chosen)
     assert max(rendered(other).values()) == 1

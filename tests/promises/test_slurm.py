@@ -1,6 +1,5 @@
 """A build on a real Slurm node, with the accidents that happen on clusters."""
 
-import json
 import os
 import re
 import resource
@@ -12,15 +11,16 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+import bookkeeping
 import forks
 import psutil
 import pytest
-from checkouts import checkout, rendered, snakemake, start_snakemake
+from bookkeeping import rendered, workers
+from checkouts import ROOT, checkout, snakemake, start_snakemake
 from slurm_node import Node, install
 from waiting import wait_until as wait_until_soon
 
 CUBOID = "smoke/LFCuboid_1x1x1"
-JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
 SHARDS = ("0-3", "3-6")
 # What the jobs on the cluster need.
 INPUTS = (
@@ -45,12 +45,12 @@ WORDS = [
     *CONFIG,
     "--",
     # A job that renders a shard also reprojects it.
-    *(f"work/{CUBOID}/perspective/{shard}.json" for shard in SHARDS),
+    *(bookkeeping.shard(CUBOID, "perspective", views) for views in SHARDS),
     f"work/{CUBOID}/panorama/exr/view_0000f.exr",
 ]
 # Slurm takes minutes, in which many looks would take time from other tests.
 wait_until = partial(wait_until_soon, pause=0.1)
-IMPATIENT = Path(__file__).with_name("impatient")
+IMPATIENT = ROOT / "tests/impatient"
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(os.geteuid() != 0, reason="Slurm's daemons are root's"),
@@ -98,7 +98,7 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
     build(folder, *INPUTS)
     undisturbed = tmp_path / "undisturbed"
     shutil.copytree(folder, undisturbed)
-    build(undisturbed, *(f"work/{CUBOID}/render/{shard}.json" for shard in SHARDS))
+    build(undisturbed, *(bookkeeping.shard(CUBOID, "render", views) for views in SHARDS))
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
         environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}
@@ -108,9 +108,9 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
         environment[forks.PYTHON_OF_JOBS] = sys.executable
         with log.open("wb") as terminal:
             run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
-        began = stop_next(folder, "*.journal.jsonl", set(), run)
+        began = stop_next(folder, "*", set(), run)
         # All accidents happen to one shard. The other one's jobs may be faster.
-        (shard,) = {path.name for path in folder.glob(JOURNALS) if pids(path) & began}
+        (shard,) = (views for views in SHARDS if workers(folder, CUBOID, views) & began)
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
         # The job submitted in its place hangs until its time is over.
         began |= stop_next(folder, shard, began, run)
@@ -124,7 +124,7 @@ def test_no_view_is_lost_or_rendered_twice_on_a_cluster(tmp_path):
                 os.kill(process, signal.SIGCONT)
             wait_until(lambda: not any(map(psutil.pid_exists, full)), run, log=log)
             logs = [path.read_text() for path in folder.glob(f"work/logs/{CUBOID}/render/*.log")]
-        wait_until(lambda: processes(folder, shard) - began - full, run, log=log)
+        wait_until(lambda: workers(folder, CUBOID, shard) - began - full, run, log=log)
         wait_for_views(folder, 4, run)
         node.kill_node()
         wait_until(lambda: node.state() == "down", node.daemons["slurmctld"], 60)
@@ -179,7 +179,7 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path, 
 
 
 def test_the_documented_program_needs_nothing_of_the_project():
-    program = Path(__file__).with_name("slurm_node.py")
+    program = ROOT / "tests/slurm_node.py"
     environment = {"PATH": os.environ["PATH"]}
     result = subprocess.run(
         [sys.executable, program, "--help"], env=environment, capture_output=True, check=False
@@ -187,22 +187,11 @@ def test_the_documented_program_needs_nothing_of_the_project():
     assert result.returncode == 0, result.stderr
 
 
-def pids(journal: Path) -> set[int]:
-    """Return the processes that a journal names."""
-    lines = map(json.loads, journal.read_text().splitlines())
-    return {line["pid"] for line in lines if "pid" in line}
-
-
-def processes(folder: Path, journals: str) -> set[int]:
-    """Return the processes that worked on the shards with these journals."""
-    return set().union(*map(pids, folder.glob(JOURNALS.replace("*.journal.jsonl", journals))))
-
-
-def stop_next(folder: Path, journals: str, began: set[int], run) -> set[int]:
-    """Wait for processes other than those in ``began``. Stop and return them."""
+def stop_next(folder: Path, views: str, began: set[int], run) -> set[int]:
+    """Wait for processes of a shard other than those in ``began``. Stop and return them."""
     log = folder / "terminal.log"
-    wait_until(lambda: processes(folder, journals) - began, run, log=log)
-    stopped = processes(folder, journals) - began
+    wait_until(lambda: workers(folder, CUBOID, views) - began, run, log=log)
+    stopped = workers(folder, CUBOID, views) - began
     for process in stopped:
         os.kill(process, signal.SIGSTOP)
     return stopped
@@ -222,9 +211,6 @@ def no_room(node: Node, found: set[int]):
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:
-    """Wait until the journals have this many views."""
-    wait_until(
-        lambda: sum(path.read_text().count('"view"') for path in folder.glob(JOURNALS)) >= count,
-        run,
-        log=folder / "terminal.log",
-    )
+    """Wait until this many views are rendered."""
+    log = folder / "terminal.log"
+    wait_until(lambda: rendered(folder).total() >= count, run, log=log)
