@@ -42,7 +42,7 @@ def pytest_sessionstart(session):
 LONG = (
     "every_rule",
     "provenance",
-    "failures",
+    "failing_jobs",
     "frames",
     "slurm",
     "storage",

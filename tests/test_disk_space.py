@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -14,12 +13,10 @@ from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
-import forks
 import pytest
-from checkouts import checkout, snakemake, start_snakemake
+from checkouts import checkout, snakemake
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
-from waiting import wait_until
 
 from lightfield.core import disk_space, files, leftovers, live_runs
 from lightfield.core.errors import UserError
@@ -45,19 +42,6 @@ rigs:
     cameras: [2, 1]
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
-
-# Stands in for the program that builds a scene. It writes the number of the process group of
-# Snakemake and its jobs. Then it waits until the test lets it go on.
-WAITING = """
-import os, sys, time
-from pathlib import Path
-Path("starting").write_text(str(os.getpgrp()))
-Path("starting").rename("started")
-while not Path("go").exists():
-    time.sleep(0.05)
-Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
-"""
-BUILD = ("--config", "scenes=one", "rigs=all", "preset=full", "--", "work/one/scene.blend")
 
 # Starts a run that lives until it is killed, and one of its jobs.
 RUN = """
@@ -479,125 +463,3 @@ def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch,
     others = live_runs.enter(folder, False, lambda: pytest.fail("removed the locks"))
     assert others == []
     assert len(list(folder.iterdir())) == 1
-
-
-@pytest.fixture
-def real_jobs(monkeypatch):
-    """Run the jobs of forks as real children of Snakemake, which share its locks."""
-    monkeypatch.setenv(forks.PYTHON_OF_JOBS, sys.executable)
-
-
-@pytest.fixture(params=["checkout", "own folder"])
-def building(request, tmp_path, real_jobs, in_forks):
-    """A folder with a run that waits for its job, the process, the run's number, and a function.
-
-    The process stands for the run, which is a fork. The function runs Snakemake there.
-    """
-    folder, arguments = checkout(tmp_path / "checkout", one=ONE), BUILD
-    (folder / "scripts/build_scene.py").write_text(WAITING)
-    if request.param == "own folder":
-        own_folder = tmp_path / "own"
-        (own_folder / "configs").mkdir(parents=True)
-        (folder / "configs/scenes").rename(own_folder / "configs/scenes")
-        shutil.copytree(own_folder / "configs/scenes", folder / "configs/scenes")
-        arguments = ("--snakefile", folder / "Snakefile", "--directory", own_folder, *BUILD)
-        folder = own_folder
-    else:
-        arguments = ("--directory", folder, *BUILD)
-    process = start_snakemake(tmp_path / "checkout", *arguments, stderr=subprocess.PIPE, text=True)
-    wait_until((folder / "started").exists, process)
-
-    def run(*more, target=None):
-        given = (*arguments[:-1], target) if target else arguments
-        return snakemake(tmp_path / "checkout", *more, *given)
-
-    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *arguments, **options)
-    number = int((folder / "started").read_text())
-    yield folder, process, number, run
-    (folder / "go").touch()
-    with suppress(ProcessLookupError):
-        os.killpg(number, signal.SIGKILL)
-    process.wait()
-
-
-def last_line(run):
-    return (run.stdout + run.stderr).splitlines()[-1]
-
-
-@pytest.mark.slow
-def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(building):
-    folder, process, number, run = building
-    refusal = f"error: another run makes these files, process {number}: wait for it, or end"
-    second = run()
-    assert second.returncode != 0
-    assert last_line(second).startswith(refusal)
-    assert "Traceback" not in second.stdout + second.stderr
-    assert "locked" not in (dry := run("--dry-run")).stderr and dry.returncode == 0
-    # A run that makes no files leaves the build its locks.
-    for options in ((), ("--nolock",)):
-        status = run(*options, target="status")
-        assert status.returncode == 0, status.stderr
-    assert last_line(run()).startswith(refusal)
-    (folder / "go").touch()
-    assert process.wait() == 0
-    assert run().returncode == 0
-
-
-@pytest.mark.slow
-def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
-    folder, process, number, run = building
-    os.killpg(number, signal.SIGKILL)
-    process.wait()
-    (folder / "go").touch()
-    following = run()
-    assert following.returncode == 0, following.stderr
-    assert "waiting for jobs" not in following.stderr
-    assert (folder / "work/one/scene.blend").read_text() == "a scene"
-
-
-@pytest.mark.slow
-def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp_path):
-    folder, process, number, run = building
-    os.kill(number, signal.SIGKILL)
-    process.wait()
-    log = tmp_path / "terminal.log"
-    with log.open("w") as terminal:
-        following = run.start(stdout=terminal, stderr=terminal)
-    waiting = "waiting for jobs that a killed run has left"
-    wait_until(lambda: waiting in log.read_text(), following, log=log)
-    (folder / "go").touch()
-    assert following.wait() == 0, log.read_text()
-    assert (folder / "work/one/scene.blend").read_text() == "a scene"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("building", ["checkout"], indirect=True)
-def test_a_stopped_run_says_so_and_the_next_one_continues(building):
-    folder, process, number, run = building
-    os.kill(number, signal.SIGTERM)
-    said = process.stderr.readline()
-    while "stopping after SIGTERM" not in said:
-        said = process.stderr.readline()
-        assert said, "it ended without a message"
-    (folder / "go").touch()
-    *_, last = process.stderr.read().splitlines()
-    assert process.wait() != 0
-    assert last.startswith("error: the run was stopped") and last.endswith("goes on")
-    assert (folder / "work/one/scene.blend").read_text() == "a scene"
-    assert run().returncode == 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("building", ["checkout"], indirect=True)
-def test_the_locks_of_another_machine_are_left_to_the_user(building):
-    folder, process, number, run = building
-    os.killpg(number, signal.SIGKILL)
-    process.wait()
-    (folder / "go").touch()
-    (note,) = (folder / ".snakemake/locks").glob("*.here")
-    note.rename(note.with_name(note.name.replace(socket.gethostname(), "elsewhere")))
-    refused = run()
-    assert refused.returncode != 0
-    assert last_line(refused).endswith("if it no longer runs: snakemake --unlock")
-    assert run("--unlock").returncode == 0
-    assert run().returncode == 0
