@@ -3,8 +3,11 @@
 Snakemake has nothing to do in it. If a test damages a file, Snakemake must plan it again.
 """
 
+import json
 import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import bookkeeping
 import numpy as np
@@ -14,6 +17,7 @@ from lightfield.core.files import sha256, write_json, write_text
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 
 WHEN = 1_700_000_000
@@ -96,3 +100,29 @@ def _write(path: Path, number: int) -> None:
             images.write_exr(path, {"R": np.full((4, 4), number, np.float16)})
         case _:
             write_text(path, f"{path.name} {number}\n")
+
+
+def put(path: Path, content: Any) -> None:
+    """Write a text, or other content as JSON."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+
+
+def write_one_view(folder: Path) -> None:
+    """Write a dataset of one view, and its file of checksums."""
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
+    rig = {"type": "plane", "cameras": [1, 1]}
+    LightField.from_rig(rig, lens).write(folder / "lightfield.json")
+    put(folder / "validation.json", {"valid": True})
+    files = ["exr/view_0000f.exr", "transforms.json", "depth.png"]
+    files += ["exports/colmap/export.json", "exports/colmap/sparse/points.txt"]
+    for name in files:
+        put(folder / name, f'{{"name": "{folder}/{name}"}}')
+    write_checksums(folder, [*files, "lightfield.json", "validation.json"])
+    put(folder / "report/page.html", "a page")
+
+
+def write_checksums(folder: Path, names: Iterable[str]) -> None:
+    """Write the checksums of these files of a dataset."""
+    lines = [f"{sha256(folder / name)}  {name}\n" for name in sorted(names)]
+    put(folder / "sha256sums.txt", "".join(lines))

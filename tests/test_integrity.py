@@ -1,83 +1,29 @@
-"""Verify: it finds and names every fault in every kind of file, and runs repair it."""
+"""Integrity: which lists name a fault in a file of a dataset, and what is removed to mend it."""
 
 import errno
 import hashlib
 import json
 import os
-import random
-import shutil
 from pathlib import Path
 
+import bookkeeping
 import pytest
 import simulated
 from checkouts import checkout
+from simulated import put, write_checksums
 
 from lightfield.core.files import sha256
-from lightfield.dataset.lightfield import LightField
-from lightfield.geometry import lenses
 from lightfield.validation import integrity
 from lightfield.validation.integrity import Integrity
-from soak import KINDS, replace, spoil
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    root = checkout(tmp_path_factory.mktemp("verify"))
-    return root, simulated.build(root)
 
 
 @pytest.fixture
-def copy(built, tmp_path, monkeypatch):
-    """A copy of the build, which is the current folder, and its datasets."""
-    root = Path(shutil.copytree(built[0], tmp_path / "plenoforge", copy_function=os.link))
-    for name in ("results", "work"):
-        shutil.rmtree(root / name)
-        shutil.copytree(built[0] / name, root / name)
+def copy(tmp_path, monkeypatch):
+    """The datasets of a simulated build, which is the current folder."""
+    root = checkout(tmp_path / "plenoforge")
+    datasets = simulated.build(root)
     monkeypatch.chdir(root)
-    return built[1]
-
-
-def faults(datasets, work="work"):
-    return {
-        str(fault.path): fault
-        for dataset in datasets
-        for fault in Integrity(Path(dataset.folder), Path(work) if work else None).faults()
-    }
-
-
-def own_files(*folders):
-    """Return the files that jobs made. Leaves out the index, which belongs to no single dataset."""
-    paths = [path for name in folders for path in sorted(Path(name).rglob("*")) if path.is_file()]
-    return [
-        path
-        for path in paths
-        if path not in (Path("work/ledger.txt"), Path("results/index.html"))
-        and "settings" not in path.parts
-        and not path.name.endswith(".lock")
-    ]
-
-
-def test_a_build_and_its_copy_have_no_fault(copy):
-    assert faults(copy) == {}
-    assert faults(copy, work=None) == {}
-
-
-def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
-    rng = random.Random(2)
-    for dataset in copy:
-        files = [path for path in own_files(dataset.folder) if "report" not in path.parts]
-        # The file of checksums has two faults. Only one is named.
-        chosen = rng.sample([path for path in files if path.name != "sha256sums.txt"], 6)
-        for path in chosen:
-            spoil(path, rng.choice(KINDS), rng)
-        assert faults([dataset], work=None).keys() == {str(path) for path in chosen}
-
-
-def test_a_name_that_leaves_the_dataset_is_not_its_file(copy):
-    with Path(copy[0].folder, "sha256sums.txt").open("a") as sums:
-        for name in ("../outside.txt", "exr/../../outside.txt", "/outside.txt", ""):
-            sums.write(f"{'0' * 64}  {name}\n")
-    assert faults(copy[:1], work=None) == {}
+    return datasets
 
 
 def test_a_damaged_ledger_is_named_and_written_anew(copy):
@@ -85,74 +31,16 @@ def test_a_damaged_ledger_is_named_and_written_anew(copy):
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([lines[0].replace("0", "1", 1), *lines[1:]]))
     for dataset in copy:
-        assert "work/ledger.txt" in faults([dataset])
+        assert "work/ledger.txt" in problems_of(dataset.name)
     absolute = Integrity(Path(copy[0].folder).absolute(), Path("work").absolute())
     damaged = next(fault for fault in absolute.faults() if fault.path.name == "ledger.txt")
     assert "1" in damaged.problem
     absolute.mend(damaged)
     assert path.read_text() == "".join(lines[1:])
-    assert "work/ledger.txt" not in faults(copy)
-
-
-def test_repaired_files_are_planned_and_no_others(copy, run_program):
-    first, second, third = copy
-    view = next(Path(first.folder, "exr").iterdir())
-    picture = next(Path(second.folder, "perspective").glob("*.png"))
-    spoilt = {
-        str(view): first.record("render", *first.shards[0]),
-        str(picture): second.record("perspective", *second.shards[0]),
-        f"{second.work}/perspective/lens_map.npy": f"{second.work}/perspective/lens_map.npy",
-        f"{first.folder}/report/rig.svg": f"{first.folder}/report/rig.svg",
-        second.record("render", *second.shards[0]): second.record("render", *second.shards[0]),
-    }
-    rng = random.Random(3)
-    for name in spoilt:
-        spoil(Path(name), replace, rng)
-    Path(first.folder, "notes.txt").write_text("a stray")
-    arguments = ("verify.py", first.folder, second.folder, third.folder)
-    result = run_program(*arguments, "--work", "work", check=False)
-    assert result.returncode == 1
-    assert sorted(line.split(": ")[0] for line in result.stdout.splitlines()) == sorted(
-        [*spoilt, f"{first.folder}/notes.txt"]
-    )
-    result = run_program(*arguments, "--work", "work", "--mend", check=False)
-    assert result.stderr == (
-        f"error: 6 faults in {', '.join(arguments[1:])}; the next run makes them again\n"
-    )
-    planned = simulated.planned(Path(), "smoke")
-    assert set(spoilt.values()) <= planned
-    assert not any(name.startswith((third.folder, third.work)) for name in planned)
-    assert second.inventory not in planned and second.blend not in planned
-    assert f"{second.folder}/lightfield.json" not in planned
-    assert Path("work/removed", first.folder, "notes.txt").read_text() == "a stray"
+    assert not any("work/ledger.txt" in problems_of(dataset.name) for dataset in copy)
 
 
 # ---- a dataset of one view, alone and as a frame of a sequence ------------------------------
-
-
-def put(path, content):
-    """Write a text, or other content as JSON."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
-
-
-def published(folder):
-    """Write a dataset of one view, and its file of checksums."""
-    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
-    rig = {"type": "plane", "cameras": [1, 1]}
-    LightField.from_rig(rig, lens).write(folder / "lightfield.json")
-    put(folder / "validation.json", {"valid": True})
-    files = ["exr/view_0000f.exr", "transforms.json", "depth.png"]
-    files += ["exports/colmap/export.json", "exports/colmap/sparse/points.txt"]
-    for name in files:
-        put(folder / name, f'{{"name": "{folder}/{name}"}}')
-    write_checksums(folder, [*files, "lightfield.json", "validation.json"])
-    put(folder / "report/page.html", "a page")
-
-
-def write_checksums(folder, names):
-    lines = [f"{sha256(folder / name)}  {name}\n" for name in sorted(names)]
-    put(folder / "sha256sums.txt", "".join(lines))
 
 
 def write_work_files(name):
@@ -194,7 +82,7 @@ def small(request, tmp_path, monkeypatch):
     name = request.param
     noted = []
     for dataset_name in (name, f"{name[:-1]}2", "scene_near/other"):
-        published(Path("results", dataset_name))
+        simulated.write_one_view(Path("results", dataset_name))
         noted += write_work_files(dataset_name)
         listed = ("exr/view_0000f.exr", "exports/colmap/sparse/points.txt", "depth.png")
         present = [path for path in Path("results", dataset_name).rglob("*") if path.is_file()]
@@ -206,7 +94,7 @@ def small(request, tmp_path, monkeypatch):
     for path in map(Path, OF_SCENE + OF_OTHERS):
         put(path, {"of": str(path)})
         noted.append(path)
-    simulated.note(sorted({str(path) for path in noted}))
+    bookkeeping.note(sorted({str(path) for path in noted}))
     return name
 
 
@@ -254,40 +142,17 @@ def test_the_list_that_a_file_disagrees_with_is_named(small):
         (folder / name).write_bytes(content)
 
 
-def test_a_copys_own_lists_must_agree(small):
+def test_a_dataset_that_is_not_valid_is_named(small):
     folder = Path("results", small)
-    right = (folder / "validation.json").read_text()
-    put(folder / "validation.json", {"valid": False})
-    assert problems_of(small, None)[f"{folder}/validation.json"].startswith("its sha256 is")
-    put(folder / "validation.json", right)
-    sums = f"{folder}/sha256sums.txt"
-    listed = [line.split("  ")[1] for line in Path(sums).read_text().splitlines()]
-    for missing in ("validation.json", "lightfield.json", "exr/view_0000f.exr"):
-        write_checksums(folder, [name for name in listed if name != missing])
-        assert problems_of(small, None) == {
-            f"{folder}/{missing}": "is not a file of this dataset, or has no checksum",
-            sums: f"has no checksum of {missing}",
-        }
-    write_checksums(folder, listed)
-    for name in ("README.md", "card.json"):
-        (folder / name).write_text("of a package")
-    assert problems_of(small, None) == {}
+    sums = folder / "sha256sums.txt"
+    listed = [line.split("  ")[1] for line in sums.read_text().splitlines()]
     put(folder / "validation.json", {"valid": False})
     write_checksums(folder, listed)
+    work_sums = Path(f"work/{small}/checksums.txt")
+    work_sums.write_text(sums.read_text())
+    bookkeeping.note([f"{folder}/validation.json", str(sums), str(work_sums)])
     invalid = {f"{folder}/validation.json": "says that the dataset is not valid"}
-    assert problems_of(small, None) == invalid
-    written = [f"{folder}/validation.json", sums, f"work/{small}/checksums.txt"]
-    Path(written[-1]).write_text(Path(sums).read_text())
-    simulated.note(written)
-    # A run that adds a package notes its files.
-    added = {f"{folder}/{name}" for name in ("README.md", "card.json")}
-    problems = problems_of(small)
-    assert {path: problem for path, problem in problems.items() if path not in added} == invalid
-    for text, problem in (("no sums\n", "has no checksum"), ("", "is empty"), (None, "is missing")):
-        Path(sums).unlink()
-        if text is not None:
-            Path(sums).write_text(text)
-        assert problems_of(small, None) == {sums: problem}
+    assert problems_of(small) == invalid
 
 
 def test_any_remaining_list_is_enough_for_a_view(small):
@@ -295,7 +160,7 @@ def test_any_remaining_list_is_enough_for_a_view(small):
     view = Path("results", small, "exr/view_0000f.exr")
     log = Path("work", small, "render/0-1.sums.jsonl")
     log.write_text(json.dumps({"file": "exr/view_0000f.exr", "sha256": sha256(view)}))
-    simulated.note([str(log)])
+    bookkeeping.note([str(log)])
     view.write_bytes(b"spoilt")
     lists = [view.parents[1] / "sha256sums.txt", Path("work", small, "checksums.txt")]
     lists += [log.with_name("0-1.json"), log]
@@ -317,13 +182,6 @@ def test_an_unreadable_file_is_a_fault(small, monkeypatch):
     monkeypatch.setattr(integrity, "sha256", failing)
     image = f"results/{small}/depth.png"
     assert problems_of(small) == {image: "cannot be read: Input/output error"}
-
-
-def test_a_copy_is_checked_from_its_own_folder(small, monkeypatch):
-    monkeypatch.chdir(Path("results", small))
-    assert list(Integrity(Path()).faults()) == []
-    Path("depth.png").write_bytes(b"spoilt")
-    assert [str(fault.path) for fault in Integrity(Path()).faults()] == ["depth.png"]
 
 
 def test_without_a_ledger_only_published_files_have_a_checksum(small):
@@ -370,22 +228,3 @@ def test_history_that_was_set_aside_is_not_missed(small):
     integrity.mend(fault)
     assert problems_of(small) == {}
     assert not path.exists() and Path("work/removed", path).read_bytes() == b"spoilt"
-
-
-@pytest.mark.slow
-def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
-    first, second, third = copy
-    shutil.rmtree(".snakemake")
-    scene = Path("configs/scenes/smoke.yaml")
-    text = scene.read_text()
-    # The checkout's files are links to the repository's own.
-    scene.unlink()
-    scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
-    planned = simulated.planned(Path(), "smoke")
-    assert {f"{second.folder}/lightfield.json", *second.all_records} <= planned
-    others = {name for name in planned if name.startswith((first.folder, third.folder))}
-    # A page shows the scene YAML.
-    assert others == {first.page, third.page}
-    scene.write_text(text.replace("samples: 4", "samples: 2"))
-    planned = simulated.planned(Path(), "smoke")
-    assert all({f"{d.folder}/lightfield.json", *d.all_records} <= planned for d in copy)

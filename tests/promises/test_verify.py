@@ -1,0 +1,160 @@
+"""Verify: it finds and names every fault in every kind of file, and runs repair it."""
+
+import os
+import random
+import shutil
+from pathlib import Path
+
+import bookkeeping
+import pytest
+import simulated
+from checkouts import checkout
+from simulated import put, write_checksums, write_one_view
+
+from soak import KINDS, replace, spoil
+
+SUMS = "sha256sums.txt"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    root = checkout(tmp_path_factory.mktemp("verify"))
+    return root, simulated.build(root)
+
+
+@pytest.fixture
+def copy(built, tmp_path, monkeypatch):
+    """A copy of the build, which is the current folder, and its datasets."""
+    root = Path(shutil.copytree(built[0], tmp_path / "plenoforge", copy_function=os.link))
+    for name in ("results", "work"):
+        shutil.rmtree(root / name)
+        shutil.copytree(built[0] / name, root / name)
+    monkeypatch.chdir(root)
+    return built[1]
+
+
+def faults(datasets, work="work"):
+    return bookkeeping.problems((dataset.folder for dataset in datasets), work)
+
+
+def test_a_build_and_its_copy_have_no_fault(copy):
+    assert faults(copy) == {}
+    assert faults(copy, work=None) == {}
+
+
+def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
+    rng = random.Random(2)
+    for dataset in copy:
+        files = [path for path in sorted(Path(dataset.folder).rglob("*")) if path.is_file()]
+        # A copy has no checksums of its report, and none of the checksums.
+        published = [path for path in files if "report" not in path.parts and path.name != SUMS]
+        chosen = rng.sample(published, 6)
+        for path in chosen:
+            spoil(path, rng.choice(KINDS), rng)
+        assert faults([dataset], work=None).keys() == {str(path) for path in chosen}
+
+
+def test_a_name_that_leaves_the_dataset_is_not_its_file(copy):
+    with Path(copy[0].folder, SUMS).open("a") as sums:
+        for name in ("../outside.txt", "exr/../../outside.txt", "/outside.txt", ""):
+            sums.write(f"{'0' * 64}  {name}\n")
+    assert faults(copy[:1], work=None) == {}
+
+
+@pytest.fixture
+def one_view(tmp_path, monkeypatch):
+    """The folder of a copied dataset of one view."""
+    monkeypatch.chdir(tmp_path)
+    write_one_view(Path("copied/rig"))
+    return Path("copied/rig")
+
+
+def problems_of(folder):
+    return bookkeeping.problems([folder], work=None)
+
+
+def test_a_copys_own_lists_must_agree(one_view):
+    right = (one_view / "validation.json").read_text()
+    put(one_view / "validation.json", {"valid": False})
+    assert problems_of(one_view)[f"{one_view}/validation.json"].startswith("its sha256 is")
+    put(one_view / "validation.json", right)
+    sums = one_view / SUMS
+    listed = [line.split("  ")[1] for line in sums.read_text().splitlines()]
+    for missing in ("validation.json", "lightfield.json", "exr/view_0000f.exr"):
+        write_checksums(one_view, [name for name in listed if name != missing])
+        assert problems_of(one_view) == {
+            f"{one_view}/{missing}": "is not a file of this dataset, or has no checksum",
+            str(sums): f"has no checksum of {missing}",
+        }
+    write_checksums(one_view, listed)
+    for name in ("README.md", "card.json"):
+        (one_view / name).write_text("of a package")
+    assert problems_of(one_view) == {}
+    put(one_view / "validation.json", {"valid": False})
+    write_checksums(one_view, listed)
+    invalid = {f"{one_view}/validation.json": "says that the dataset is not valid"}
+    assert problems_of(one_view) == invalid
+    for text, problem in (("no sums\n", "has no checksum"), ("", "is empty"), (None, "is missing")):
+        sums.unlink()
+        if text is not None:
+            sums.write_text(text)
+        assert problems_of(one_view) == {str(sums): problem}
+
+
+def test_a_copy_is_checked_from_its_own_folder(one_view, monkeypatch):
+    monkeypatch.chdir(one_view)
+    assert problems_of(".") == {}
+    Path("depth.png").write_bytes(b"spoilt")
+    assert problems_of(".").keys() == {"depth.png"}
+
+
+def test_repaired_files_are_planned_and_no_others(copy, run_program):
+    first, second, third = copy
+    view = next(Path(first.folder, "exr").iterdir())
+    picture = next(Path(second.folder, "perspective").glob("*.png"))
+    spoilt = {
+        str(view): first.record("render", *first.shards[0]),
+        str(picture): second.record("perspective", *second.shards[0]),
+        f"{second.work}/perspective/lens_map.npy": f"{second.work}/perspective/lens_map.npy",
+        f"{first.folder}/report/rig.svg": f"{first.folder}/report/rig.svg",
+        second.record("render", *second.shards[0]): second.record("render", *second.shards[0]),
+    }
+    rng = random.Random(3)
+    for name in spoilt:
+        spoil(Path(name), replace, rng)
+    Path(first.folder, "notes.txt").write_text("a stray")
+    arguments = ("verify.py", first.folder, second.folder, third.folder)
+    result = run_program(*arguments, "--work", "work", check=False)
+    assert result.returncode == 1
+    assert sorted(line.split(": ")[0] for line in result.stdout.splitlines()) == sorted(
+        [*spoilt, f"{first.folder}/notes.txt"]
+    )
+    result = run_program(*arguments, "--work", "work", "--mend", check=False)
+    assert result.stderr == (
+        f"error: 6 faults in {', '.join(arguments[1:])}; the next run makes them again\n"
+    )
+    planned = simulated.planned(Path(), "smoke")
+    assert set(spoilt.values()) <= planned
+    assert not any(name.startswith((third.folder, third.work)) for name in planned)
+    assert second.inventory not in planned and second.blend not in planned
+    assert f"{second.folder}/lightfield.json" not in planned
+    assert Path("work/removed", first.folder, "notes.txt").read_text() == "a stray"
+
+
+@pytest.mark.slow
+def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
+    first, second, third = copy
+    shutil.rmtree(".snakemake")
+    scene = Path("configs/scenes/smoke.yaml")
+    text = scene.read_text()
+    # The checkout's files are links to the repository's own.
+    scene.unlink()
+    scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
+    planned = simulated.planned(Path(), "smoke")
+    assert {f"{second.folder}/lightfield.json", *second.all_records} <= planned
+    others = {name for name in planned if name.startswith((first.folder, third.folder))}
+    # A page shows the scene YAML.
+    assert others == {first.page, third.page}
+    scene.write_text(text.replace("samples: 4", "samples: 2"))
+    planned = simulated.planned(Path(), "smoke")
+    assert all({f"{d.folder}/lightfield.json", *d.all_records} <= planned for d in copy)
