@@ -3,6 +3,8 @@
 A point's colour follows from its place.
 """
 
+import json
+
 import numpy as np
 
 from lightfield.dataset.lightfield import LightField
@@ -57,6 +59,16 @@ def look(lens, matrix):
     distance = -along + np.sqrt(along**2 + RADIUS**2 - matrix[:3, 3] @ matrix[:3, 3])
     colour = decode_srgb(colour_of(matrix[:3, 3] + rays * distance[..., None]) / 255)
     return np.nan_to_num(colour), distance
+
+
+def make_transparent(folder, alpha):
+    """Say that a scene covers this part of all pixels of the views in ``folder``."""
+    path = folder / "lightfield.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"render": {"transparent": True}}))
+    for view in [*folder.glob("*.exr"), *folder.glob("exr/*.exr")]:
+        image = images.read_image(view)
+        covered = np.full(image.channels["Z"].shape, alpha, np.float16)
+        images.write_exr(view, image.channels | {"A": covered}, image.attributes)
 
 
 def look_at_ball(lens, matrix):

@@ -16,7 +16,7 @@ import OpenEXR
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
-from sphere import LENSES, RADIUS, colour_of, look, write_views
+from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -735,6 +735,21 @@ def ncore_poses(folder):
 
 
 MOTION = {"travel": [0.2, 0, 0.1], "turn": [0, 20, 5]}
+
+
+def test_ncore_shows_a_transparent_view_in_front_of_black(tmp_path):
+    """Light that is multiplied by alpha is that in front of black. NCore has no alpha."""
+    pictures = []
+    for name in ("transparent", "black"):
+        folder = tmp_path / name / "dataset"
+        write_views(folder, LENSES["perspective"], RIG)
+        if name == "transparent":
+            make_transparent(folder, 0.25)
+        made = exported(folder, "ncore", "views", tmp_path / name, points=50)
+        views = sorted(made.glob("**/frames/*/image/0"))
+        pictures.append([cv2.imdecode(np.fromfile(view, np.uint8), -1) for view in views])
+    assert len(pictures[0]) == 12
+    assert np.abs(np.subtract(*np.array(pictures, int))).max() <= 1
 
 
 def test_an_ncore_frame_of_a_blurred_view_is_the_middle_of_its_exposure(tmp_path):

@@ -7,7 +7,16 @@ import struct
 import cv2
 import numpy as np
 import pytest
-from sphere import BALL, BALL_RADIUS, LENSES, RADIUS, look, look_at_ball, write_views
+from sphere import (
+    BALL,
+    BALL_RADIUS,
+    LENSES,
+    RADIUS,
+    look,
+    look_at_ball,
+    make_transparent,
+    write_views,
+)
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -152,6 +161,26 @@ def test_neural_3d_video_has_a_video_and_a_pose_for_each_camera(sequence, tmp_pa
     again = exported(sequence / "split", "neural_3d_video", tmp_path / "again", points=300)
     for path in videos:
         assert (again / path.name).read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "picture"),
+    [("neural_3d_video", "cam00.mp4"), ("multipleview", "cam01/frame_00001.jpg")],
+)
+def test_pictures_without_alpha_show_transparent_views_in_front_of_black(tmp_path, name, picture):
+    """Light that is multiplied by alpha is that in front of black."""
+    shown = []
+    for kind in ("transparent", "black"):
+        (tmp_path / kind).mkdir()
+        write_sequence(tmp_path / kind, RIG)
+        if kind == "transparent":
+            for frame in (tmp_path / kind).iterdir():
+                make_transparent(frame, 0.25)
+                make_transparent(frame / "perspective", 0.25)
+        folder = exported(tmp_path / kind, name, tmp_path / f"{kind}_export")
+        shown.append(cv2.VideoCapture(str(folder / picture)).read()[1])
+    # Videos and JPEGs round.
+    assert np.abs(np.subtract(*np.array(shown, int))).max() <= 4
 
 
 def read_points3d(path):

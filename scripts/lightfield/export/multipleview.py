@@ -44,5 +44,5 @@ def export(source: SourceSequence, settings: MultipleView, folder: Path) -> None
         for view in frame.lightfield.views:
             camera = view.name.removeprefix("image").zfill(2)
             picture = folder / f"cam{camera}" / f"frame_{number:05d}.jpg"
-            images.write_jpeg(picture, frame.colour(view))
+            images.write_jpeg(picture, frame.opaque(view))
         progress.done()

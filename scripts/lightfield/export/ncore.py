@@ -258,6 +258,6 @@ def _write_frames(store: ZarrStore, source: SourceDataset, frames: Sequence[_Fra
             store.array(f"{place}/generic_data/mask", valid.astype(np.uint8) * 255)
         # gsplat takes three channels.
         picture = store.folder / f"{view.name}.png"
-        images.write_png(picture, source.colour(view))
+        images.write_png(picture, source.opaque(view))
         store.encoded(f"{place}/image", picture, {"format": "png"})
         progress.done()

@@ -49,7 +49,7 @@ def export(source: SourceSequence, settings: Neural3dVideo, folder: Path) -> Non
         }
         for frame in sequence.frames:
             for view, surface in frame.surfaces(frame.lightfield.views):
-                add_picture[view.name](frame.colour(view))
+                add_picture[view.name](frame.opaque(view))
                 seen_depths[view.name].append(depths(lens, view, surface))
             progress.done()
     write_poses_bounds(folder / "poses_bounds.npy", lens, views, seen_depths)

@@ -136,13 +136,30 @@ class SourceDataset:
             covered *= alpha.astype(np.float32) / scale
         return np.asarray(np.rint(covered * 255), np.uint8)
 
-    def encoded(self, view: View) -> Floats:
-        """Return a view's sRGB-encoded colour (height, width, 3), 0 to 1, not rounded."""
-        if self.suffix == ".png":
-            return self._image(view).encoded
-        from lightfield.imaging.tonemap import encode_srgb, tone_map
+    def opaque(self, view: View) -> NDArray[np.uint8]:
+        """Return a view's sRGB pixels (height, width, 3), for pictures that can have no alpha.
 
-        developed = tone_map(self._image(view).colour, self.exposure, self.reinhard)
+        A transparent view is in front of black.
+        """
+        if not self.lightfield.transparent:
+            return self.colour(view)
+        return np.asarray(np.rint(255 * self.encoded(view)), np.uint8)
+
+    def encoded(self, view: View) -> Floats:
+        """Return a view's sRGB-encoded colour (height, width, 3), 0 to 1, not rounded.
+
+        A transparent view is in front of black.
+        """
+        from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
+
+        image = self._image(view)
+        if self.suffix == ".png" and not self.lightfield.transparent:
+            return image.encoded
+        if self.suffix == ".png":
+            alpha = image.channels["A"] / np.iinfo(image.channels["A"].dtype).max
+            developed = decode_srgb(image.encoded) * alpha[..., np.newaxis]
+        else:
+            developed = tone_map(image.colour, self.exposure, self.reinhard)
         return np.asarray(encode_srgb(developed), np.float64)
 
     def valid(self, view: View) -> Bools:
