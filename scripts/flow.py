@@ -64,12 +64,14 @@ def main() -> None:
         sums = [sha256(source.path(view)), sha256(source.path(neighbour))]
         key = keys.flow_key(lightfield, view, neighbour, sums)
         if not record.is_finished(path, key):
+            neighbour_distance = source.depth(neighbour, "distance")
+            neighbour_distance[images.may_hide(source.path(neighbour))] = np.nan
             motion, visible = flow(
                 source.lens,
                 view.matrix,
                 neighbour.matrix,
                 source.depth(view, "distance"),
-                source.depth(neighbour, "distance"),
+                neighbour_distance,
             )
             planes = [*np.moveaxis(np.nan_to_num(motion), -1, 0), visible]
             channels = {

@@ -33,6 +33,8 @@ PART_VERSION = 1
 BLEND_VERSION = 1
 # The same for those of them with a pass of numbers, which once replaced what shaders read.
 NUMBERS_VERSION = 1
+# The same for transparent views of a scene that may have shadow catchers.
+CATCHERS_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
 MODEL_VERSION = 2
 # The same for models in softboxes.
@@ -104,6 +106,8 @@ def render_key(lightfield: LightField, view: View) -> str:
         key.append(["blend", BLEND_VERSION])
         if any(view_pass.kind == "id" for view_pass in lightfield.passes):
             key.append(["numbers", NUMBERS_VERSION])
+    if lightfield.transparent and _may_have_shadow_catchers(lightfield):
+        key.append(["catchers", CATCHERS_VERSION])
     return _digest(key)
 
 
@@ -111,6 +115,11 @@ def _is_of_blend(lightfield: LightField) -> bool:
     """Return whether the scene is a user's .blend: neither built nor a model."""
     scene = lightfield.content.get("scene", {})
     return "fingerprint" in scene and not scene.keys() & {"builder", "unit"}
+
+
+def _may_have_shadow_catchers(lightfield: LightField) -> bool:
+    """Return whether the scene is a user's .blend, or a model on a ground."""
+    return _is_of_blend(lightfield) or lightfield.content.get("scene", {}).get("ground", False)
 
 
 def renders_part(lightfield: LightField) -> bool:

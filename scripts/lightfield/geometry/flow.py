@@ -49,9 +49,10 @@ def flow(
     """Return the flow (h, w, 2) from one view to another, and where (h, w) its point is visible.
 
     Flow is in pixels, x right and y down. The matrices (4, 4) are camera-to-world. The distances
-    (h, w) are along the ray, in metres, and inf where a ray hits nothing. Flow is NaN where the
-    lens has no ray, or where the other view has no ray to the point. A point is visible if it is in
-    the other view's frame, and if no surface hides it there.
+    (h, w) are along the ray, in metres, and inf where a ray hits nothing. The other view's distance
+    is NaN where it hides all points. Flow is NaN where the lens has no ray, or where the other view
+    has no ray to the point. A point is visible if it is in the other view's frame, and if nothing
+    hides it there.
     """
     rays = lens.pixel_rays() @ matrix[:3, :3].T
     far = np.isinf(distance)

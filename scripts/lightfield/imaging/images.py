@@ -35,6 +35,12 @@ MACHINE_ATTRIBUTE = "plenoforge:machine"
 CLAMPED_ATTRIBUTE = "plenoforge:clamped"
 # How many values were not a number.
 NAN_ATTRIBUTE = "plenoforge:nan"
+# In how many pixels the first surface is a shadow catcher that the picture does not show. Only
+# transparent views of scenes with shadow catchers have it.
+UNSHOWN_ATTRIBUTE = "plenoforge:unshown"
+
+# What covers a smaller part of a pixel counts as absent.
+LEAST_ALPHA = 1e-3
 
 HALF_MAX = 65504.0
 
@@ -212,6 +218,17 @@ def read_image(
     if missing_channels:
         raise UserError(f"{path}: has no channel {missing_channels[0]}; it has {', '.join(names)}")
     return image
+
+
+def may_hide(path: Path) -> np.ndarray[Any, Any]:
+    """Return where (height, width) a view shows nothing, and may hide what other views see.
+
+    Shadow catchers hide what is behind them, although the picture does not show them there.
+    """
+    header = read_header(path)
+    if not header.attributes.get(UNSHOWN_ATTRIBUTE):
+        return np.zeros((header.height, header.width), bool)
+    return np.asarray(read_image(path, ["A"]).channels["A"] < LEAST_ALPHA)
 
 
 def attribute(path: Path, name: str) -> Attribute | None:

@@ -7,12 +7,13 @@ transparency cuts out do not, as in the colour. Neither do fog, smoke and other 
 
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
 
+from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering import ids, instances, volumes
 from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
 from lightfield.rendering.render_graph import changed
@@ -20,9 +21,6 @@ from lightfield.rendering.view import Array, render_view
 
 # Cycles gives this depth to a ray that hits nothing.
 MISS = 1e10
-
-# A surface with less opacity than this is cut out by transparency.
-OPACITY = 1e-3
 
 _SAMPLING = {
     "samples": 1,
@@ -51,6 +49,8 @@ class Geometry:
       if not requested.
     - ``motion`` (height, width, 4): float32, the offsets x, y to the surface's places in the
       previous and in the next frame. In pixels, to the right and down. None if not requested.
+    - ``alpha`` (height, width): float32, how much of the surface the picture shows, by one sample.
+      None if not requested.
     - ``render_seconds``, ``synchronization_seconds``: as Cycles measured them.
 
     All but the depth are 0 for a miss.
@@ -62,20 +62,45 @@ class Geometry:
     materials: Array
     instances: Array | None
     motion: Array | None
+    alpha: Array | None
     render_seconds: float
     synchronization_seconds: float
 
+    def without(self, where: Array) -> "Geometry":
+        """Return a copy with a miss at each of the pixels ``where`` (height, width)."""
+        return replace(
+            self,
+            depth=np.where(where, np.float32(np.inf), self.depth),
+            normal=cleared(self.normal, where),
+            objects=cleared(self.objects, where),
+            materials=cleared(self.materials, where),
+            instances=None if self.instances is None else cleared(self.instances, where),
+            motion=None if self.motion is None else cleared(self.motion, where),
+        )
 
-def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = False) -> Geometry:
+
+def cleared(pixels: Array, where: Array) -> Array:
+    """Return a copy of ``pixels`` (height, width, …) that is 0 at the pixels ``where``."""
+    copy = pixels.copy()
+    copy[where] = 0
+    return copy
+
+
+def render_geometry(
+    world_matrix: Array, motion: bool = False, apart: bool = False, alpha: bool = False
+) -> Geometry:
     """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees.
 
-    ``motion`` adds the motion, ``apart`` the instances. Cycles must be set up for both.
+    ``motion`` adds the motion, ``apart`` the instances, ``alpha`` the alpha. Cycles must be set up
+    for them.
     """
     geometry_passes = dict(GEOMETRY_PASSES)
     if motion:
         geometry_passes |= _MOTION
     with _geometry_settings(geometry_passes):
         cycles_passes = geometry_passes | (instances.CYCLES_PASSES if apart else {})
+        if alpha:
+            cycles_passes = cycles_passes | {"Combined": "RGBA"}
         rendered = render_view(world_matrix, 0, cycles_passes)
     depth = rendered.passes["Depth"]
     # Cycles leaves NaN where the lens sees nothing.
@@ -93,6 +118,7 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
         materials,
         instances.decoded(rendered.passes, objects.astype(int)) if apart else None,
         np.where(hit, rendered.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
+        rendered.passes["Combined"][..., 3] if alpha else None,
         rendered.render_seconds,
         rendered.synchronization_seconds,
     )
@@ -112,7 +138,8 @@ def _geometry_settings(passes: Iterable[str]) -> Iterator[None]:
         stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
         for name in passes:
             stack.enter_context(changed(*pass_property(layer, name), True))
-        stack.enter_context(changed(layer, "pass_alpha_threshold", OPACITY))
+        # A surface with less opacity than this is cut out by transparency.
+        stack.enter_context(changed(layer, "pass_alpha_threshold", LEAST_ALPHA))
         stack.enter_context(changed(layer.cycles, "pass_debug_sample_count", False))
         for obj in bpy.data.objects:
             if obj.visible_camera and obj.name_full in volumes.alone():

@@ -7,6 +7,7 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.light_groups import WORLD
+from lightfield.rendering import shadow_catchers
 
 
 def set_up(layer: Any, groups: Mapping[str, Sequence[str]]) -> None:
@@ -15,10 +16,7 @@ def set_up(layer: Any, groups: Mapping[str, Sequence[str]]) -> None:
     An object's group is also that of its instances, its glowing volume, and all its materials.
     Raises `UserError` for a scene whose groups would not add up to the colour.
     """
-    # Lamps have this property, too, with another meaning.
-    surfaces = [obj for obj in bpy.data.objects if obj.type != "LIGHT"]
-    catchers = sorted(obj.name_full for obj in surfaces if obj.is_shadow_catcher)
-    if catchers:
+    if catchers := shadow_catchers.names():
         raise UserError(
             f"render.light_groups: {catchers[0]} is a shadow catcher, whose shadow is in no "
             "light group; turn that off, or leave light_groups out"

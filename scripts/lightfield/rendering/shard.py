@@ -231,12 +231,14 @@ def _render_views(
 class _Rendered:
     """One view as Cycles rendered it. ``geometry`` is None if neither depth nor a pass needs it.
 
-    ``geometry_seconds`` is the time of the geometry's render.
+    ``geometry_seconds`` is the time of the geometry's render. ``unshown_pixels`` is the number of
+    pixels in which `unshown` left a surface out. None if the scene has no shadow catchers.
     """
 
     colour: "Colour"
     geometry: "Geometry | None"
     geometry_seconds: float
+    unshown_pixels: int | None
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -263,7 +265,7 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
 
     ``visible`` are the places of `_visible_places`.
     """
-    from lightfield.rendering import visible_part
+    from lightfield.rendering import shadow_catchers, unshown, visible_part
     from lightfield.rendering.colour_pass import render_colour
     from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
@@ -274,17 +276,21 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     began = time.perf_counter()
     choose_eye(view.name)
     part = visible_part.choose(visible, view.matrix, lightfield.lens)
+    catches = lightfield.transparent and bool(shadow_catchers.names())
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
     if has_geometry:
-        geometry = render_geometry(view.matrix, "motion" in names, "instance" in names)
+        geometry = render_geometry(view.matrix, "motion" in names, "instance" in names, catches)
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render["seed"], view.name)
     colour = render_colour(view.matrix, seed, view_passes, lightfield.transparent)
+    unshown_pixels = None
+    if catches:
+        colour, geometry, unshown_pixels = unshown.left_out(colour, geometry, view_passes)
     if part:
         colour = replace(colour, pixels=part.in_whole(colour.pixels, 0))
         geometry = geometry and replace(geometry, depth=part.in_whole(geometry.depth, np.inf))
-    return _Rendered(colour, geometry, geometry_seconds)
+    return _Rendered(colour, geometry, geometry_seconds, unshown_pixels)
 
 
 class _ViewFiles:
@@ -317,6 +323,8 @@ class _ViewFiles:
         if geometry and lightfield.depth:
             channels["Z"] = depth_channel(geometry.depth, lightfield, self.depth_rays)
             attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
+            if rendered.unshown_pixels is not None:
+                attributes[images.UNSHOWN_ATTRIBUTE] = rendered.unshown_pixels
         contents = [(channels, attributes)]
         contents += [
             pass_channels(view_pass, geometry, colour, lightfield.lens)

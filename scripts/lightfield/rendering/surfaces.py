@@ -13,7 +13,9 @@ from typing import Any
 
 import bpy
 
+from lightfield.core.errors import UserError
 from lightfield.dataset.passes import AOV_PREFIX, INEXACT, Pass
+from lightfield.rendering import shadow_catchers
 
 _PRINCIPLED = "ShaderNodeBsdfPrincipled"
 _DIFFUSE = "ShaderNodeBsdfDiffuse"
@@ -38,10 +40,18 @@ _OPAQUE = 0.999
 
 
 def set_up(layer: Any, passes: Collection[Pass]) -> None:
-    """Make every material of the scene write those of the ``passes`` that are of surfaces."""
+    """Make every material of the scene write those of the ``passes`` that are of surfaces.
+
+    Raises `UserError` for shadow catchers: Cycles adds what they write twice.
+    """
     of_surfaces = {each.name: each for each in passes if each.unless}
     if not of_surfaces:
         return
+    if catchers := shadow_catchers.names():
+        raise UserError(
+            f"render.passes: {catchers[0]} is a shadow catcher, whose values are wrong in "
+            f"{', '.join(of_surfaces)}; turn that off, or leave these passes out"
+        )
     for view_pass in of_surfaces.values():
         for name in view_pass.cycles:
             _add_aov(layer, name, "VALUE" if view_pass.kind == "value" else "COLOR")

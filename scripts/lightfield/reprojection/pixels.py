@@ -15,6 +15,7 @@ from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
+    UNSHOWN_ATTRIBUTE,
     Attribute,
     Header,
     read_header,
@@ -43,13 +44,14 @@ class _Face:
     """One image file of a view: the whole view, or one face of a cube map.
 
     ``colour`` (h, w, 4) is linear float32. ``meaning`` says whether ``depth`` (h, w) is "z" or
-    "distance".
+    "distance". ``unshown`` is the header's `UNSHOWN_ATTRIBUTE`.
     """
 
     colour: Array
     depth: Array | None
     has_alpha: bool
     meaning: Attribute | None
+    unshown: Attribute | None
 
 
 class SourcePixels:
@@ -72,6 +74,7 @@ class SourcePixels:
         # Trust the file first: another program may have written the lightfield.json.
         meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
+        self.unshown = faces[0].unshown
         self.is_relit = False
 
     def light_up(self, light: Light) -> None:
@@ -113,7 +116,13 @@ class SourcePixels:
             colour[alpha == 0] = np.nan
         if depth is not None and depth.dtype != np.float16:
             depth = depth.astype(np.float32, copy=False)
-        return _Face(colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE))
+        return _Face(
+            colour,
+            depth,
+            alpha is not None,
+            image.attributes.get(DEPTH_ATTRIBUTE),
+            image.attributes.get(UNSHOWN_ATTRIBUTE),
+        )
 
     def window(self, lens_map: LensMap) -> tuple[Array, Array | None]:
         """Return the colour and depth that a lens map reads."""
@@ -166,11 +175,13 @@ def write(
     if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
     image = _developed(job, target, lens_map, source, outputs, parameters)
-    attributes = {KEY_ATTRIBUTE: key} | {
-        f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
-    }
+    attributes: dict[str, Attribute] = {KEY_ATTRIBUTE: key}
+    for name, value in job.settings.published.items():
+        attributes[f"plenoforge:{name}"] = str(value)
     if "exr" in outputs and image.depth is not None:
         attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
+        if source.unshown is not None:
+            attributes[UNSHOWN_ATTRIBUTE] = source.unshown
     for kind, path in outputs.items():
         match kind:
             case "exr":

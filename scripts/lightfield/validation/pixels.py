@@ -131,7 +131,8 @@ class Examiner:
         ``questions`` are the numbers of those views, and their patches.
         """
         image_set = self.sets[file.set]
-        depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
+        path = self.dataset / file.path
+        depth = _with_unknown(images.read_image(path, ["Z"]).channels["Z"], path)
         camera = image_set.camera(file.view)
         return [
             consistency.ask(patches, image_set.camera(asking), camera, depth)
@@ -277,6 +278,8 @@ class Examiner:
         target_depth = self._depth(image_set, target)
         if depth is None or target_depth is None:
             return  # Another check reports it.
+        target_path = self.dataset / image_set.folder / f"{image_set.views[target]}.exr"
+        target_depth = _with_unknown(target_depth, target_path)
         camera = image_set.camera(file.view)
         other = image_set.camera(target)
         rows, columns = np.nonzero(np.isfinite(depth) & np.isfinite(flow).all(axis=0))
@@ -511,6 +514,11 @@ def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
     ]
     passed = False if problems else exports.passed
     return replace(exports, passed=passed, problems=exports.problems + problems)
+
+
+def _with_unknown(depth: NDArray[Any], path: Path) -> NDArray[Any]:
+    """Return the ``depth`` of the view at ``path``, with NaN where the view may hide a surface."""
+    return np.where(images.may_hide(path), depth.dtype.type(np.nan), depth)
 
 
 def _hashes(image: images.Image) -> set[float]:
