@@ -33,6 +33,8 @@ PART_VERSION = 1
 BLEND_VERSION = 1
 # The same for those of them with a pass of numbers, which once replaced what shaders read.
 NUMBERS_VERSION = 1
+# The same for mattes of a user's .blend.
+MATTES_VERSION = 1
 # The same for transparent views of a scene that may have shadow catchers.
 CATCHERS_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
@@ -106,6 +108,8 @@ def render_key(lightfield: LightField, view: View) -> str:
         key.append(["blend", BLEND_VERSION])
         if any(view_pass.kind == "id" for view_pass in lightfield.passes):
             key.append(["numbers", NUMBERS_VERSION])
+        if any(view_pass.kind == "matte" for view_pass in lightfield.passes):
+            key.append(["mattes", MATTES_VERSION])
     if lightfield.transparent and _may_have_shadow_catchers(lightfield):
         key.append(["catchers", CATCHERS_VERSION])
     return _digest(key)

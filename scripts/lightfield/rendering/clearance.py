@@ -201,9 +201,9 @@ def enclosures(positions: Floats, box: Floats | None = None) -> list[Enclosure |
             around_each.append(None)
             continue
         hits = _first_hits(position, depsgraph)
-        backs = Counter(hit.obj.name for hit in hits if hit.is_back)
+        backs = Counter(str(hit.obj.name_full) for hit in hits if hit.is_back)
         name, count = backs.most_common(1)[0] if backs else ("", 0)
-        of_object = [hit for hit in hits if hit.obj.name == name]
+        of_object = [hit for hit in hits if hit.obj.name_full == name]
         share = count / _RAYS
         sees_backs = share >= 1 / 3 and count >= 0.75 * len(of_object)
         is_open = sees_backs and _is_within_open(position, of_object[0], depsgraph)

@@ -3,6 +3,7 @@
 import re
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +13,14 @@ import numpy as np
 
 from lightfield.dataset.passes import Pass
 from lightfield.imaging.images import Attribute
+from lightfield.rendering import namesakes
 from lightfield.rendering.cycles import view_layer
-from lightfield.rendering.view import Array, render_view
+from lightfield.rendering.render_graph import changed
+from lightfield.rendering.view import Array, Rendered, render_view
 
 _COUNTS = "Debug Sample Count"
+# For a matte without colour.
+_MATTE_SAMPLING = {"max_bounces": 0, "use_adaptive_sampling": False, "use_denoising": False}
 
 
 @dataclass(frozen=True)
@@ -48,8 +53,12 @@ def render_colour(
     Returns those of the ``passes`` that belong to colour. Cycles must be set up for them.
     """
     counts_samples = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
-    _reports.clear()
     colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
+    mattes = [view_pass for view_pass in colour_passes if view_pass.kind == "matte"]
+    matte = None
+    if mattes and namesakes.shown():
+        matte = _render_matte(world_matrix, seed, mattes)
+    _reports.clear()
     needed: dict[str, str] = {}
     for view_pass in colour_passes:
         channels = {"matte": "rgba", "value": "X"}.get(view_pass.kind, "RGB")
@@ -60,6 +69,8 @@ def render_colour(
     if counts_samples:
         needed[_COUNTS] = "X"
     rendered = render_view(world_matrix, seed, needed)
+    if matte:
+        rendered.passes.update(matte.passes)
     samples = None
     if counts_samples:
         # The pass holds each pixel's part of all samples.
@@ -72,15 +83,30 @@ def render_colour(
         lights = [composed[each.name] for each in colour_passes if each.kind == "light"]
         for pixels in (rendered.passes["Combined"], *lights):
             pixels[..., :3] = pixels[..., :3] @ to_rec_709.T
+    renders = [matte, rendered] if matte else [rendered]
     return Colour(
         pixels=rendered.passes["Combined"],
         passes=composed,
-        manifest=_manifest(rendered.attributes),
+        manifest=_manifest((matte or rendered).attributes),
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
-        render_seconds=rendered.render_seconds,
-        synchronization_seconds=rendered.synchronization_seconds,
+        render_seconds=sum(each.render_seconds for each in renders),
+        synchronization_seconds=sum(each.synchronization_seconds for each in renders),
     )
+
+
+def _render_matte(world_matrix: Array, seed: int, mattes: Iterable[Pass]) -> Rendered:
+    """Render ``mattes`` in which objects of equal names have their full names.
+
+    The camera's rays are those of the colour, and nothing else is followed.
+    """
+    needed = {name: "rgba" for matte in mattes for name in matte.needed}
+    cycles = bpy.context.scene.cycles
+    with ExitStack() as stack:
+        for name, value in _MATTE_SAMPLING.items():
+            stack.enter_context(changed(cycles, name, value))
+        stack.enter_context(namesakes.under_full_names())
+        return render_view(world_matrix, seed, needed)
 
 
 def _to_rec_709() -> Array | None:

@@ -22,6 +22,7 @@ from lightfield.rendering import (
     light_groups,
     motion_blur,
     moving_camera,
+    namesakes,
     pruning,
     surfaces,
     volumes,
@@ -89,6 +90,9 @@ def set_up(
     _set_camera(scene, lightfield.content)
     drawings.set_up(view_layer(scene), scene.camera.data.type, bool(groups))
     _hide_empty_point_clouds()
+    namesakes.shown.cache_clear()
+    if any(each.kind == "matte" for each in passes):
+        namesakes.shown()
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:
