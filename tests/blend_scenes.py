@@ -75,6 +75,13 @@ def blurred_cube():
     bpy.context.scene.render.use_motion_blur = True
 
 
+def transparent_film():
+    """Leave out the sky behind the scene."""
+    import bpy
+
+    bpy.context.scene.render.film_transparent = True
+
+
 def scaled_camera():
     """Roll the camera, and scale it along its own axes, which changes no picture."""
     import bpy
@@ -156,6 +163,7 @@ def roots(scene):
         "world_cycles": scene.world.cycles,
         "world_visibility": scene.world.cycles_visibility,
         "cube": bpy.data.objects["Cube"],
+        "ground": bpy.data.objects["Ground"],
         "cube_cycles": bpy.data.objects["Cube"].cycles,
         "lamp": bpy.data.lights["Lamp"],
         "lamp_cycles": bpy.data.lights["Lamp"].cycles,

@@ -197,6 +197,25 @@ ROWS = [
         ],
         "a pose cannot shear",
     ),
+    Row(
+        "shadow catchers",
+        TAKEN,
+        [Case({"ground.is_shadow_catcher": True})],
+        "with `transparent: true`, [no surface](files.md#transparency) where no shadow falls",
+    ),
+    Row(
+        "holdouts",
+        TAKEN,
+        [
+            Case(
+                {"cube.is_holdout": True},
+                yaml={"render": {"transparent": True}},
+                by_hand=scenes.transparent_film,
+            ),
+            Case({"cube.is_holdout": True}),
+        ],
+        "[no surface](files.md#transparency)",
+    ),
     Row("film exposure", TAKEN, [Case({"cycles.film_exposure": 2})]),
     Row(
         "render border",
