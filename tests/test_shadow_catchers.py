@@ -1,13 +1,13 @@
 """Transparent views of a cube on a shadow catcher, whose depth is known at every pixel."""
 
-from functools import partial
+import shutil
 
 import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.export import MANIFESTS
 from lightfield.export.points import lift
 from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses, rigs
@@ -167,12 +167,19 @@ def test_no_exported_point_is_on_the_invisible_ground(rendered):
     assert not in_sun(on_ground, 0.05).any()
 
 
-def test_views_around_it_agree(rendered):
+def test_views_around_it_agree(rendered, run_program, tmp_path):
     """A view from below shows nothing of the cube, which the ground hides."""
-    result = partial(validation.validate, manifests=MANIFESTS)(rendered)
+    folder = tmp_path / "dataset"
+    shutil.copytree(rendered, folder)
+    camera = {"lens": "equidistant", "fov": 40, "resolution": [SIZE, SIZE]}
+    write_json(tmp_path / "settings.json", {"camera": camera, "formats": ["exr"]})
+    source = ("-i", folder / "exr", "--input-cfg", folder / "lightfield.json")
+    target = ("-o", folder / "fisheye", "--output-cfg", folder / "fisheye/lightfield.json")
+    run_program("reproject.py", *source, *target, "--settings", tmp_path / "settings.json")
+    result = validation.validate(folder, ["fisheye"])
     checks = {check.name: check for check in result.checks}
-    assert checks["geometry"].passed, checks["geometry"].problems
-    assert checks["passes"].passed, checks["passes"].problems
+    for name in ("geometry", "passes", "fisheye/geometry", "fisheye/images", "fisheye/source"):
+        assert checks[name].passed, (name, checks[name].problems)
 
 
 def test_passes_that_a_shadow_catcher_spoils_are_refused(tmp_path):
