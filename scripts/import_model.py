@@ -36,6 +36,8 @@ def main() -> None:
     else:
         names = ("model", "unit", "up", "ground", "light", "frame", "allow_missing")
         content = {name: getattr(arguments, name) for name in names}
+        if arguments.shared_folder is not None:
+            content["shared_folder"] = arguments.shared_folder
         settings = checked(TypeAdapter(ImportSettings), content, "flags")
     keep_apart("--record", arguments.record, Path(settings.model))
     record = model.write(settings, arguments.output, arguments.record)
@@ -77,6 +79,11 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
         "--allow-missing",
         action="store_true",
         help="import the model even if files that it names are missing",
+    )
+    flags.add_argument(
+        "--shared-folder",
+        metavar="FOLDER",
+        help="folder with files that the model may name, beside its own folder",
     )
 
 

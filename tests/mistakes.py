@@ -612,6 +612,12 @@ EXPLAINED = [
         {"model": "a.obj", "frame": "file"},
         "scene.frame: file is only for blend, not for model",
     ),
+    (
+        "scene",
+        {"model": "a.obj", "shared_folder": ["b"]},
+        'scene.shared_folder: is ["b"]; must be a text',
+    ),
+    ("scene.shared_folder", "b", "scene.shared_folder: is only for model"),
     ("scene.light", "city", "scene.light: is only for model"),
     ("scene.url", "https://example.org/a.blend", "scene.url: is only for blend, not for builder"),
     ("scene.frame", "file", "scene.frame: file is only for blend, not for builder"),

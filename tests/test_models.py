@@ -261,14 +261,17 @@ def written(path, content):
     return path
 
 
-GLTF = {"asset": {"version": "2.0"}, "buffers": [{"uri": "data:,"}, {"uri": "a%20b.bin"}]}
+GLTF = {"asset": {"version": "2.0"}}
+GLTF["buffers"] = [{"uri": "data:;base64,"}, {"uri": "a%20b.bin"}]
 GLTF["images"] = [{"uri": "c.png"}, {"bufferView": 0}]
 GLTF_TEXT = json.dumps(GLTF)
 LENGTHS = struct.pack("<III", 0x46546C67, 2, 20 + len(GLTF_TEXT))
 GLB = LENGTHS + struct.pack("<I4s", len(GLTF_TEXT), b"JSON") + GLTF_TEXT.encode()
 USDA = """#usda 1.0
 ( subLayers = [@./deeper/layer.usda@] )
-def "a" ( references = [@other.usd@</b>, @https://a.org/c.usd@] ) {
+def "a" (
+    references = [@other.usd@</b>, @https://a.org/c.usd@]
+) {
     asset inputs:file = @tex/wood.png@
     asset inputs:tiles = @tex/wood.<UDIM>.png@
 }
@@ -286,15 +289,16 @@ def "a" ( references = [@other.usd@</b>, @https://a.org/c.usd@] ) {
     ],
 )
 def test_a_model_names_other_files(tmp_path, name, content, expected):
-    written(tmp_path / "deeper/layer.usda", "#usda 1.0\n(asset a = @bark.jpg@)\n")
-    files = model_files.referred(written(tmp_path / name, content))
-    assert set(files) == {tmp_path / file for file in expected}
+    written(tmp_path / "deeper/layer.usda", '#usda 1.0\ndef "c" {\n    asset a = @bark.jpg@\n}\n')
+    references, _ = model_files.survey(written(tmp_path / name, content))
+    assert {each.path for each in references} == {tmp_path / file for file in expected}
 
 
 def test_layers_that_name_each_other_are_read_once(tmp_path):
     first = written(tmp_path / "a.usda", "#usda 1.0\n(subLayers = [@b.usda@])\n")
     second = written(tmp_path / "b.usda", "#usda 1.0\n(subLayers = [@a.usda@])\n")
-    assert model_files.referred(first) == [second]
+    references, _ = model_files.survey(first)
+    assert [each.path for each in references] == [second]
 
 
 # ---- refusals -------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ def source_fingerprint(source, values):
     if source.builder:
         return keys.scene_fingerprint(source)
     # A drawn light may be the softboxes.
-    import_version = keys.model_version(
+    import_version = keys.import_version(
         SOFTBOXES if "scene.light" in values else source.light
     )
     # Batches of the first version keep their settings.

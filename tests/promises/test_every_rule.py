@@ -511,7 +511,7 @@ ROUNDS = {
         "modelled": (
             "model: model.obj",
             "model: other.obj, unit: metres, up: z, ground: true, light: city, frame: 2, "
-            "allow_missing: true",
+            "allow_missing: true, shared_folder: textures",
             {"import_model", "inventory"} | CAMERAS,
         ),
     },

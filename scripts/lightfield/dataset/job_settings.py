@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, PlainSerializer, model_validator
 from lightfield.core.settings import Settings, read_settings
 from lightfield.dataset.configuration import Preset
 from lightfield.dataset.family import Draw, Member
-from lightfield.dataset.keys import model_version
+from lightfield.dataset.keys import import_version
 from lightfield.dataset.names import builders
 from lightfield.dataset.scene_source import (
     FILE,
@@ -23,6 +23,7 @@ from lightfield.dataset.scene_source import (
     ModelPath,
     Parameters,
     SceneSource,
+    SharedFolder,
     check_model,
 )
 from lightfield.dataset.scene_yaml import Credits, load_scene
@@ -68,6 +69,9 @@ class ImportSettings(ModelOptions):
     allow_missing: bool = Field(
         False, description="Import the model even if files that it names are missing."
     )
+    shared_folder: SharedFolder | None = Field(
+        None, description="Folder with files that the model may name, beside its own folder."
+    )
     version: int | None = Field(
         None, description="Version of the importer. If it changes, the model is imported again."
     )
@@ -78,10 +82,10 @@ class ImportSettings(ModelOptions):
     @classmethod
     def of_source(cls, source: SceneSource) -> Self:
         """Return the settings that import the model of a scene's ``source``."""
-        keys = {"model", "frame", "allow_missing", *MODEL_KEYS}
+        keys = {"model", "frame", "allow_missing", "shared_folder", *MODEL_KEYS}
         return cls(
             **source.model_dump(include=keys, exclude_none=True),
-            version=model_version(source.light),
+            version=import_version(source.light),
             bpy=version("bpy"),
         )
 

@@ -41,6 +41,9 @@ CATCHERS_VERSION = 1
 MODEL_VERSION = 2
 # The same for models in softboxes.
 SOFTBOXES_VERSION = 1
+# Raise this when the import refuses other models. They are imported again, but scenes that stay the
+# same keep their views.
+IMPORT_VERSION = 1
 
 
 # Cached, because a look-up in a package's files takes a millisecond.
@@ -84,6 +87,11 @@ def _builder_folders(builder: str) -> list[str]:
 def model_version(light: str) -> int:
     """Return the version of the import of models in a ``light``."""
     return MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
+
+
+def import_version(light: str) -> int:
+    """Return what changes whenever models in a ``light`` must be imported again."""
+    return model_version(light) + IMPORT_VERSION
 
 
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:

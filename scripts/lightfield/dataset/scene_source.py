@@ -84,6 +84,12 @@ ModelPath = Annotated[
         )
     ),
 ]
+SharedFolder = Annotated[
+    str,
+    Field(
+        pattern=pattern(rf"^{QUOTED}$", "a path of a folder, without { } * ? [ ] and line breaks")
+    ),
+]
 # The word in a scene YAML that stands for the .blend's own value.
 FILE = "file"
 # Keys of `SceneSource` that only a .blend takes.
@@ -141,6 +147,12 @@ class Origin(Settings):
         description="Render even if files of the .blend or model are missing or cannot be read: "
         "textures, fonts, libraries, volumes or caches. Missing textures are magenta.",
     )
+    shared_folder: SharedFolder | None = Field(
+        None,
+        description="Folder with files that several models share, such as textures, relative to "
+        "the folder in which Snakemake runs. A model may name files there, and in its own folder. "
+        "Subfolders count.",
+    )
     sha256: str | None = Field(
         None,
         pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
@@ -183,7 +195,7 @@ class SceneSource(ModelOptions, Origin):
             check_model(self.model, self.up)
         elif self.blend is not None and "parameters" in self.model_fields_set:
             raise ValueError("parameters: is only for builder, not for blend")
-        for name in MODEL_KEYS:
+        for name in (*MODEL_KEYS, "shared_folder"):
             if self.model is None and name in self.model_fields_set:
                 raise ValueError(f"{name}: is only for model")
         return self

@@ -108,7 +108,7 @@ class MemberBuild:
         path = Path(self.member.model)
         files = {path}
         with suppress(UserError, OSError, *DAMAGE):
-            files.update(model_files.referred(path))
+            files.update(named.path for named in model_files.survey(path).references)
         names = sorted(Path(os.path.relpath(file)) for file in files)
         return [listed(file, path.parent) for file in names]
 

@@ -1,8 +1,10 @@
 """Makes a scene of a model file in glTF, USD, OBJ, PLY or STL, with Blender's importers."""
 
+import logging
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,9 @@ from lightfield.core.settings import FARTHEST
 from lightfield.dataset.job_settings import ImportSettings
 from lightfield.dataset.keys import model_fingerprint
 from lightfield.dataset.names import UP
+from lightfield.imaging.images import is_readable
 from lightfield.rendering import blend_file, model_files, model_light
+from lightfield.rendering.model_references import Reference, printable, refuse_outside
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
@@ -64,6 +68,8 @@ def write(
     with atomic_path(output) as temporary:
         blend_file.save_scene(temporary)
     write_json(record, content)
+    if content["left_out"]:
+        print(f"note: {settings.model}: left out: {'; '.join(content['left_out'])}")
     return content
 
 
@@ -73,26 +79,33 @@ def make_scene(
     """Make a scene of a model in the open file. Return the record of the import.
 
     ``folder`` is where the .blend will be. ``sources`` is that of `write`. The record has the
-    ``fingerprint``, the files that the model was read from as ``external_files``, and its ``box``
-    in metres.
+    ``fingerprint``, the files that the model was read from as ``external_files``, the parts that
+    are ``left_out``, and its ``box`` in metres.
 
-    Raises `UserError` for a model that is broken, empty, or lacks files.
+    Raises `UserError` for a model that is broken, empty, lacks files or parts, or names files
+    outside its folder.
     """
     path = Path(settings.model)
     model_files.check(path)
-    referred_files = model_files.referred(path)
+    references, left_out = model_files.survey(path)
+    refuse_outside(path, references, settings.shared_folder)
     if not settings.allow_missing:
-        _refuse_missing(path, referred_files)
+        _refuse_missing(path, [reference.path for reference in references])
+        _refuse_without(path, left_out)
     blend_file.new_scene()
-    _import(path, settings.up)
+    left_out += _import(path, settings.up)
     _remove_cameras_and_lamps()
-    files = _read_files(path, referred_files)
+    refuse_outside(path, _textures(path, references), settings.shared_folder)
+    files = _read_files(path, references)
     entries = [listed(file, path.parent) for file in files]
     if sources:
         write_json(sources, {"files": entries})
+    unread_textures = _unread_textures()
     if not settings.allow_missing:
         _refuse_missing(path, files)
-        _refuse_unread_textures(path)
+        _refuse_without(path, left_out)
+        _refuse_unread(path, unread_textures)
+    left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
     _pack(path)
     _give_material()
     bpy.context.scene.frame_set(settings.frame)
@@ -120,11 +133,15 @@ def make_scene(
         "fingerprint": model_fingerprint(options, names),
         "box": box.round(6).tolist(),
         "external_files": entries,
+        "left_out": left_out,
     }
 
 
-def _import(path: Path, up: str) -> None:
-    """Import a model with the importer of its suffix. Raises `UserError` if it refuses it."""
+def _import(path: Path, up: str) -> list[str]:
+    """Import a model with the importer of its suffix. Return the parts that it says it skips.
+
+    Raises `UserError` if it refuses the model.
+    """
     suffix = path.suffix.lower()
     family = "gltf" if suffix in (".glb", ".gltf") else suffix[1:4]
     options = dict(_OPTIONS.get(family, {}))
@@ -138,7 +155,7 @@ def _import(path: Path, up: str) -> None:
         "usd": bpy.ops.wm.usd_import,
     }
     try:
-        with quiet():
+        with quiet(), _skipped_by_gltf() as skipped:
             # Blender would take a path with // before it for one from the .blend.
             result = operators[family](filepath=str(path.absolute()), **options)
     except RuntimeError as error:
@@ -149,6 +166,26 @@ def _import(path: Path, up: str) -> None:
         raise UserError(_refusal(path, "it says nothing more"))
     if suffix == ".ply":
         _check_faces(path)
+    return skipped
+
+
+@contextmanager
+def _skipped_by_gltf() -> Iterator[list[str]]:
+    """Collect what the importer of glTF only logs: primitives that it cannot decode and skips."""
+    messages: list[str] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if "Skipping" in record.getMessage():
+                messages.append(record.getMessage().rstrip("."))
+
+    logger = logging.getLogger("glTFImporter_errors")
+    collector = Collector()
+    logger.addHandler(collector)
+    try:
+        yield messages
+    finally:
+        logger.removeHandler(collector)
 
 
 def _refusal(path: Path, message: str) -> str:
@@ -159,10 +196,14 @@ def _refusal(path: Path, message: str) -> str:
         lines = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)][-1:] or lines
     # Messages must be the same in every folder: the record of a family's member has them.
     reason = lines[0].removeprefix("Error: ").rstrip(".").replace(str(path.absolute()), str(path))
-    return (
-        f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; export the model "
-        "again"
-    )
+    advice = "export the model again"
+    is_gltf = path.suffix.lower() in (".glb", ".gltf")
+    names = model_files.compressions(path) if is_gltf else []
+    # The reason is an unknown extension, or a path of this machine, where a decoder is missing.
+    if names and re.search("not available|OSError|ecod", reason):
+        reason = f"it cannot decode {' and '.join(names)}"
+        advice = "export the model without compression"
+    return f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; {advice}"
 
 
 def _check_faces(path: Path) -> None:
@@ -192,13 +233,23 @@ def _remove_cameras_and_lamps() -> None:
         bpy.data.objects.remove(obj)
 
 
-def _read_files(path: Path, referred_files: Sequence[Path]) -> list[Path]:
+def _read_files(path: Path, references: Sequence[Reference]) -> list[Path]:
     """Return all files that a model was read from, also missing ones, in order."""
-    files = {path, *referred_files}
+    files = {path, *(reference.path for reference in references)}
     for image in _images():
         if not image.packed_files:
             files.update(_image_files(image))
     return sorted({Path(os.path.relpath(file)) for file in files})
+
+
+def _textures(path: Path, references: Sequence[Reference]) -> Iterator[Reference]:
+    """Yield the textures that the importer has found: names of an OBJ's materials among them."""
+    libraries = [each.path for each in references if each.path.suffix.lower() == ".mtl"]
+    for image in _images():
+        for file in () if image.packed_files else _image_files(image):
+            name = os.fsencode(file.name)
+            named_by = (each for each in libraries if each.is_file() and name in each.read_bytes())
+            yield Reference(next(named_by, path), os.path.relpath(file), file)
 
 
 def _images() -> list[Any]:
@@ -208,7 +259,8 @@ def _images() -> list[Any]:
 
 def _image_files(image: Any) -> list[Path]:
     """Return the files of an image. One with tiles has several."""
-    path = bpy.path.abspath(image.filepath)
+    # Blender takes a backslash for a slash, too.
+    path = bpy.path.abspath(image.filepath).replace("\\", "/")
     if image.source != "TILED":
         return [Path(path)]
     return [Path(path.replace("<UDIM>", str(tile.number))) for tile in image.tiles]
@@ -216,8 +268,7 @@ def _image_files(image: Any) -> list[Path]:
 
 def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
     """Raise `UserError` if a model names files that do not exist."""
-    missing_files = [_shown(file) for file in files if not file.is_file()]
-    if missing_files:
+    if missing_files := _missing(files):
         more = f" and {len(missing_files) - 8} more" if missing_files[8:] else ""
         raise UserError(
             f"{path}: files that it names are missing: {', '.join(missing_files[:8])}{more}; put "
@@ -225,24 +276,61 @@ def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
         )
 
 
-def _refuse_unread_textures(path: Path) -> None:
-    """Raise `UserError` if a model has textures that its importer left out, such as KTX2."""
-    names = [
-        material.name
+def _missing(files: Sequence[Path]) -> list[str]:
+    """Return the names of those files that do not exist."""
+    # Path.is_file() raises for a path that is too long.
+    return [printable(file) for file in files if not os.path.isfile(file)]  # noqa: PTH113
+
+
+def _refuse_without(path: Path, left_out: Sequence[str]) -> None:
+    """Raise `UserError` if Blender leaves out parts of a model."""
+    if left_out:
+        more = f"; and {len(left_out) - 3} more" if left_out[3:] else ""
+        raise UserError(
+            f"{path}: parts of it would be left out: {'; '.join(left_out[:3])}{more}; export the "
+            "model with all parts in files that Blender reads, or render without them: scene: "
+            "{allow_missing: true}"
+        )
+
+
+def _refuse_unread(path: Path, textures: Sequence[str]) -> None:
+    """Raise `UserError` if a model has textures that Blender leaves out, such as KTX2."""
+    if textures:
+        more = f" and {len(textures) - 1} more" if textures[1:] else ""
+        raise UserError(
+            f"{path}: {textures[0]}{more}; export it with PNG or JPEG, or render it magenta: "
+            "scene: {allow_missing: true}"
+        )
+
+
+def _unread_textures() -> list[str]:
+    """Return which textures Blender leaves out, or shows without a part."""
+    left_out = [
+        f"the material {material.name} has a texture on a server, or in a format that Blender does "
+        "not read"
         for material in bpy.data.materials
         for node in material.node_tree.nodes
         if node.bl_idname == "ShaderNodeTexImage" and node.image is None
     ]
-    if names:
-        raise UserError(
-            f"{path}: the material {names[0]} has a texture in a format that Blender does not "
-            "read; export it with PNG or JPEG, or render it magenta: scene: {allow_missing: true}"
-        )
+    damaged = [
+        f"the texture {image.name} is damaged, or in a format that Blender does not read"
+        for image in _damaged_images()
+    ]
+    return [printable(each) for each in left_out + damaged]
 
 
-def _shown(path: Path) -> str:
-    """Return a path for a message, also if its bytes are not UTF-8."""
-    return os.fsencode(path).decode("utf-8", "replace")
+def _damaged_images() -> Iterator[Any]:
+    """Yield the images that exist, but cannot be read."""
+    for image in _images():
+        if image.packed_files:
+            readable = image.size[0] > 0
+            # All of them at once may fill the memory.
+            image.buffers_free()
+        else:
+            # Do not let Blender read files: 5.0 crashes on some broken EXRs.
+            readable = all(is_readable(file) for file in _image_files(image) if file.is_file())
+        if not readable:
+            yield image
 
 
 def _pack(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Finds the files that a model file refers to, without Blender, which does not list them."""
+"""Finds the files that a model file names, without Blender, which does not list them."""
 
 import json
 import os
@@ -12,10 +12,8 @@ from urllib.parse import unquote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
-
-# The suffixes of files that a USD layer may refer to.
-_USD_LAYERS = (".usd", ".usda", ".usdc", ".usdz")
-_USD_TEXTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tif", ".tiff", ".bmp", ".tga", ".webp")
+from lightfield.rendering import usd_files
+from lightfield.rendering.model_references import Reference, Survey
 
 
 def check(path: Path) -> None:
@@ -99,22 +97,21 @@ def _least_ply_bytes(path: Path) -> int:
     return total - 1 if is_text else total
 
 
-def referred(path: Path) -> list[Path]:
-    """Return the files that a model file refers to, also missing ones, without the file itself.
+def survey(path: Path) -> Survey:
+    """Return what a model file consists of. The files may be missing. The model is none of them.
 
-    Those of an OBJ are its libraries of materials, without their textures. Raises `UserError` if
-    the model file is broken.
+    The textures of an OBJ, which its libraries of materials name, are not listed. Raises
+    `UserError` if the model file is broken.
     """
     match path.suffix.lower():
         case ".gltf" | ".glb":
-            files = list(_of_gltf(path))
+            return Survey(list(_of_gltf(path)), [])
         case ".obj":
-            files = list(_of_obj(path))
-        case suffix if suffix in _USD_LAYERS[:3]:
-            files = _of_usd(path)
+            return Survey(list(_of_obj(path)), [])
+        case ".usd" | ".usda" | ".usdc" | ".usdz":
+            return usd_files.survey(path)
         case _:
-            files = []
-    return sorted({Path(os.path.normpath(file)) for file in files})
+            return Survey([], [])
 
 
 def _gltf_document(path: Path) -> Any:
@@ -144,7 +141,7 @@ def _hidden_node(path: Path) -> str:
     return ""
 
 
-def _of_gltf(path: Path) -> Iterator[Path]:
+def _of_gltf(path: Path) -> Iterator[Reference]:
     """Yield the buffers and images that a glTF file has outside of itself."""
     document = _gltf_document(path)
     try:
@@ -153,124 +150,43 @@ def _of_gltf(path: Path) -> Iterator[Path]:
     except (TypeError, AttributeError) as error:
         raise UserError(f"{path}: is cut short, or not a glTF file: {error}") from None
     for address in addresses:
-        if not address.startswith("data:"):
-            yield path.parent / unquote(address)
+        # Blender takes other data addresses for paths.
+        if not (address.startswith("data:") and ";base64," in address):
+            name = unquote(address.replace("\\", "/"))
+            yield Reference(path, address, Path(os.path.normpath(path.parent / name)))
 
 
-def _of_obj(path: Path) -> Iterator[Path]:
+def compressions(path: Path) -> list[str]:
+    """Return the extensions by which a glTF file compresses its geometry."""
+    names = _gltf_document(path).get("extensionsUsed")
+    names = names if isinstance(names, list) else []
+    return [name for name in names if "_compression" in str(name)]
+
+
+def _of_obj(path: Path) -> Iterator[Reference]:
     """Yield the libraries of materials of an OBJ file."""
+    for line in _obj_lines(path):
+        words = line.split(None, 1)
+        if words[:1] == [b"mtllib"]:
+            name = os.fsdecode(words[-1].strip())
+            if len(name) > 2 and name[0] == name[-1] == '"':
+                name = name[1:-1]
+            # Blender puts the folder before an absolute path, too.
+            yield Reference(path, name, Path(os.path.normpath(f"{path.parent}/{name}")))
+    # Blender also reads a library with the name of the OBJ.
+    library = path.with_suffix(".mtl")
+    if library.is_file():
+        yield Reference(path, library.name, library)
+
+
+def _obj_lines(path: Path) -> Iterator[bytes]:
+    """Yield the lines of an OBJ file. A backslash at the end of a line continues it."""
+    begun = b""
     with path.open("rb") as file:
         for line in file:
-            if line.startswith(b"mtllib"):
-                yield path.parent / os.fsdecode(line[6:].strip().strip(b'"'))
-
-
-def _of_usd(path: Path) -> list[Path]:
-    """Return the layers and textures of a USD file, and those of its layers."""
-    files: set[Path] = set()
-    pending = [path]
-    visited = set()
-    while pending:
-        layer = pending.pop()
-        visited.add(layer)
-        for name in _usd_names(layer):
-            file = Path(os.path.normpath(layer.parent / name))
-            files.add(file)
-            # An archive holds all that its layers refer to.
-            is_layer = file.suffix.lower() in _USD_LAYERS[:3]
-            if is_layer and file.is_file() and file not in visited:
-                pending.append(file)
-    return sorted(files - {path})
-
-
-def _usd_names(layer: Path) -> set[str]:
-    """Return the paths of files that a USD layer names. <UDIM> stands for the number of a tile."""
-    content = layer.read_bytes()
-    if content[:8] == b"PXR-USDC":
-        names = _crate_tokens(content)
-    else:
-        names = {os.fsdecode(name) for name in re.findall(rb"@+([^@\n]+)@+", content)}
-    # A file inside an archive is named as archive.usdz[file].
-    names = {re.sub(r"\[.*\]$", "", name) for name in names}
-    files = {name for name in names if name.lower().endswith(_USD_LAYERS + _USD_TEXTURES)}
-    return {name for name in files if "<" not in name and "://" not in name}
-
-
-def _crate_tokens(content: bytes) -> set[str]:
-    """Return the tokens of a binary USD layer. The paths of its assets are among them.
-
-    See "crateFile.h" of OpenUSD. The table of contents names each section in 16 bytes, with its
-    start and size. Since version 0.4, tokens are compressed with LZ4. Returns nothing for a broken
-    file, which Blender refuses.
-    """
-    try:
-        (table,) = struct.unpack_from("<q", content, 16)
-        (count,) = struct.unpack_from("<Q", content, table)
-        for number in range(min(count, 64)):
-            name, start, _ = struct.unpack_from("<16sqq", content, table + 8 + 32 * number)
-            if name.rstrip(b"\0") == b"TOKENS":
-                break
-        else:
-            return set()
-        if content[8:11] < bytes([0, 4, 0]):
-            _, size = struct.unpack_from("<QQ", content, start)
-            tokens = content[start + 16 : start + 16 + size]
-        else:
-            _, _, size = struct.unpack_from("<QQQ", content, start)
-            tokens = _decompressed(content[start + 24 : start + 24 + size])
-    except (struct.error, IndexError):
-        return set()
-    return {os.fsdecode(token) for token in tokens.split(b"\0")}
-
-
-def _decompressed(content: bytes) -> bytes:
-    """Return content that OpenUSD has compressed: chunks of LZ4, each with its length before it.
-
-    The first byte is the number of chunks. 0 means one without a length.
-    """
-    count = content[0]
-    if not count:
-        return _lz4_block(content[1:])
-    parts = []
-    start = 1
-    for _ in range(count):
-        (size,) = struct.unpack_from("<i", content, start)
-        parts.append(_lz4_block(content[start + 4 : start + 4 + size]))
-        start += 4 + size
-    return b"".join(parts)
-
-
-def _lz4_block(block: bytes) -> bytes:
-    """Decompress a block of LZ4. See "LZ4 Block Format" of the lz4 project.
-
-    Each sequence has a token with two lengths, literal bytes, and a copy of earlier bytes.
-    """
-    output = bytearray()
-    at = 0
-
-    def length(nibble: int) -> int:
-        nonlocal at
-        total = nibble
-        while nibble == 15:
-            total += block[at]
-            at += 1
-            if block[at - 1] != 255:
-                break
-        return total
-
-    while at < len(block):
-        token = block[at]
-        at += 1
-        literals = length(token >> 4)
-        output += block[at : at + literals]
-        at += literals
-        if at >= len(block):
-            break
-        offset = int.from_bytes(block[at : at + 2], "little")
-        at += 2
-        repeated = length(token & 15) + 4
-        if not 0 < offset <= len(output):
-            raise IndexError
-        for _ in range(repeated):
-            output.append(output[-offset])
-    return bytes(output)
+            if line.endswith((b"\\\n", b"\\\r\n")):
+                begun += line.rstrip()[:-1] + b" "
+            else:
+                yield begun + line
+                begun = b""
+    yield begun

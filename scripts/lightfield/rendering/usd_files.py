@@ -1,0 +1,164 @@
+"""Finds the files that a USD names, and its parts that Blender leaves out, with OpenUSD itself.
+
+Blender reads USD with the same library, and says nothing of what it cannot find or read.
+"""
+
+import importlib
+import itertools
+import os
+import re
+import sys
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.rendering.model_references import Reference, Survey
+
+# The suffixes of files that Blender reads for a USD. Others, such as sounds, affect no pixel.
+_LAYERS = (".usd", ".usda", ".usdc", ".usdz")
+_TEXTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tif", ".tiff", ".bmp", ".tga", ".webp")
+_VOLUMES = (".vdb",)
+# The types of geometry that Blender imports.
+_IMPORTED = {"Mesh", "Cube", "Sphere", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1"}
+_IMPORTED |= {"Plane", "Volume"}
+# Those that a model never shows, as they are no surfaces.
+_NO_SURFACES = {"BasisCurves", "NurbsCurves", "HermiteCurves", "Points"}
+
+
+@cache
+def openusd() -> SimpleNamespace:
+    """Return the modules of the OpenUSD that comes with Blender. Blender itself is not loaded."""
+    package = Path(str(metadata.distribution("bpy").locate_file("bpy")))
+    folder = next(package.glob("*/python/**/site-packages"))
+    # Only for this import: the folder has other packages, such as OpenImageIO, in other versions.
+    sys.path.append(str(folder))
+    try:
+        names = ("Ar", "Sdf", "Usd", "UsdGeom", "UsdUtils")
+        return SimpleNamespace(**{name: importlib.import_module(f"pxr.{name}") for name in names})
+    finally:
+        sys.path.remove(str(folder))
+
+
+def survey(path: Path) -> Survey:
+    """Return the files that a USD names, and its parts that cannot be composed or imported.
+
+    Raises `UserError` if the file is broken.
+    """
+    usd = openusd()
+    references: list[Reference] = []
+
+    def note(layer: Any, dependency: Any) -> Any:
+        # These are the tiles of a texture and the files of value clips.
+        for name in dependency.dependencies or [dependency.assetPath]:
+            if reference := _reference(layer, name):
+                references.append(reference)
+        return dependency
+
+    address = str(path.absolute())
+    try:
+        # Layers live until nothing refers to them, so this one is read once.
+        layer = usd.Sdf.Layer.FindOrOpen(address)
+        layers, _, _ = usd.UsdUtils.ComputeAllDependencies(address, note)
+        stage = usd.Usd.Stage.Open(layer)
+        left_out = [*_composition_errors(path, stage), *_surfaces_left_out(stage)]
+    except RuntimeError:
+        raise UserError(
+            f"{path}: is cut short, or not a USD file, or a layer of it is; export it again"
+        ) from None
+    except UnicodeError:
+        raise UserError(f"{path}: names a file by bytes that are not UTF-8; rename it") from None
+    # An expression may name a layer, and a layer may be in a format of another library.
+    noted = {reference.path for reference in references}
+    for file in {_file(each.realPath) for each in [*layers, *stage.GetUsedLayers()]}:
+        if file and Path(file) not in noted:
+            references.append(Reference(path.absolute(), file, Path(file)))
+    others = {each for each in references if each.path != path.absolute()}
+    return Survey([_from(path.parent, each) for each in sorted(others)], left_out)
+
+
+def _reference(layer: Any, name: str) -> Reference | None:
+    """Return the reference of a layer to a file that Blender reads. None for anything else.
+
+    A name may be an address on a server, which is no file. <UDIM> stands for the tiles of a
+    texture, of which none exists.
+    """
+    usd = openusd()
+    file = re.sub(r"\[.*\]$", "", name)
+    is_read = file.lower().endswith(_LAYERS + _TEXTURES + _VOLUMES)
+    if not is_read or "<" in file or "://" in file:
+        return None
+    named_by = Path(_file(layer.realPath))
+    anchored = usd.Sdf.ComputeAssetPathRelativeToLayer(layer, name)
+    # Without ./ before it, a name is also looked for in the working folder.
+    path = named_by.parent / _file(str(usd.Ar.GetResolver().Resolve(anchored)) or anchored)
+    return Reference(named_by, name, path)
+
+
+def _file(address: str) -> str:
+    """Return the file of an address. What lies in an archive has the archive's name before it."""
+    outer, _ = openusd().Ar.SplitPackageRelativePathOuter(address)
+    return str(outer)
+
+
+def _from(folder: Path, reference: Reference) -> Reference:
+    """Return a reference with paths that begin with the model's folder, as the user names it."""
+    named_by, path = (
+        Path(os.path.normpath(folder / os.path.relpath(each, folder)))
+        for each in (reference.named_by, reference.path)
+    )
+    return Reference(named_by, reference.name, path)
+
+
+def _composition_errors(path: Path, stage: Any) -> list[str]:
+    """Return what of a stage is not composed: missing and unknown files, servers, and cycles."""
+    messages = set()
+    for error in stage.GetCompositionErrors():
+        prim = stage.GetPrimAtPath(error.rootSite.path)
+        if prim and not prim.IsActive():
+            continue
+        message = str(error).replace(f"{path.absolute().parent}/", "")
+        # The session's layer, and what layers are opened with, concern no user.
+        message = re.sub(r",@anon:[^@]*@|:SDF_FORMAT_ARGS:[^@]*", "", message)
+        # OpenUSD takes an address for a path, and shortens it.
+        message = re.sub(r"@(\w+):/(?=\w)", r"@\1://", message)
+        messages.add(" ".join(message.split()).rstrip("."))
+    return sorted(messages)
+
+
+def _surfaces_left_out(stage: Any) -> list[str]:
+    """Return the visible surfaces of a stage that Blender does not import, or not as they are."""
+    usd = openusd()
+    problems = []
+    # What is instanced is not among the prims of the stage itself.
+    roots = [stage.GetPseudoRoot(), *stage.GetPrototypes()]
+    for prim in itertools.chain.from_iterable(map(usd.Usd.PrimRange, roots)):
+        type_name = prim.GetTypeName()
+        if type_name == "Mesh" and _lacks_corners(usd.UsdGeom.Mesh(prim)):
+            problem = f"the mesh {prim.GetName()} has faces with corners that do not exist"
+        elif type_name in _IMPORTED and prim.IsInstance():
+            problem = f"Blender does not import the {type_name} {prim.GetName()}, an instance"
+        elif type_name not in _IMPORTED | _NO_SURFACES and prim.IsA(usd.UsdGeom.Gprim):
+            problem = f"Blender does not import the {type_name} {prim.GetName()}"
+        else:
+            continue
+        shape = usd.UsdGeom.Imageable(prim)
+        is_shown = shape.ComputeVisibility() != "invisible"
+        if is_shown and shape.ComputePurpose() in ("default", "render"):
+            problems.append(problem)
+    return sorted(problems)
+
+
+def _lacks_corners(mesh: Any) -> bool:
+    """Return whether faces of a mesh have corners without a place."""
+    earliest = openusd().Usd.TimeCode.EarliestTime()
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(earliest) or (), int)
+    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(earliest) or (), int)
+    if counts.sum() != len(corners):
+        return True
+    places = len(mesh.GetPointsAttr().Get(earliest) or ())
+    return bool(len(corners) and (corners.min() < 0 or corners.max() >= places))
