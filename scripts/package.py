@@ -10,6 +10,7 @@ from pathlib import Path
 from lightfield.core.cli import above_zero, check_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.paths import place_in
 
 
 def main() -> None:
@@ -30,7 +31,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.output.suffix != ".tar":
         raise UserError(f"--output {arguments.output}: must end in .tar; .json lies beside it")
-    if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
+    if place_in(arguments.folder, arguments.output):
         raise UserError(f"--output {arguments.output}: must not be in what it packs")
     check_settings(arguments, add_settings_flags, "scene")
 

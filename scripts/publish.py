@@ -11,6 +11,7 @@ from pathlib import Path
 
 from lightfield.core.cli import above_zero, check_settings, run
 from lightfield.core.errors import UserError
+from lightfield.core.paths import place_in
 
 
 def main() -> None:
@@ -24,7 +25,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     add_settings_flags(parser)
     arguments = parser.parse_args()
-    if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
+    if place_in(arguments.folder, arguments.output):
         raise UserError(f"--output {arguments.output}: must not be in what it publishes")
     check_settings(arguments, add_settings_flags, "scene")
 

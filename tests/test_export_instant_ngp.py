@@ -335,6 +335,17 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
     assert len(list(elsewhere.iterdir())) == 6
 
 
+def test_a_linked_folder_of_pictures_is_named_as_a_folder(dataset: Dataset) -> None:
+    content = dataset.write(PERSPECTIVE)
+    dataset.render(content, PERSPECTIVE, "z", 2.5)
+    (dataset.folder / "disk/deep").mkdir(parents=True)
+    (dataset.folder / "instant_ngp").symlink_to(dataset.folder / "disk/deep")
+    frames = dataset.export("--image-suffix", ".exr")["frames"]
+    name = content["frames"][0]["name"]
+    assert frames[0]["file_path"] == f"instant_ngp/{name}.exr"
+    assert (dataset.folder / "disk/deep" / f"{name}.exr").is_file()
+
+
 def test_exr_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
     content = dataset.write(PERSPECTIVE, depth="z")
     dataset.render(content, PERSPECTIVE, "z", 2.0)

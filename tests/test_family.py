@@ -514,3 +514,15 @@ def test_a_member_with_a_damaged_splits_json_is_built_again(face, tmp_path, dama
     if damage:
         splits.write_text(damage)
     assert not build.is_finished()
+
+
+def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
+    build = build_of(face())
+    build.folder.mkdir(parents=True)
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk/mine.txt").write_text("mine")
+    (build.folder / "ring").symlink_to(tmp_path / "disk")
+    (build.folder / "half").mkdir()
+    assert build.fail("render", "out of memory")["state"] == "failed"
+    assert [path.name for path in build.folder.iterdir()] == ["member.json"]
+    assert (tmp_path / "disk/mine.txt").read_text() == "mine"

@@ -159,7 +159,8 @@ def test_any_remaining_list_is_enough_for_a_view(small):
     """Three lists have its checksum: that of published files, the shard's record and its log."""
     view = Path("results", small, "exr/view_0000f.exr")
     log = Path("work", small, "render/0-1.sums.jsonl")
-    log.write_text(json.dumps({"file": "exr/view_0000f.exr", "sha256": sha256(view)}))
+    line = {"file": "exr/view_0000f.exr", "key": "0", "sha256": sha256(view)}
+    log.write_text(json.dumps(line))
     bookkeeping.note([str(log)])
     view.write_bytes(b"spoilt")
     lists = [view.parents[1] / "sha256sums.txt", Path("work", small, "checksums.txt")]

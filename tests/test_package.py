@@ -68,6 +68,23 @@ def test_a_package_has_the_same_bytes_whoever_packs_it_and_when(folder, tmp_path
             assert "report" not in entry.name
 
 
+def test_a_package_has_the_files_behind_links(folder, tmp_path):
+    (expected,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
+    linked = Path(shutil.copytree(folder, tmp_path / "linked" / folder.name))
+    for path in [path for path in linked.iterdir() if path.is_dir()]:
+        shutil.move(path, tmp_path / "disk" / path.name)
+        path.symlink_to(tmp_path / "disk" / path.name)
+    single = linked / "lightfield.json"
+    shutil.move(single, tmp_path / "single.json")
+    single.symlink_to(tmp_path / "single.json")
+    (archive,) = packed(linked, tmp_path / "two" / f"{NAME}.tar")
+    assert archive.read_bytes() == expected.read_bytes()
+    (linked / "exr/loop").symlink_to(linked)
+    with pytest.raises(UserError, match="exr/loop: is a link to a folder that it lies in; remove"):
+        packed(linked, tmp_path / "three" / f"{NAME}.tar")
+    assert not (tmp_path / "three" / f"{NAME}.tar").exists()
+
+
 def test_parts_of_a_size_unpack_to_a_complete_dataset(folder, tmp_path):
     target = tmp_path / f"{NAME}.tar"
     (target.with_name(f"{NAME}.9.tar")).write_text("of an earlier package")

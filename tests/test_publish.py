@@ -156,6 +156,24 @@ def test_the_same_files_are_published_with_the_same_bytes(folder, output, tmp_pa
     assert written == {path.name: path.read_bytes() for path in again.iterdir()}
 
 
+def test_files_behind_links_are_published(folder, output, tmp_path):
+    linked = Path(shutil.copytree(folder, tmp_path / "linked"))
+    for path in [path for path in linked.iterdir() if path.is_dir()]:
+        shutil.move(path, tmp_path / "disk" / path.name)
+        path.symlink_to(tmp_path / "disk" / path.name)
+    again = published(linked, tmp_path / NAME)
+    for path in output.iterdir():
+        assert (again / path.name).read_bytes() == path.read_bytes(), path.name
+    # The frames of a sequence are links, too.
+    sequence = tmp_path / "sequence"
+    sequence.mkdir()
+    for frame in ("f00001", "f00002"):
+        (sequence / frame).symlink_to(linked)
+    of_frames = published(sequence, tmp_path / "of frames" / NAME)
+    names = [name for tar in of_frames.glob(f"{NAME}-*.tar") for name in members(tar)]
+    assert len({name.split(".")[0] for name in names}) == 12
+
+
 def test_a_shard_has_at_most_the_size_that_is_asked_for(folder, tmp_path):
     output = published(folder, tmp_path / NAME)
     stale = output / f"{NAME}-train-00009.tar"

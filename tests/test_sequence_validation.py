@@ -18,7 +18,12 @@ from lightfield.export.sequence import SourceSequence
 from lightfield.imaging import images
 from lightfield.validation.integrity import Integrity
 from lightfield.validation.readers.mp4 import read_mp4
-from lightfield.validation.sequence import export_lists, frame_folders, validate_sequence
+from lightfield.validation.sequence import (
+    export_lists,
+    frame_folders,
+    remove_strays,
+    validate_sequence,
+)
 
 sequence = test_sequence_exports.sequence
 KINDS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview")
@@ -77,6 +82,30 @@ def problems(rig):
 def test_correct_exports_of_a_sequence_are_valid(rigs, name):
     assert len(export_lists(rigs / name)) == len(KINDS)
     assert problems(rigs / name) == []
+
+
+def test_a_sequence_behind_links_is_valid_and_has_the_same_sums(rigs, rig, tmp_path):
+    def sums():
+        return validate_sequence(rig, frame_folders(rig), export_lists(rig), IN_FOLDERS).checksums
+
+    expected = sums()
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    for place in (frame_folders(rig)[0], "perspective/exports/dnerf", "perspective"):
+        shutil.move(rig / place, disk / place.replace("/", "_"))
+        (rig / place).symlink_to(disk / place.replace("/", "_"))
+    assert problems(rig) == []
+    assert sums() == expected
+    shutil.move(rig, disk / "rig")
+    rig.symlink_to(disk / "rig")
+    assert problems(rig) == []
+    assert sums() == expected
+    (disk / "perspective/mine.txt").write_text("mine")
+    lists = export_lists(rig)
+    remove_strays(rig, frame_folders(rig), lists, IN_FOLDERS, tmp_path / "removed")
+    assert (disk / "perspective/mine.txt").is_file()
+    (problem,) = problems(rig)
+    assert problem.startswith("perspective/mine.txt: is not a file of this sequence; remove it")
 
 
 def test_correct_scene_flow_is_valid(flow):

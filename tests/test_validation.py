@@ -1514,6 +1514,47 @@ def test_stray_files_are_moved_before_they_make_a_dataset_invalid(
     assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
 
 
+def test_views_behind_a_link_are_published_and_nothing_there_is_moved(
+    dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = Path("room/sphere")
+    published = validate(folder).checksums
+    disk = tmp_path / "disk"
+    shutil.move(folder / "exr", disk)
+    (folder / "exr").symlink_to(disk)
+    assert validate(folder).checksums == published
+    (disk / "mine.txt").write_text("mine")
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes/a.txt").write_text("mine")
+    (folder / "notes").symlink_to(tmp_path / "notes")
+    # The link itself is moved, and not the notes.
+    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 1
+    assert Path("removed/room/sphere/notes").is_symlink()
+    assert (tmp_path / "notes/a.txt").is_file()
+    (problem,) = check(validate(folder), "files").problems
+    assert problem == (
+        "exr/mine.txt: is not a file of this dataset; remove it, because nothing is moved out of "
+        "the folder that exr links to"
+    )
+    (disk / "mine.txt").unlink()
+    assert validate(folder).checksums == published
+
+
+def test_a_single_linked_view_is_published_and_a_loop_is_refused(
+    dataset: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "room/sphere"
+    published = validate(folder).checksums
+    view = folder / "exr" / f"{names(dataset)[0]}.exr"
+    shutil.move(view, tmp_path / "one.exr")
+    view.symlink_to(tmp_path / "one.exr")
+    assert validate(folder).checksums == published
+    (folder / "exr/loop").symlink_to("..")
+    with pytest.raises(UserError, match="exr/loop: is a link to a folder that it lies in; remove"):
+        validate(folder)
+
+
 def test_an_export_that_is_no_longer_requested_is_moved_away(
     small_dataset: Path, tmp_path: Path
 ) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import shutil
 from pathlib import Path
 
@@ -54,11 +55,47 @@ def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
         assert faults([dataset], work=None).keys() == {str(path) for path in chosen}
 
 
-def test_a_name_that_leaves_the_dataset_is_not_its_file(copy):
+@pytest.mark.parametrize("name", ["../outside.txt", "exr/../../outside.txt", "/outside.txt", ""])
+def test_a_list_that_names_a_file_outside_the_dataset_is_refused(copy, run_program, name):
     with Path(copy[0].folder, SUMS).open("a") as sums:
-        for name in ("../outside.txt", "exr/../../outside.txt", "/outside.txt", ""):
-            sums.write(f"{'0' * 64}  {name}\n")
-    assert faults(copy[:1], work=None) == {}
+        sums.write(f"{'0' * 64}  {name}\n")
+    result = run_program("verify.py", copy[0].folder, check=False)
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert re.search(rf"{SUMS}: line \d+: is {re.escape(repr(name))}; must be the path of", line)
+
+
+def test_files_behind_links_are_checked(copy, run_program, tmp_path):
+    folder = Path(copy[0].folder)
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    for path in [path for path in folder.iterdir() if path.is_dir()]:
+        shutil.move(path, disk / path.name)
+        path.symlink_to(disk / path.name)
+    assert faults(copy[:1]) == {}
+    view = next((folder / "exr").glob("*.exr"))
+    view.write_bytes(view.read_bytes()[:-1] + b"!")
+    stray = view.with_name("stray.exr")
+    stray.write_bytes(b"mine")
+    found = faults(copy[:1], work=None)
+    assert found.keys() == {str(view), str(stray)}
+    assert "nothing is moved out of the folder that exr links to" in found[str(stray)]
+    run_program("verify.py", folder, "--work", "work", "--mend", check=False)
+    assert not view.exists()
+    assert (disk / "exr/stray.exr").read_bytes() == b"mine"
+
+
+def test_a_link_to_a_foreign_folder_is_one_fault(copy, run_program, tmp_path):
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    for name in ("a.txt", "b.txt"):
+        (notes / name).write_text("mine")
+    link = Path(copy[0].folder, "notes")
+    link.symlink_to(notes)
+    assert faults(copy[:1]).keys() == {str(link)}
+    run_program("verify.py", copy[0].folder, "--work", "work", "--mend", check=False)
+    assert not link.exists()
+    assert sorted(path.name for path in notes.iterdir()) == ["a.txt", "b.txt"]
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from lightfield.core.disk_space import SHARED_MEMORY
 from lightfield.core.files import is_locked
+from lightfield.core.paths import files_below
 
 # No user's folder may have this prefix: it would be removed.
 PREFIX = "plenoforge-temporary-"
@@ -71,14 +72,11 @@ def remove_unfinished(folder: Path, age: float = FILE_AGE, excluded: str = "") -
     Skips the folder's subfolder ``excluded``.
     """
     removed = []
-    for parent, folders, names in os.walk(folder):
-        if Path(parent) == folder and excluded in folders:
-            folders.remove(excluded)
-        for name in names:
-            path = Path(parent, name)
-            if _UNFINISHED.fullmatch(name) and _is_old(path, age):
-                path.unlink(missing_ok=True)
-                removed.append(path)
+    for path in files_below(folder, strict=False):
+        is_excluded = path.relative_to(folder).parts[0] == excluded
+        if _UNFINISHED.fullmatch(path.name) and not is_excluded and _is_old(path, age):
+            path.unlink(missing_ok=True)
+            removed.append(path)
     return removed
 
 

@@ -14,9 +14,11 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
+from lightfield.core.paths import files_below
 from lightfield.dataset import published
 from lightfield.dataset.lightfield import MACHINE, LightField, View
 from lightfield.dataset.names import BUILDERS, SOFTBOXES
@@ -69,16 +71,21 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     assert source.builder
     files = []
     for folder in _builder_folders(source.builder):
-        for file in sorted((BUILDERS / folder).rglob("*.py")):
+        for file in _sources(folder):
             files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
     return _digest([files, source.parameters.model_dump(exclude_none=True), version("bpy")])
+
+
+def _sources(folder: str) -> list[Path]:
+    """Return the files of source code in a folder of builders."""
+    return [file for file in files_below(BUILDERS / folder) if file.suffix == ".py"]
 
 
 def _builder_folders(builder: str) -> list[str]:
     """Return the folders with a builder's source: the library, its own, and those that it uses."""
     folders = ["library", builder]
     for folder in folders:
-        for file in sorted((BUILDERS / folder).rglob("*.py")):
+        for file in _sources(folder):
             imported = re.findall(r"^from scenes\.(\w+)", file.read_text(), re.MULTILINE)
             folders += [name for name in dict.fromkeys(imported) if name not in folders]
     return folders

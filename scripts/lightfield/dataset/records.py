@@ -11,20 +11,20 @@ On machines without a common folder, the view store takes the log's place.
 """
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
+    absolute_path,
     append_json_line,
     read_json,
-    read_json_lines,
     sha256,
     write_json,
 )
-from lightfield.dataset.shard_files import LOG_SUFFIX
+from lightfield.dataset.shard_files import LOG_SUFFIX, logged_lines
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
 
@@ -39,7 +39,8 @@ class ShardRecord:
     def __init__(self, path: Path | None, folder: Path) -> None:
         self._path = path
         self._folder = folder
-        self._dataset_folder = folder.resolve().name
+        # The name of a link, not that of the folder that it leads to.
+        self._dataset_folder = absolute_path(folder).name
         self._finished: dict[str, dict[str, Any]] = {}
         self._store = ViewStore.configured()
 
@@ -122,7 +123,7 @@ class ShardRecord:
         """The last line of the log for each file."""
         assert self._path
         log = _log(self._path)
-        return {line["file"]: line for line in _lines(log)} if log.exists() else {}
+        return {line["file"]: line for line in logged_lines(log)} if log.exists() else {}
 
     @cached_property
     def _logged_here(self) -> set[tuple[Any, Any, Any]]:
@@ -155,14 +156,9 @@ def _log(record: Path) -> Path:
 
 def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:
     """Return file, key and SHA-256 of every line of the logs."""
-    return {(line["file"], line["key"], line["sha256"]) for log in logs for line in _lines(log)}
-
-
-def _lines(log: Path) -> Iterator[dict[str, Any]]:
-    """Yield the complete lines of a log. Skips damaged lines."""
-    for line in read_json_lines(log):
-        if all(isinstance(line.get(key), str) for key in ("file", "key", "sha256")):
-            yield line
+    return {
+        (line["file"], line["key"], line["sha256"]) for log in logs for line in logged_lines(log)
+    }
 
 
 def _sums(file: Path) -> dict[str, Any]:

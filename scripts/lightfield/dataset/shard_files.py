@@ -1,11 +1,14 @@
 """The files of a shard: their names, and the contents of its record."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from stat import S_ISREG
+from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, read_json_lines
+from lightfield.core.paths import check_inside
 
 # A shard's other files have the name of its record, and these suffixes.
 # The journal says what the shard's processes did.
@@ -15,12 +18,31 @@ LOG_SUFFIX = ".sums.jsonl"
 
 
 def read_record(record: Path) -> dict[str, tuple[int, str]]:
-    """Return each file's bytes and SHA-256 by its path in the dataset. Errors name the record."""
+    """Return each file's bytes and SHA-256 by its path in the dataset. Errors name the record.
+
+    Raises `UserError` for a path that leads out of the dataset.
+    """
     content = read_json(record)
     try:
-        return {path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()}
+        files = {
+            path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()
+        }
     except (LookupError, TypeError, AttributeError):
         raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
+    for path in files:
+        check_inside(path, f"{record}: files")
+    return files
+
+
+def logged_lines(log: Path) -> Iterator[dict[str, Any]]:
+    """Yield the complete lines of a log. Skips damaged lines.
+
+    Raises `UserError` for a path that leads out of the dataset.
+    """
+    for line in read_json_lines(log):
+        if all(isinstance(line.get(key), str) for key in ("file", "key", "sha256")):
+            check_inside(line["file"], f"{log}: file")
+            yield line
 
 
 def recorded_sizes(record: Path, folder: str) -> dict[str, int] | None:

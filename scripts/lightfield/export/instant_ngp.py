@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import keep_apart, read_json, write_json
+from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.core.settings import checked, read_settings
 from lightfield.dataset.exports import (
@@ -61,7 +61,7 @@ def _pictures(path: Path) -> list[str]:
     """Return the images that a transforms.json names: views and depth maps."""
     try:
         frames = read_json(path)["frames"]
-        depths = [frame["depth_path"] for frame in frames if "depth_path" in frame]
+        depths = [str(frame["depth_path"]) for frame in frames if "depth_path" in frame]
         return [str(frame["file_path"]) for frame in frames] + depths
     except (UserError, LookupError, TypeError):
         raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
@@ -237,9 +237,14 @@ class _Writer:
         return DepthMaps(max(_DEPTH_UNIT, min(farthest, FARTHEST) / LARGEST_STEP))
 
     def relative(self, path: Path) -> str:
-        """Return a path relative to the transforms.json."""
-        start = self.output.parent.resolve()
-        return Path(os.path.relpath(path.resolve(), start)).as_posix()
+        """Return a path relative to the transforms.json.
+
+        A folder beside it may be a link, and is a folder in a package.
+        """
+        folder = absolute_path(self.output).parent
+        if absolute_path(path).is_relative_to(folder):
+            return absolute_path(path).relative_to(folder).as_posix()
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
 
     def depth(self, view: View, meaning: str) -> Floats:
         """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance"."""

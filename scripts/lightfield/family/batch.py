@@ -30,6 +30,7 @@ from lightfield.core.files import (
     size_and_time,
     write_json,
 )
+from lightfield.core.paths import place_in
 from lightfield.core.progress import Progress
 from lightfield.dataset.family import Member
 from lightfield.dataset.job_settings import BatchSettings
@@ -82,7 +83,10 @@ def _brought_journal(record: Path, work: Path) -> Path:
     if not store:
         return journal
     # The record is named in the folder of Snakemake's copies, to which ``work`` is a link.
-    journal = work / journal.resolve().relative_to(work.resolve())
+    place = place_in(work, journal)
+    if place is None:
+        raise UserError(f"{record}: must be in {work}")
+    journal = work / place
     store.bring(str(journal))
     return journal
 

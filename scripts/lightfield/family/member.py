@@ -215,7 +215,9 @@ class MemberBuild:
         """Write and return the record of a failed member. Removes what is half-written of it."""
         if stage != "validate":
             for entry in self.folder.iterdir() if self.folder.is_dir() else ():
-                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+                # What a user's link leads to stays.
+                is_folder = entry.is_dir() and not entry.is_symlink()
+                shutil.rmtree(entry) if is_folder else entry.unlink()
         failure = {"stage": stage, "cause": cause, "log": str(self.log)}
         return self._write({"state": "failed", "datasets": {}, "failure": failure})
 

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from lightfield.core.paths import files_below
 from lightfield.core.settings import Settings
 from lightfield.dataset import journal
 from lightfield.dataset.configuration import Energy
@@ -142,7 +143,8 @@ def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
     tables = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
     tables += [
         (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
-        for path in dataset.rglob("*.tsv")
+        for path in files_below(dataset)
+        if path.suffix == ".tsv"
     ]
     for name, path in tables:
         if name == "render":
@@ -194,8 +196,8 @@ def stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
     files = []
     for name in STAGE_PATHS.get(stage, (stage,)):
         for path in dataset.glob(name):
-            inside = [path] if path.is_file() else path.rglob("*")
-            files += [file for file in inside if file.is_file() and file.name not in NOT_COUNTED]
+            inside = [path] if path.is_file() else files_below(path)
+            files += [file for file in inside if file.name not in NOT_COUNTED]
     if stage == "export":
         return files
     exported = [dataset / stage / name for name in EXPORTED]

@@ -11,6 +11,7 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import listed
+from lightfield.core.paths import files_below
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
@@ -193,7 +194,7 @@ def _files(block: Any, path: str) -> list[Path]:
     """Return the files that a path stands for. Return the path itself if they do not exist."""
     folder = Path(path)
     if folder.is_dir():
-        return sorted(file for file in folder.rglob("*") if file.is_file()) or [folder]
+        return [*files_below(folder)] or [folder]
     if isinstance(block, bpy.types.Image) and block.source == "TILED":
         return [_tile(path, tile.number) for tile in block.tiles]
     sequence = getattr(block, "source", "") == "SEQUENCE" or getattr(block, "is_sequence", False)

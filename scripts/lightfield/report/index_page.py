@@ -7,12 +7,14 @@ from urllib.parse import quote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import files_below
 from lightfield.dataset.corpus import CORPUS
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page, tables
 from lightfield.validation.files import REPORT
 
 THUMBNAIL = 480
+_PAGE = (REPORT, "index.html")
 
 
 def write(output: Path, results: Path) -> None:
@@ -22,7 +24,7 @@ def write(output: Path, results: Path) -> None:
     corpus.json.
     """
     corpora = sorted(path.parent for path in results.glob(f"*/{CORPUS}"))
-    pages = sorted(results.glob(f"*/**/{REPORT}/index.html"))
+    pages = [path for path in files_below(results, strict=False) if path.parts[-2:] == _PAGE]
     datasets = []
     for path in pages:
         # A family may have thousands of members. Its own page has them.

@@ -16,6 +16,7 @@ import jinja2
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256
+from lightfield.core.paths import files_below
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
@@ -65,7 +66,8 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
 
     The folder of a sequence has a folder for each frame. The first one counts.
     """
-    lightfields = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
+    lightfields = [path for path in files_below(folder) if path.name == NAME]
+    lightfields.sort(key=lambda path: (len(path.parts), path))
     if not lightfields:
         raise UserError(f"{folder}: has no {NAME}")
     first = lightfields[0].parent
@@ -103,8 +105,9 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
     for path in transforms(folder):
         place = path.parent.relative_to(folder).as_posix()
         yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
-    for path in sorted(folder.rglob(MANIFEST)):
-        yield _loader(path, folder)
+    for path in files_below(folder):
+        if path.name == MANIFEST:
+            yield _loader(path, folder)
 
 
 def _loaders_of_sequence(folder: Path, first: Path) -> Iterator[tuple[str, str]]:
@@ -140,11 +143,9 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     )
     readme = environment.get_template("card.md.j2").render(**content)
     texts = {CARD: json.dumps(content, indent=1) + "\n", README: readme}
-    paths = sorted(
-        path
-        for path in folder.rglob("*")
-        if path.is_file() and REPORT not in path.relative_to(folder).parts[:2]
-    )
+    paths = [
+        path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
+    ]
     for old in target.parent.glob(f"{target.stem}.*.tar"):
         # Another rig's name may begin with this rig's name.
         if re.fullmatch(r"\.\d+", old.name[len(target.stem) : -len(".tar")]):

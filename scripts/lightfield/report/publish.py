@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
+from lightfield.core.paths import files_below
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
 from lightfield.dataset.scene_yaml import Credits
@@ -27,7 +28,7 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
             "publish: is missing in the scene YAML: see docs/how-to/publish-a-dataset.md"
         )
     card = package.card(folder, name, scene)
-    folders = sorted({path.parent for path in folder.glob(f"**/{SUMS}")})
+    folders = sorted({path.parent for path in files_below(folder) if path.name == SUMS})
     if not folders:
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
     datasets = [shards.read_dataset(folder, dataset) for dataset in folders]

@@ -5,6 +5,7 @@ a folder with its own lightfield.json and images.
 """
 
 import math
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, set_aside, sha256, write_text
+from lightfield.core.files import absolute_path, read_json, set_aside, sha256, write_text
+from lightfield.core.paths import (
+    files_below,
+    inside,
+    kept_behind_link,
+    leads_inside,
+    link_above,
+    place_in,
+    stray_places,
+)
 from lightfield.dataset.dataset_paths import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import FLOW, NAMES, Pass
@@ -381,20 +391,28 @@ def listed_files(dataset: Path, path: Path, manifest: Manifest) -> ListedFiles:
     list_name = path.relative_to(dataset).as_posix()
     listed = ListedFiles()
     for name in named_pictures:
-        target = (path.parent / name).resolve()
-        if target.is_file() and target.is_relative_to(dataset):
-            listed.pictures.append(target.relative_to(dataset))
+        if place := _listed_place(dataset, path, name):
+            listed.pictures.append(Path(place))
         else:
             listed.problems.append(f"{list_name}: {name} is not a file of the dataset")
     for name, digest in sums.items():
-        target = path.parent / name
-        if not target.resolve().is_relative_to(dataset) or not target.is_file():
+        place = _listed_place(dataset, path, name)
+        if place is None:
             listed.problems.append(f"{list_name}: {name} is not a file of the dataset")
-        elif sha256(target) != digest:
-            listed.problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
+        elif sha256(dataset / place) != digest:
+            listed.problems.append(f"{place}: is not as it was exported")
         else:
-            listed.other_files.append(target.relative_to(dataset).as_posix())
+            listed.other_files.append(place)
     return listed
+
+
+def _listed_place(dataset: Path, path: Path, name: str) -> str | None:
+    """Return the path in the dataset of a file that the list at ``path`` names.
+
+    The file may lie beside the list's folder. None if it is no file, or outside the dataset.
+    """
+    place = os.path.normpath(path.parent.relative_to(dataset) / name)
+    return place if leads_inside(place) and (dataset / place).is_file() else None
 
 
 def listing(
@@ -402,7 +420,7 @@ def listing(
 ) -> tuple[list[str], Check]:
     """Return the files that the dataset publishes, and a check that fails if there are others."""
     published, strays = _sorted_out(dataset, sets, owned)
-    problems = [f"{path}: is not a file of this dataset" for path in strays]
+    problems = stray_problems(dataset, strays, "dataset")
     return published, Check("files", not strays, f"{len(published)} files", problems=problems)
 
 
@@ -411,11 +429,38 @@ def _sorted_out(
 ) -> tuple[list[str], list[str]]:
     """Return the files that the dataset publishes, and all others in its folder."""
     all_owned = {*owned, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
-    paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
-    present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
-    beside = (*OUTPUTS, README, CARD)
-    strays = [path for path in present if path not in all_owned and path not in beside]
+    present = present_files(dataset, {REPORT})
+    folders = {image_set.folder for image_set in sets}
+    strays = strays_among(dataset, present, all_owned, folders)
     return [path for path in present if path in all_owned], strays
+
+
+def present_files(dataset: Path, excluded: Collection[str]) -> list[str]:
+    """Return the paths in the dataset of all its files but those in ``excluded`` subfolders."""
+    paths = [path.relative_to(dataset) for path in files_below(dataset)]
+    return sorted(path.as_posix() for path in paths if path.parts[0] not in excluded)
+
+
+def strays_among(
+    dataset: Path,
+    present: Iterable[str],
+    owned: Collection[str],
+    own_folders: Collection[str] = (),
+) -> list[str]:
+    """Return the files of ``present`` that are neither ``owned`` nor of a validation or package.
+
+    Those behind a foreign link are that link: see `stray_places`.
+    """
+    all_owned = {*owned, *OUTPUTS, README, CARD}
+    strays = [path for path in present if path not in all_owned]
+    return stray_places(dataset, strays, all_owned, own_folders)
+
+
+def stray_problems(dataset: Path, strays: Iterable[str], kind: str) -> list[str]:
+    """Return a line for each file that does not belong to a dataset or sequence."""
+    return [
+        f"{path}: is not a file of this {kind}{kept_behind_link(dataset, path)}" for path in strays
+    ]
 
 
 def remove_strays(
@@ -436,7 +481,9 @@ def remove_strays(
         return 0
     views, _ = of_views(dataset, sets)
     views += of_passes(dataset, sets)[0]
-    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, export_lists)
+    extras, lists, exports = of_exports(
+        absolute_path(dataset), sets, views, manifests, export_lists
+    )
     if exports.passed is False:
         return 0
     owned = {*lists, *json_files(sets), *(file.path for file in [*views, *extras])}
@@ -444,26 +491,28 @@ def remove_strays(
     # Leave hidden files: another process is writing them now.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
     strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
-    set_strays_aside(dataset, strays, folder)
-    return len(strays)
+    return set_strays_aside(dataset, strays, folder)
 
 
-def set_strays_aside(dataset: Path, strays: Sequence[str], folder: Path) -> None:
+def set_strays_aside(dataset: Path, strays: Iterable[str], folder: Path) -> int:
     """Move files out of a dataset into ``folder``, and remove the folders that become empty.
 
-    Says how many files it has moved.
+    Leaves files behind links, because the folder there may be of other use, too. Says how many
+    files it has moved, and returns the number.
     """
-    for name in strays:
+    moved = [name for name in strays if link_above(dataset, name) is None]
+    for name in moved:
         set_aside(dataset / name, folder)
         for parent in (dataset / name).parents:
             if parent == dataset or any(parent.iterdir()):
                 break
             parent.rmdir()
-    if strays:
+    if moved:
         print(
-            f"{dataset}: {len(strays)} files that are no longer its own are now below {folder}, "
+            f"{dataset}: {len(moved)} files that are no longer its own are now below {folder}, "
             "under their own paths"
         )
+    return len(moved)
 
 
 def checksums(
@@ -542,11 +591,15 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
 
 
 def read_sums(path: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file that a sha256sums.txt names below its own folder."""
+    """Return the SHA-256 of each file that a sha256sums.txt names.
+
+    Raises `UserError` for a name that leads out of the folder of the list.
+    """
     sums = {}
-    for line in path.read_text(encoding="utf-8").splitlines():
-        digest, _, name = line.partition("  ")
-        if name and ".." not in name.split("/") and not name.startswith("/"):
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        digest, separator, name = line.partition("  ")
+        if separator:
+            inside(path.parent, name, f"{path}: line {number}")
             sums[name] = digest
     return sums
 
@@ -554,6 +607,6 @@ def read_sums(path: Path) -> dict[str, str]:
 def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
     """Write ``checksums`` as sha256sum does, and the sum of ``result`` if the dataset holds it."""
     sums = dict(checksums)
-    if result.resolve().is_relative_to(dataset.resolve()):
-        sums[result.resolve().relative_to(dataset.resolve()).as_posix()] = sha256(result)
+    if place := place_in(dataset, result):
+        sums[place.as_posix()] = sha256(result)
     write_text(path, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))

@@ -12,18 +12,20 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
     absolute_path,
     broken,
     read_json,
-    read_json_lines,
     read_problem,
     set_aside,
     sha256,
 )
+from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
 from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
@@ -111,14 +113,27 @@ class Integrity:
         # Look for these files even if all lists with checksums are damaged.
         was_finished = self._published or self._is_noted(self.dataset / SUMS)
         present = set(self._present()) if was_finished else set()
-        for path in sorted(present - expected.keys()):
-            yield Fault(path, "is not a file of this dataset, or has no checksum")
+        for path in self._strays(present, expected):
+            name = path.relative_to(self.dataset).as_posix()
+            problem = "is not a file of this dataset, or has no checksum"
+            yield Fault(path, f"{problem}{kept_behind_link(self.dataset, name)}")
         for path in sorted(self._required_views(present) - expected.keys() - present):
             yield Fault(path, "is missing")
         wrong = {path for path, problem in problems.items() if problem}
         # Damaged lists do not tell which files must exist.
         if wrong.isdisjoint((self.dataset / NAME, self.dataset / "validation.json")):
             yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
+
+    def _strays(self, present: set[Path], expected: Mapping[Path, Any]) -> list[Path]:
+        """Return the files that the dataset must not have. A foreign link stands for its files."""
+        own_files = [
+            path.relative_to(self.dataset).as_posix()
+            for path in expected
+            if _is_below(path, self.dataset)
+        ]
+        strays = sorted(present - expected.keys())
+        names = [path.relative_to(self.dataset).as_posix() for path in strays]
+        return [self.dataset / name for name in stray_places(self.dataset, names, own_files)]
 
     def _ledger_faults(self, path: Path) -> Iterator[Fault]:
         damaged = ledger.damaged_lines(path)
@@ -137,12 +152,18 @@ class Integrity:
                 ledger.Ledger(ledger_path).compact()
             return
         for path in (fault.path, *self._followers(fault.path)):
-            if os.path.lexists(path):
+            if os.path.lexists(path) and not self._is_kept(path):
                 set_aside(path, self.work / "removed")
         if fault.path.name.endswith(_HISTORY):
             for name in ledger.read(ledger_path):
                 if os.path.relpath(name) == str(fault.path):
                     ledger.forget(ledger_path, name)
+
+    def _is_kept(self, path: Path) -> bool:
+        """Return whether a file is none of the dataset's, and a link leads to its folder."""
+        if path in self._expected or not _is_below(path, self.dataset):
+            return False
+        return link_above(self.dataset, path.relative_to(self.dataset).as_posix()) is not None
 
     def _followers(self, path: Path) -> Iterator[Path]:
         """Yield the declared output of the job that made ``path``, if that is another file."""
@@ -195,7 +216,7 @@ class Integrity:
         log = record.with_name(f"{record.stem}{LOG_SUFFIX}")
         if not self._is_sound(log):
             return {}
-        return {line["file"]: line["sha256"] for line in read_json_lines(log) if "file" in line}
+        return {line["file"]: line["sha256"] for line in shard_files.logged_lines(log)}
 
     @cached_property
     def _published(self) -> dict[Path, str]:
@@ -246,13 +267,14 @@ class Integrity:
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files. Those of its report only with a ledger, which lists them."""
-        for path in sorted(self.dataset.rglob("*")):
+        pictures = chain(self.dataset.glob("*/*.exr"), self.dataset.glob("*/*.png"))
+        # A folder may have taken a picture's place.
+        folders = (path for path in pictures if path.is_dir())
+        for path in chain(files_below(self.dataset), folders):
             parts = path.relative_to(self.dataset).parts
             is_addition = parts in ((SUMS,), (CARD,), (README,))
-            # A folder may have taken a picture's place.
-            is_file = not path.is_dir() or path.suffix in (".exr", ".png")
             is_own = not _FRAME.fullmatch(parts[0]) and (self._ledger or parts[0] != REPORT)
-            if is_file and is_own and not is_addition:
+            if is_own and not is_addition:
                 yield path
 
     def _required_views(self, present: set[Path]) -> set[Path]:

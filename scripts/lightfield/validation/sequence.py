@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import absolute_path, sha256
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, View
 from lightfield.dataset.passes import PASSES
@@ -23,16 +23,16 @@ from lightfield.validation.depth_questions import converted
 from lightfield.validation.exported_cameras import Expected, SetExport
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import (
-    CARD,
-    OUTPUTS,
-    README,
     File,
     ImageSet,
     ListedFiles,
     Manifest,
     listed_files,
+    present_files,
     read_sets,
     set_strays_aside,
+    stray_problems,
+    strays_among,
 )
 from lightfield.validation.pixels import Examiner
 from lightfield.validation.readers import read_sequence
@@ -89,12 +89,12 @@ def validate_sequence(
 
     The result holds all faults. Its checksums are those of the exports' files.
     """
-    rig = rig.resolve()
+    rig = absolute_path(rig)
     owned: list[str] = []
     intact: list[str] = []
     problems: dict[str, list[str]] = {"exports": [], "exported_cameras": [], "exported_depth": []}
     views = 0
-    for path in (list_.resolve() for list_ in lists):
+    for path in map(absolute_path, lists):
         try:
             owned += _owned(rig, path, manifest)
             listed = listed_files(rig, path, manifest)
@@ -125,7 +125,7 @@ def validate_sequence(
         )
         for name in problems
     ]
-    strays = [f"{path}: is not a file of this sequence" for path in _strays(rig, frames, owned)]
+    strays = stray_problems(rig, _strays(rig, frames, owned), "sequence")
     checks.append(Check("files", not strays, f"{len(intact)} files", problems=strays))
     digests = {path: sha256(rig / path) for path in sorted(intact)}
     return Result(f"{rig.parent.name}/{rig.name}", views, checks, digests)
@@ -138,11 +138,10 @@ def remove_strays(
 
     Moves nothing if a list of an export cannot be read.
     """
-    resolved = rig.resolve()
     owned: list[str] = []
-    for path in (list_.resolve() for list_ in lists):
+    for path in map(absolute_path, lists):
         try:
-            owned += _owned(resolved, path, manifest)
+            owned += _owned(absolute_path(rig), path, manifest)
         except UserError:
             return
     set_strays_aside(rig, _strays(rig, frames, owned), folder)
@@ -156,10 +155,7 @@ def _owned(rig: Path, path: Path, manifest: Manifest) -> list[str]:
 
 def _strays(rig: Path, frames: Collection[str], owned: Collection[str]) -> list[str]:
     """Return the files in a rig's folder that are of no frame and of no export."""
-    paths = [path.relative_to(rig) for path in rig.rglob("*") if path.is_file()]
-    present = sorted(path.as_posix() for path in paths if path.parts[0] not in frames)
-    all_owned = {*owned, *OUTPUTS, README, CARD}
-    return [path for path in present if path not in all_owned]
+    return strays_among(rig, present_files(rig, frames), owned)
 
 
 def _read_frames(rig: Path, path: Path, folders: Sequence[str]) -> list[Frame]:

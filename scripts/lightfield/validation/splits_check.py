@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import absolute_path, read_json
+from lightfield.core.paths import inside, place_in
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.geometry.rigs.split_setting import PARTS
@@ -25,8 +26,9 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
     validation or testing may have the pose of a training view: both would be the same picture.
     Raises `UserError` if splits.json cannot be read, or belongs to another scene.
     """
-    home = path.resolve().parent
-    if not dataset.is_relative_to(home):
+    home = absolute_path(path).parent
+    place = place_in(home, dataset)
+    if place is None:
         raise UserError(f"{path}: belongs to the rigs in {home}, but {dataset} is not in it")
     content = read_json(path)
     try:
@@ -36,7 +38,9 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
     # Views of one rig may be in several lists.
     folders = sorted({name.rpartition("/")[0] for name in chain(*parts.values())})
     try:
-        lightfields = {folder: LightField.read(path.parent / folder / NAME) for folder in folders}
+        lightfields = {
+            folder: LightField.read(inside(home, folder, str(path)) / NAME) for folder in folders
+        }
     except UserError as error:
         return Check("splits", False, "cannot be checked", problems=[str(error)])
     expected = splits_content(lightfields)
@@ -45,7 +49,7 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
         for part in PARTS
         if sorted(parts[part]) != sorted(expected[part])
     ]
-    lightfield = lightfields.get(dataset.relative_to(home).as_posix())
+    lightfield = lightfields.get(place.as_posix())
     split = {view.name: view.split for view in lightfield.views} if lightfield else {}
     source = rendered(sets)
     for image_set in sets:

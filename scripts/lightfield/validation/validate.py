@@ -25,7 +25,7 @@ import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
-from lightfield.core.files import sha256
+from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.shard_files import read_record
@@ -77,7 +77,7 @@ def validate(
 
     Raises `UserError` if one of these cannot be read. The result holds all faults of the dataset.
     """
-    dataset = dataset.resolve()
+    dataset = absolute_path(dataset)
     volumes = read_inventory(inventory, "volumes")["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence_checks = files.of_views(dataset, sets)

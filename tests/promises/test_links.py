@@ -1,0 +1,135 @@
+"""Folders of a dataset that are links: no view is lost, and nothing outside is moved."""
+
+import json
+import shutil
+import tarfile
+from pathlib import Path
+
+import bookkeeping
+import pytest
+from checkouts import checkout, snakemake
+
+SCENE = """
+licence: CC0-1.0
+scene: {builder: room}
+render: {samples: 1, passes: [normal, object]}
+rigs:
+  LFTrain:
+    type: plane
+    cameras: [2, 2]
+    size: 0.5
+    center: [0, 0, 1.2]
+    camera: {lens: equidistant, fov: 180, resolution: [32, 32]}
+    split: train
+  LFTest:
+    type: plane
+    cameras: [2, 1]
+    size: 0.3
+    center: [0, 0, 1.2]
+    camera: {lens: equidistant, fov: 180, resolution: [32, 32]}
+    split: test
+reprojections:
+  perspective:
+    camera: {lens: rectilinear, fov: 80, resolution: [24, 24]}
+    format: png
+exports:
+  instant_ngp: {sources: [perspective]}
+  nerfstudio: {sources: [perspective]}
+report: {panorama: false}
+"""
+DATASET = Path("results/linked/LFTrain")
+OTHER = Path("results/linked/LFTest")
+SUMS = "sha256sums.txt"
+# The folders that are links: those in one dataset, and the other dataset.
+LINKS = (
+    DATASET / "exr",
+    DATASET / "normal",
+    DATASET / "perspective",
+    DATASET / "report",
+    DATASET / "object",
+    OTHER,
+)
+
+
+def run(folder, *targets):
+    result = snakemake(
+        folder, "--cores", "2", "--config", "scenes=[linked]", "preset=full", "--", *targets
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+def tarred(folder, rig):
+    """Return the SHA-256 of each file in the package of a rig."""
+    with tarfile.open(folder / f"results/linked/linked_{rig}.tar") as archive:
+        assert all(entry.isreg() for entry in archive)
+        return {entry.name: archive.extractfile(entry).read() for entry in archive}
+
+
+def sums(folder, dataset):
+    """Return the checksums of all files but that of the validation, which takes a time."""
+    lines = (folder / dataset / SUMS).read_text().splitlines()
+    return sorted(line for line in lines if not line.endswith("  validation.json"))
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A build without links, and its packages."""
+    folder = checkout(tmp_path_factory.mktemp("links") / "plain", linked=SCENE)
+    run(folder, "all", "package")
+    return folder
+
+
+def assert_complete(folder, built):
+    """Check that a build with links publishes and packs what the build without them does."""
+    for dataset in (DATASET, OTHER):
+        assert sums(folder, dataset) == sums(built, dataset)
+        assert sum("  exr/" in line for line in sums(folder, dataset)) >= 2
+        assert json.loads((folder / dataset / "validation.json").read_text())["valid"]
+        archive = tarred(folder, dataset.name)
+        expected = tarred(built, dataset.name)
+        for content in (archive, expected):
+            # It has a time, and sha256sums.txt has its checksum.
+            del content[f"linked_{dataset.name}/validation.json"]
+            del content[f"linked_{dataset.name}/{SUMS}"]
+        assert archive == expected
+    page = (folder / "results/index.html").read_text()
+    assert "linked/LFTrain/report/index.html" in page
+    assert "linked/LFTest/report/index.html" in page
+    assert all((folder / link).is_symlink() for link in LINKS)
+    assert "no fault" in run_verify(folder)
+
+
+def run_verify(folder):
+    run(folder, "verify")
+    return (folder / "work/logs/verify.log").read_text()
+
+
+@pytest.mark.slow
+def test_a_build_into_linked_folders_has_every_view(built, tmp_path):
+    folder = checkout(tmp_path / "fresh", linked=SCENE)
+    for link in LINKS:
+        disk = tmp_path / "disk" / link.name
+        disk.mkdir(parents=True)
+        (folder / link).parent.mkdir(parents=True, exist_ok=True)
+        (folder / link).symlink_to(disk)
+    run(folder, "all", "package")
+    assert_complete(folder, built)
+    assert "Nothing to be done" in run(folder, "all")
+
+
+@pytest.mark.slow
+def test_a_dataset_whose_folders_move_behind_links_keeps_every_view(built, tmp_path):
+    folder = Path(shutil.copytree(built, tmp_path / "moved"))
+    for link in LINKS:
+        disk = tmp_path / "disk" / link.name
+        disk.parent.mkdir(exist_ok=True)
+        shutil.move(folder / link, disk)
+        (folder / link).symlink_to(disk)
+    for dataset in (DATASET, OTHER):
+        (folder / dataset / "validation.json").unlink()
+        (folder / f"results/linked/linked_{dataset.name}.tar").unlink()
+    before = bookkeeping.rendered(folder)
+    run(folder, "all", "package")
+    assert_complete(folder, built)
+    assert bookkeeping.rendered(folder) == before
