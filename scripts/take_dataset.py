@@ -10,7 +10,8 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, sha256
+from lightfield.core.files import read_keys, reading, sha256
+from lightfield.core.paths import inside
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
 
@@ -32,8 +33,9 @@ def take(store: ViewStore, dataset: Path) -> None:
     # Only now, so that --help need not wait for it.
     from lightfield.validation.files import REPORT
 
-    for name in store.names(f"{dataset}/{REPORT}"):
-        store.bring(f"{dataset}/{REPORT}/{name}")
+    report = dataset / REPORT
+    for name in store.names(str(report)):
+        store.bring(str(inside(report, name, f"{store.url}: {report}")))
     listing, sums = sums_of(store, dataset)
     progress = Progress(len(sums), "take", "files")
     lost_files = []
@@ -63,13 +65,17 @@ def sums_of(store: ViewStore, dataset: Path) -> tuple[Path, dict[Path, str]]:
         raise UserError(f"{listing}: is not in {store.url}: no run has finished it there")
     if is_archive:
         entries = read_keys(listing, "package.py", "parts")["parts"]
-        sums = {entry["file"]: entry["sha256"] for entry in entries}
+        with reading(f"{listing}: parts", "list of files and their sha256"):
+            sums = {str(entry["file"]): str(entry["sha256"]) for entry in entries}
     elif is_published:
         entities = read_keys(listing, "publish.py", "@graph")["@graph"]
-        sums = {entity["@id"]: entity["sha256"] for entity in entities if "sha256" in entity}
+        with reading(f"{listing}: @graph", "list of entities"):
+            files = [entity for entity in entities if "sha256" in entity]
+            sums = {str(entity["@id"]): str(entity["sha256"]) for entity in files}
     else:
         sums = read_sums(listing)
-    return listing, {listing.parent / name: digest for name, digest in sums.items()}
+    folder = listing.parent
+    return listing, {inside(folder, name, str(listing)): digest for name, digest in sums.items()}
 
 
 if __name__ == "__main__":

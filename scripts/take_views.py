@@ -13,6 +13,7 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
+from lightfield.core.paths import place_in
 from lightfield.core.progress import Progress
 from lightfield.dataset import shard_files
 from lightfield.dataset.view_store import VARIABLE, ViewStore
@@ -65,19 +66,20 @@ def main() -> None:
 def _stored(path: Path, results: Path, work: Path) -> str:
     """Return the path of a list in Snakemake's storage. ``path`` is the list's copy here."""
     for folder in (results, work):
-        if path.resolve().is_relative_to(folder.resolve()):
-            return str(folder / path.resolve().relative_to(folder.resolve()))
+        if place := place_in(folder, path):
+            return str(folder / place)
     raise UserError(f"{path}: must be in {results} or {work}")
 
 
 def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable[tuple[Path, str]]:
     """Return each file that a list names, and its SHA-256."""
     if re.fullmatch(r"\d+-\d+\.json", path.name):
-        if not path.resolve().is_relative_to(work.resolve()):
+        place = place_in(work, path)
+        if place is None:
             raise UserError(f"{path}: must be in {work}")
-        stage = path.resolve().parent.relative_to(work.resolve())
+        dataset = results / place.parent.parent
         files = shard_files.read_record(path).items()
-        return [(results / stage.parent / name, digest) for name, (_, digest) in files]
+        return [(dataset / name, digest) for name, (_, digest) in files]
     return [(path.parent / name, digest) for name, digest in store.listed(sha256(path))]
 
 

@@ -719,6 +719,50 @@ def test_a_changed_name_is_found(name, kind, file, old, new, said, dataset):
     assert any(said in line for line in problem_lines), problem_lines
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "file", "before", "old"),
+    [
+        ("perspective", "nerfstudio", "transforms.json", '"', "images/view_0003f.png"),
+        ("perspective", "nerfstudio", "transforms.json", '"file_path": "', "images/view_0003f.png"),
+        ("perspective", "nerfstudio", "transforms.json", '"', "depths/view_0003f.png"),
+        ("perspective", "nerfstudio", "transforms.json", '"', "points.ply"),
+        ("perspective", "nerf_synthetic", "transforms_train.json", '"', "train/view_0001f"),
+        ("perspective", "lichtfeld", "transforms.json", '"', "images/view_0003f.exr"),
+        ("perspective", "lichtfeld", "transforms.json", '"', "points.ply"),
+        ("split", "lichtfeld", "test.txt", "", "view_0001f.png"),
+        ("perspective", "opendibr", "cameras.json", '"', "view_0003f_texture.png"),
+        ("perspective", "opendibr", "cameras.json", '"', "view_0003f_depth.png"),
+        ("perspective", "miv", "sequence.json", '"Name": "', "view_0003f"),
+        ("perspective", "ncore", "views.json", '"', "views.ncore4.zarr"),
+        ("opencv", "colmap", "sparse/0/images.txt", "", "view_0003f.png"),
+        ("split", "colmap", "sparse/0/test.txt", "", "view_0001f.png"),
+        ("fisheye", "scannetpp", "train_test_lists.json", '"', "view_0003f.png"),
+    ],
+)
+def test_a_file_outside_its_export_is_not_one_of_it(
+    name, kind, file, before, old, dataset, tmp_path
+):
+    """The file is there, with the right content, but a copy of the dataset would lack it."""
+    export_folder = dataset / name / "exports" / kind
+    path = export_folder / file
+    text = path.read_text()
+    inner = export_folder / "images" if kind == "colmap" else export_folder
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.symlink_to(inner)
+    try:
+        for hostile in (f"{elsewhere}/{old}", f"../{inner.name}/{old}"):
+            pattern = rf"{re.escape(before)}(\./)?{re.escape(old)}"
+            changed_text, count = re.subn(pattern, before + hostile, text, count=1)
+            assert count == 1
+            path.write_text(changed_text)
+            lines = problems(dataset, name, kind)
+            assert any(re.search("in its folder, without|must be a file name", x) for x in lines), (
+                lines
+            )
+    finally:
+        path.write_text(text)
+
+
 NCORE = "ncore/views.ncore4.zarr"
 NCORE_LENS = f"{NCORE}/intrinsics/default/cameras/camera/.zattrs"
 NCORE_POSES = f"{NCORE}/poses/default/dynamic_poses/.zattrs"

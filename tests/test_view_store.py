@@ -227,6 +227,82 @@ def test_a_finished_dataset_is_fetched_by_its_checksums(tmp_path, monkeypatch, s
     assert str(dataset / "perspective/lightfield.json") in wrong.stderr
 
 
+HOSTILE = ["../../x", "exr/../../../../x", "{outside}/x", ""]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("kind", ["sums", "archive", "crate"])
+def test_no_dataset_of_a_storage_is_written_outside_its_folder(
+    kind, name, tmp_path, monkeypatch, store, run_program
+):
+    home = tmp_path / "home/deep"
+    home.mkdir(parents=True)
+    monkeypatch.chdir(home)
+    name = name.format(outside=tmp_path)
+    store.put(write(tmp_path / "hostile", b"hostile"), digest(b"hostile"))
+    (tmp_path / "hostile").unlink()
+    stored = Path(store.url, "results/s")
+    if kind == "sums":
+        write(stored / "rig/sha256sums.txt", f"{digest(b'hostile')}  {name}\n".encode())
+    elif kind == "archive":
+        entry = {"file": name, "bytes": 7, "sha256": digest(b"hostile")}
+        write_json(stored / "rig.json", {"parts": [entry]})
+    else:
+        entity = {"@id": name, "sha256": digest(b"hostile")}
+        write_json(stored / "published/rig/ro-crate-metadata.json", {"@graph": [entity]})
+    path = {"sums": "rig", "archive": "rig.json", "crate": "published/rig"}[kind]
+    before = files(tmp_path)
+    result = run_program("take_dataset.py", "--store", store.url, f"results/s/{path}", check=False)
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert f"is {name!r}; must be the path of a file in its folder, without .." in line
+    # Only the list itself has come.
+    assert len(files(tmp_path) - before) == 1
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("kind", ["record", "note"])
+def test_no_file_of_a_list_is_written_outside_its_dataset(
+    kind, name, tmp_path, monkeypatch, store, run_program
+):
+    home = tmp_path / "home/deep"
+    home.mkdir(parents=True)
+    monkeypatch.chdir(home)
+    name = name.format(outside=tmp_path)
+    hostile = write(tmp_path / "hostile", b"hostile")
+    store.put(hostile, digest(b"hostile"))
+    path = home / RECORD
+    if kind == "record":
+        write_json(path, {"files": {name: {"bytes": 7, "sha256": digest(b"hostile")}}})
+    else:
+        path = home / "results/s/rig/exports/colmap/export.json"
+        write_json(path, {"format": "colmap"})
+        store.put_view(hostile, name, sha256(path), digest(b"hostile"))
+    before = files(tmp_path)
+    arguments = ("--results", "results", "--work", "work", path)
+    result = run_program("take_views.py", *arguments, check=False)
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert f"is {name!r}; must be the path of a file in its folder, without .." in line
+    assert files(tmp_path) == before
+
+
+def test_a_taken_file_replaces_a_link_and_not_what_it_leads_to(store, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outside = write(tmp_path / "outside", b"mine")
+    store.put(write(tmp_path / "view", b"view"), digest(b"view"))
+    taken = tmp_path / "results/exr/a.exr"
+    taken.parent.mkdir(parents=True)
+    taken.symlink_to(outside)
+    assert store.take(digest(b"view"), taken)
+    assert taken.read_bytes() == b"view"
+    assert outside.read_bytes() == b"mine"
+
+
+def files(folder):
+    return {path for path in folder.rglob("*") if path.is_file()}
+
+
 def write(path, content):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.core.paths import leads_inside
 from lightfield.core.settings import checked
 from lightfield.dataset.family import RECORD
 
@@ -53,6 +54,13 @@ class MemberRecord(_Record):
     def _has_what_its_state_needs(self) -> Self:
         if self.state == "failed" and self.failure is None:
             raise ValueError("failure: is missing, although state is failed")
+        return self
+
+    @model_validator(mode="after")
+    def _has_datasets_in_its_folder(self) -> Self:
+        for rig in self.datasets:
+            if not leads_inside(rig):
+                raise ValueError(f"datasets: {rig!r} must be a folder in that of the member")
         return self
 
     @property

@@ -5,6 +5,7 @@ validation and reprojection all use this table.
 """
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -77,7 +78,12 @@ def _light(name: str, meaning: str, *cycles: str, factor: str | None = None) -> 
 
 
 def of_group(group: str) -> Pass:
-    """Return the pass of the light of a light group. Their sum is the colour."""
+    """Return the pass of the light of a light group. Their sum is the colour.
+
+    Raises KeyError for a name that no group can have, because it names a folder.
+    """
+    if not re.fullmatch(light_groups.NAME_PATTERN, group):
+        raise KeyError(group)
     name = group_pass(group)
     return _light(name, f"light that comes from the light group {group}", name)
 

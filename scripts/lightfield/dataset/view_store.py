@@ -23,6 +23,7 @@ from typing import Any, Self
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, sha256
+from lightfield.core.paths import check_inside
 
 # The environment variable with which the workflow tells its programs where the store is.
 VARIABLE = "PLENOFORGE_STORE"
@@ -130,12 +131,18 @@ class ViewStore:
             self.put_view(file, name, key, sha256(file))
 
     def listed(self, key: str) -> list[tuple[str, str]]:
-        """Return name and SHA-256 of each file that the settings of ``key`` have made."""
+        """Return name and SHA-256 of each file that the settings of ``key`` have made.
+
+        Raises `UserError` for a note whose name leads out of the folder of the files.
+        """
         listed = []
-        for note in self.names(f"views/keys/{key}"):
+        folder = f"views/keys/{key}"
+        for note in self.names(folder):
             name, separator, digest = note.rpartition("@")
             if separator:
-                listed.append((name.replace("@", "/"), digest))
+                name = name.replace("@", "/")
+                check_inside(name, f"{self.url}: {folder}/{note}")
+                listed.append((name, digest))
         return listed
 
     def has(self, digest: str, size: int) -> bool:

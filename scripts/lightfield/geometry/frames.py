@@ -132,6 +132,9 @@ def _frame(where: str, content: Any) -> Frame:
     for missing_key, given_key in (("position", "rotation"), ("rotation", "position")):
         if missing_key not in pose and given_key in pose:
             raise UserError(f"{where}: {missing_key}: is missing beside {given_key}")
+    if "flow" in others:
+        # It names files, too.
+        check_name(f"{where}: flow", others["flow"])
     if not pose:
         raise UserError(f"{where}: world_matrix: is missing, or position and rotation are")
     return Frame(

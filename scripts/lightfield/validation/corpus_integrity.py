@@ -7,7 +7,8 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from lightfield.core.files import broken, read_json, set_aside
+from lightfield.core.files import broken, read_json, reading, set_aside
+from lightfield.core.paths import check_inside
 from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
 from lightfield.dataset.family import RECORD
 from lightfield.validation.files import SUMS, read_sums
@@ -67,8 +68,13 @@ def _required(folder: Path, sums: Mapping[str, str]) -> set[str]:
     """Return corpus.json and, if its checksum holds, the lists of sums of the datasets in it."""
     if file_problem(folder / CORPUS, sums.get(CORPUS, ""), SUMS):
         return {CORPUS}
-    members = read_json(folder / CORPUS)["members"]
-    lists = {
-        f"{member['name']}/{rig}/{SUMS}" for member in members for rig in member.get("datasets", {})
-    }
+    with reading(folder / CORPUS, "corpus"):
+        members = read_json(folder / CORPUS)["members"]
+        lists = {
+            f"{member['name']}/{rig}/{SUMS}"
+            for member in members
+            for rig in member.get("datasets", {})
+        }
+    for name in lists:
+        check_inside(name, f"{folder / CORPUS}: members")
     return {CORPUS, *lists}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import reading
+from lightfield.core.paths import check_inside
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from lightfield.validation.readers.contents import (
     FLOAT32,
@@ -28,6 +29,7 @@ from lightfield.validation.readers.contents import (
     development,
     from_texts,
     numbers,
+    views_listed,
 )
 
 Ints = NDArray[np.int64]
@@ -108,7 +110,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     tests = folder / "test.txt"
     if tests.is_file():
         with reading(tests, "list of images"):
-            names = [Path(line).stem for line in tests.read_text(encoding="utf-8").splitlines()]
+            names = views_listed(str(tests), tests.read_text(encoding="utf-8").splitlines())
         exported.parts.append(Part(str(tests), "test", names))
     for image in model.images:
         view = Path(image.name).stem
@@ -135,6 +137,8 @@ def read_model(folder: Path, suffix: str) -> Model:
         images = _binary_images(images_path) if is_binary else _text_images(images_path)
         if not images:
             raise ValueError("it is empty")
+        for image in images:
+            check_inside(image.name, f"{images_path}: image {image.number}")
     points_path = folder / f"points3D{suffix}"
     with reading(points_path, "COLMAP points3D file"):
         points = _binary_points(points_path) if is_binary else _text_points(points_path)

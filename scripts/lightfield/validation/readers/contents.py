@@ -1,7 +1,7 @@
 """What an export says of a dataset, in the axes and metres of lightfield.json."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lightfield.core.paths import check_inside
 from lightfield.validation.readers.cameras import Camera
 
 Floats = NDArray[np.float64]
@@ -217,6 +218,18 @@ class Exported:
             self.faults.append(f"{place}: is {path.name}; must be {picture.format(view)}")
         elif not path.is_file():
             self.faults.append(f"{place}: there is no file {path}")
+
+
+def views_listed(place: str, files: Iterable[Any]) -> list[str]:
+    """Return the views whose files a list names. ``place`` is the list.
+
+    Raises `UserError` for a file outside the export.
+    """
+    views = []
+    for file in files:
+        check_inside(file, place)
+        views.append(Path(file).stem)
+    return views
 
 
 def development(options: Mapping[str, Any]) -> tuple[float, float]:

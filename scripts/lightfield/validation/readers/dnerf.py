@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import inside
 from lightfield.validation.readers.cameras import Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -44,7 +45,8 @@ def read(
                 place = f"frames[{index}]"
                 with reading(f"{path}: {place}", "frame"):
                     time = number(entry["time"])
-                    picture = listing.parent / f"{entry['file_path']}.png"
+                    file = f"{entry['file_path']}.png"
+                    picture = inside(listing.parent, file, f"{path}: {place}: file_path")
                     matrix = numbers(entry["transform_matrix"], (4, 4))
                 frame = next((n for n in frames if abs(times[n] - time) < _ROUNDING), None)
                 if frame is None or time < previous or (index == 0 and time != 0):

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.files import read_json, read_text, reading
+from lightfield.core.paths import inside
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -14,6 +15,7 @@ from lightfield.validation.readers.contents import (
     development,
     number,
     numbers,
+    views_listed,
 )
 from lightfield.validation.readers.ply import read_ply
 
@@ -30,7 +32,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         for index, frame in enumerate(content["frames"]):
             place = f"frames[{index}]"
             with reading(f"{path}: {place}", "frame"):
-                picture = folder / str(frame["file_path"])
+                picture = inside(folder, frame["file_path"], f"{path}: {place}: file_path")
                 matrix = numbers(frame["transform_matrix"], (4, 4))
                 exported.views.append(ExportedView(path, place, picture.stem, matrix))
                 exported.expect_picture(f"{path}: {place}", picture, picture.stem, image)
@@ -38,14 +40,15 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 exported.add_picture(picture, view, "colour", development=development(options))
                 exported.add_mask(folder / "masks" / f"{view}.png", view)
                 exported.add_picture(folder / "depth" / f"{view}.png", view, "relative")
-        cloud, faults = read_ply(folder / str(content["ply_file_path"]))
+        points = inside(folder, content["ply_file_path"], f"{path}: ply_file_path")
+        cloud, faults = read_ply(points)
     exported.clouds.append(cloud)
     exported.faults += faults
     _check_side_folders(folder, exported, options)
     for part in ("train", "test"):
         names = read_text(folder / f"{part}.txt").splitlines()
         place = str(folder / f"{part}.txt")
-        exported.parts.append(Part(place, part, [Path(name).stem for name in names]))
+        exported.parts.append(Part(place, part, views_listed(place, names)))
         for name in names:
             exported.expect(f"{place}: {name}: suffix", Path(name).suffix, f".{options['format']}")
     return exported

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_json, reading
+from lightfield.geometry.frames import check_name
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.validation.readers.contents import (
     Exported,
@@ -42,6 +43,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             place = f"cameras[{index}]"
             with reading(f"{path}: {place}", "camera"):
                 where = f"{path}: {place} ({names[index]})"
+                check_name(where, names[index])
                 exported.views.append(ExportedView(path, place, names[index], _matrix(camera)))
                 exported.cameras.append(ExportedCamera(where, lens_of(camera)))
                 exported.ranges.append(depth_range_of(where, names[index], camera))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import files_below, inside
 from lightfield.geometry.exposure import pose_between
 from lightfield.validation.readers.cameras import Camera, FTheta, Pinhole
 from lightfield.validation.readers.contents import (
@@ -54,7 +55,9 @@ class Store:
         # `Path.relative_to` is slow for many files.
         depth = len(folder.parts)
         names = {
-            "/".join(file.parts[depth:]) for file in folder.rglob(".z*") if file.name != METADATA
+            "/".join(file.parts[depth:])
+            for file in files_below(folder)
+            if file.name.startswith(".z") and file.name != METADATA
         }
         for name in sorted(names | self.metadata.keys()):
             if name not in names or name not in self.metadata:
@@ -95,7 +98,8 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     with reading(path, "sequence of NCore"):
         sequence = read_json(path)
         (entry,) = sequence["component_stores"]
-        store = Store(listing.parent / str(entry["path"]), exported)
+        place = f"{path}: component_stores: path"
+        store = Store(inside(listing.parent, entry["path"], place), exported)
         root = store.metadata[".zattrs"]
         for key in (
             "sequence_id",

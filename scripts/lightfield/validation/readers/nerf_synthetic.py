@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import inside
 from lightfield.validation.readers.cameras import Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -36,7 +37,8 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             for index, frame in enumerate(content["frames"]):
                 place = f"frames[{index}]"
                 with reading(f"{path}: {place}", "frame"):
-                    picture = listing.parent / f"{frame['file_path']}.png"
+                    file = f"{frame['file_path']}.png"
+                    picture = inside(listing.parent, file, f"{path}: {place}: file_path")
                     view = picture.stem
                     names.append(view)
                     exported.expect_picture(f"{path}: {place}: file_path", picture, view, "{}.png")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import inside
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -19,6 +20,7 @@ from lightfield.validation.readers.contents import (
     development,
     number,
     numbers,
+    views_listed,
 )
 from lightfield.validation.readers.ply import read_ply
 
@@ -45,8 +47,9 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 exported.views.append(ExportedView(path, place, name, matrix))
                 for key in ("file_path", "mask_path", "depth_file_path"):
                     if key in frame:
-                        picture = folder / str(frame[key])
-                        exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
+                        where = f"{path}: {place}: {key}"
+                        picture = inside(folder, frame[key], where)
+                        exported.expect_picture(where, picture, name, "{}.png")
                 _add_pictures(folder, frame, name, options, exported)
         # Either all frames have a mask, or none. The options say whether they have depth.
         masks = sum("mask_path" in frame for frame in frames)
@@ -55,9 +58,11 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         expected_depths = len(frames) if options["depth"] else 0
         exported.expect(f"{path}: frames with a depth_file_path", depths, expected_depths)
         for part, name in PARTS.items():
-            names = [Path(str(file)).stem for file in content[f"{part}_filenames"]]
-            exported.parts.append(Part(f"{path}: {part}_filenames", name, names))
-        cloud, faults = read_ply(folder / str(content["ply_file_path"]), undone)
+            place = f"{path}: {part}_filenames"
+            views = views_listed(place, content[f"{part}_filenames"])
+            exported.parts.append(Part(place, name, views))
+        points = inside(folder, content["ply_file_path"], f"{path}: ply_file_path")
+        cloud, faults = read_ply(points, undone)
     exported.clouds.append(cloud)
     exported.faults += faults
     return exported

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_json, reading
+from lightfield.core.paths import inside
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.validation.readers.contents import (
     Exported,
@@ -57,8 +58,9 @@ def _read_camera(
     suffix, colour_bits, depth_bits = pictures
     name = str(camera["NameColor"]).removesuffix(f"_texture{suffix}")
     for key, kind in (("NameColor", "texture"), ("NameDepth", "depth")):
-        picture = path.parent / str(camera[key])
-        exported.expect_picture(f"{path}: {place}: {key}", picture, name, f"{{}}_{kind}{suffix}")
+        at_key = f"{path}: {place}: {key}"
+        picture = inside(path.parent, camera[key], at_key)
+        exported.expect_picture(at_key, picture, name, f"{{}}_{kind}{suffix}")
     where = f"{path}: {place} ({name})"
     for key, bits in (("BitDepthColor", colour_bits), ("BitDepthDepth", depth_bits)):
         exported.expect(f"{where}: {key}", camera[key], bits)

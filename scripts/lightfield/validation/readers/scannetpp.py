@@ -5,7 +5,7 @@ from typing import Any
 
 from lightfield.core.files import read_json, reading
 from lightfield.validation.readers.colmap import exported_model, read_model
-from lightfield.validation.readers.contents import Exported, Part, development
+from lightfield.validation.readers.contents import Exported, Part, development, views_listed
 
 IMAGES = "image_undistorted_fisheye"
 
@@ -23,8 +23,8 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     with reading(path, "list of ScanNet++'s"):
         content = read_json(path)
         for part in ("train", "test"):
-            names = [Path(str(name)).stem for name in content[part]]
-            exported.parts.append(Part(f"{path}: {part}", part, names))
+            place = f"{path}: {part}"
+            exported.parts.append(Part(place, part, views_listed(place, content[part])))
         masks = any((folder / IMAGES).glob("*_mask.png"))
         exported.expect(f"{path}: has_masks", content["has_masks"], masks)
     return exported

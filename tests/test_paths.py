@@ -1,0 +1,191 @@
+"""Paths that files name lead nowhere else, and walks follow links without end."""
+
+from pathlib import Path
+
+import pytest
+
+from lightfield.core import leftovers
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256, write_json
+from lightfield.core.paths import files_below, inside, place_in
+from lightfield.dataset import shard_files
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.member_record import read_member
+from lightfield.dataset.view_store import ViewStore
+from lightfield.validation.corpus_integrity import corpus_faults
+from lightfield.validation.files import read_sums
+
+# Each leads to a file beside the folder "home", or to none.
+HOSTILE = ["../x", "a/../../x", "..", "/tmp/x", "//tmp/x", "", ".", "a\0b", "./../x"]
+DIGEST = "0" * 64
+
+
+def write(path, content="x"):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content)
+    return path
+
+
+@pytest.mark.parametrize("name", [*HOSTILE, None, 3, ["x"]])
+def test_a_path_that_leads_out_of_its_folder_is_refused(name, tmp_path):
+    with pytest.raises(UserError, match=r"list\.json: files: is "):
+        inside(tmp_path, name, "list.json: files")
+
+
+@pytest.mark.parametrize("name", ["x", "./x", "a/x", "..x", "x..", "a\\..\\x", "…"])
+def test_other_names_stay_in_the_folder(name, tmp_path):
+    path = inside(tmp_path, name, "list.json")
+    write(path)
+    assert path.resolve().is_relative_to(tmp_path.resolve())
+
+
+def test_a_walk_follows_links_to_folders_and_files(tmp_path):
+    dataset, disk = tmp_path / "dataset", tmp_path / "disk"
+    write(disk / "exr/b.exr")
+    write(disk / "exr/deep/c.exr")
+    write(disk / "one.exr")
+    write(dataset / "a.json")
+    (dataset / "exr").symlink_to(disk / "exr")
+    (dataset / "linked.exr").symlink_to(disk / "one.exr")
+    (dataset / "gone.exr").symlink_to("nowhere")
+    (dataset / "self.exr").symlink_to("self.exr")
+    expected = ["a.json", "exr/b.exr", "exr/deep/c.exr", "linked.exr"]
+    assert [path.relative_to(dataset).as_posix() for path in files_below(dataset)] == expected
+    (tmp_path / "way").symlink_to(dataset)
+    assert [*files_below(tmp_path / "way")] == [tmp_path / "way" / name for name in expected]
+    assert [*files_below(tmp_path / "nowhere")] == []
+
+
+@pytest.mark.parametrize("target", [".", "..", "/", "../exr"])
+def test_a_link_to_a_folder_that_it_lies_in_is_named_and_the_walk_ends(target, tmp_path):
+    write(tmp_path / "dataset/exr/a.exr")
+    (tmp_path / "dataset/exr/loop").symlink_to(target)
+    with pytest.raises(UserError, match="exr/loop: is a link to a folder that it lies in; remove"):
+        list(files_below(tmp_path / "dataset"))
+    files = files_below(tmp_path / "dataset", strict=False)
+    assert [path.name for path in files] == ["a.exr"]
+
+
+def test_two_folders_that_link_to_each_other_end_a_walk(tmp_path):
+    write(tmp_path / "one/a")
+    write(tmp_path / "two/b")
+    (tmp_path / "one/two").symlink_to(tmp_path / "two")
+    (tmp_path / "two/one").symlink_to(tmp_path / "one")
+    with pytest.raises(UserError, match="one/two/one: is a link"):
+        list(files_below(tmp_path / "one"))
+
+
+def test_a_folder_that_nobody_may_read_hides_no_views(nobody):
+    write(nobody / "dataset/exr/a.exr")
+    (nobody / "dataset/exr").chmod(0)
+    with pytest.raises(UserError, match="exr: cannot be read: "):
+        list(files_below(nobody / "dataset"))
+    assert list(files_below(nobody / "dataset", strict=False)) == []
+    (nobody / "dataset/exr").chmod(0o700)
+
+
+def test_unfinished_files_behind_links_are_removed(tmp_path):
+    unfinished = write(tmp_path / "disk/.view_0000f.123.tmp.exr")
+    (tmp_path / "dataset").mkdir()
+    (tmp_path / "dataset/exr").symlink_to(tmp_path / "disk")
+    (tmp_path / "disk/loop").symlink_to(".")
+    assert leftovers.remove_unfinished(tmp_path / "dataset", age=-1) == [
+        tmp_path / "dataset/exr" / unfinished.name
+    ]
+    assert not unfinished.exists()
+
+
+def test_a_place_is_found_through_the_links_to_its_folder(tmp_path):
+    write(tmp_path / "disk/rig/exr/a.exr")
+    (tmp_path / "big").mkdir()
+    (tmp_path / "scene").symlink_to(tmp_path / "disk")
+    (tmp_path / "disk/linked").symlink_to(tmp_path / "big")
+    for folder in ("scene", "disk"):
+        for other in ("scene", "disk"):
+            found = place_in(tmp_path / folder, tmp_path / other / "rig/exr/a.exr")
+            assert found == Path("rig/exr/a.exr")
+            # The name in the folder counts, not that of the folder that it leads to.
+            assert place_in(tmp_path / folder, tmp_path / other / "linked") == Path("linked")
+    assert place_in(tmp_path / "big", tmp_path / "disk/rig") is None
+
+
+# ---- the files that name paths ---------------------------------------------------------------
+
+
+def sums_file(home, name):
+    return read_sums(write(home / "sha256sums.txt", f"{DIGEST}  {name}\n"))
+
+
+def record(home, name):
+    path = home / "0-1.json"
+    write_json(path, {"files": {name: {"bytes": 1, "sha256": DIGEST}}})
+    return shard_files.read_record(path)
+
+
+def log(home, name):
+    path = home / "0-1.sums.jsonl"
+    path.parent.mkdir(exist_ok=True)
+    write_json(path, {})
+    with path.open("a") as file:
+        file.write('{"file": %s, "key": "k", "sha256": "%s"}\n' % (quoted(name), DIGEST))  # noqa: UP031
+    return list(shard_files.logged_lines(path))
+
+
+def note(home, name):
+    class Store(ViewStore):
+        """An object store, where a name may have any letters."""
+
+        def names(self, folder):
+            return [f"{name.replace('/', '@')}@{DIGEST}"]
+
+    return Store(str(home)).listed("key")
+
+
+def member(home, name):
+    entry = {"views": 1, "bytes": 1, "sha256sums": DIGEST}
+    content = {"name": "m", "state": "valid", "datasets": {name: entry}}
+    write_json(home / "m/member.json", content)
+    return read_member(home / "m")
+
+
+def flow(home, name):
+    view = {"name": "a", "position": [0, 0, 0], "rotation": [0, 0, 0], "flow": name}
+    return lightfield(home, {}, view)
+
+
+def light_group(home, name):
+    return lightfield(home, {"render": {"light_groups": {name: ["Lamp"]}}})
+
+
+def lightfield(home, content, view=None):
+    camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": 180}
+    frame = view or {"name": "a", "position": [0, 0, 0], "rotation": [0, 0, 0]}
+    path = home / "lightfield.json"
+    write_json(path, {"camera": camera, "resolution": [8, 8], "frames": [frame], **content})
+    return LightField.read(path)
+
+
+def view_name(home, name):
+    return lightfield(home, {}, {"name": name, "position": [0, 0, 0], "rotation": [0, 0, 0]})
+
+
+def quoted(name):
+    return '"' + name.replace("\0", "\\u0000") + '"'
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize(
+    "read", [sums_file, record, log, note, member, flow, light_group, view_name]
+)
+def test_no_reader_takes_a_path_that_leads_out_of_its_folder(read, name, tmp_path):
+    with pytest.raises(UserError):
+        read(tmp_path / "home", name)
+
+
+def test_a_corpus_has_no_file_outside_its_folder(tmp_path):
+    home = tmp_path / "home"
+    for member, rig in (("..", "x"), ("m", "../../x"), ("/tmp", "x")):
+        write_json(home / "corpus.json", {"members": [{"name": member, "datasets": {rig: {}}}]})
+        write(home / "sha256sums.txt", f"{sha256(home / 'corpus.json')}  corpus.json\n")
+        with pytest.raises(UserError, match=r"corpus.json: members: is .*; must be the path of"):
+            list(corpus_faults(home))
