@@ -26,12 +26,14 @@ from pathlib import Path
 import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+import bookkeeping
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.view_store import ViewStore
 from soak import DATASET, ROOT, SCENE, Build, count_renders, write_text
 
 # The server's own environment, in the repository.
@@ -160,12 +162,11 @@ class Cloud(Disk):
 
     def published(self) -> dict[str, str]:
         """Return the SHA-256 of each published file, computed from the bytes in the storage."""
-        store = ViewStore(self.store)
         with contextlib.chdir(self.root):
-            store.bring(str(DATASET / "sha256sums.txt"))
+            bookkeeping.bring_stored(self.store, DATASET / "sha256sums.txt")
             for name, digest in super().published().items():
-                if not store.take(digest, DATASET / name):
-                    store.bring(str(DATASET / name))
+                if not bookkeeping.take_stored(self.store, digest, DATASET / name):
+                    bookkeeping.bring_stored(self.store, DATASET / name)
         return {name: sha256(self.root / DATASET / name) for name in super().published()}
 
     def render_counts(self) -> Counter[str]:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from lightfield.core.files import read_json_lines, sha256, write_json
 from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.view_store import ViewStore
 from lightfield.validation.integrity import Integrity
 
 # The notes of all jobs of a build.
@@ -81,7 +82,7 @@ def problems(folders, work="work"):
 
 
 class Noted(NamedTuple):
-    """What is noted about the job of an output: the SHA-256 of what it read, and of its files."""
+    """What is noted about a job: the SHA-256 of each file that it read, and that it made."""
 
     inputs: dict[str, str]
     files: dict[str, str]
@@ -90,7 +91,7 @@ class Noted(NamedTuple):
 def noted(folder):
     """Return what is noted in a build's folder, by the outputs of its jobs."""
     return {
-        output: Noted(_digests(job.inputs), _digests(job.files | job.history))
+        output: Noted(_digests(job.inputs), _digests(job.files))
         for job in _latest_jobs(folder)
         for output in job.outputs
     }
@@ -188,28 +189,42 @@ def note_shard(record, folder, files, key):
     shard.write(files)
 
 
-def note_build(folder, datasets, inputs, time):
-    """Note that each file of these datasets has a job of its own, which read its ``inputs``.
+def write_shard(record, files):
+    """Write the notes of a finished shard of views. ``files`` have a path, a key and sums each."""
+    record.parent.mkdir(parents=True, exist_ok=True)
+    lines = [json.dumps({"file": path, "key": key, **sums}) + "\n" for path, key, sums in files]
+    record.with_suffix(shard_files.LOG_SUFFIX).write_text("".join(lines))
+    record.write_text(json.dumps({"files": {path: sums for path, _, sums in files}}))
 
-    ``time`` is when the last job finished.
+
+def write_batch(record, members, rigs):
+    """Write the notes of a finished batch of a family. Each of its ``members`` has these rigs."""
+    datasets = {rig: {"split": None} for rig in rigs}
+    finished = {name: {"state": "valid", "datasets": datasets} for name in members}
+    write_json(record, {"sources": {}, "members": finished})
+
+
+def note_build(folder, inputs, shards, time):
+    """Note that each output in ``inputs`` has a job of its own, which read these inputs.
+
+    ``shards`` are the records of shards, with the folders of their datasets. ``time`` is when the
+    last job finished.
     """
     with contextlib.chdir(folder):
-        jobs = ledger.Ledger(Path(NOTES))
-        for dataset in datasets:
-            for name in (*dataset.files, *dataset.intermediates):
-                if name in jobs:
-                    continue
-                files = {name: ledger.Stamp.of(name)}
-                history = {}
-                if name in dataset.all_records:
-                    listed = [
-                        f"{dataset.folder}/{view}" for view in shard_files.read_record(Path(name))
-                    ]
-                    files |= {view: ledger.Stamp.of(view) for view in listed}
-                    log = f"{name.removesuffix('.json')}{shard_files.LOG_SUFFIX}"
-                    history[log] = ledger.Stamp.of(log)
-                read = {path: ledger.Stamp.of(path) for path in inputs[name]}
-                jobs.note(ledger.Job([name], files, history, read))
+        stamps = {name: ledger.Stamp.of(name) for names in inputs.values() for name in names}
+        jobs = []
+        for name, read in inputs.items():
+            files = {name: ledger.Stamp.of(name)}
+            history = {}
+            if name in shards:
+                for view, (_, digest) in shard_files.read_record(Path(name)).items():
+                    path = f"{shards[name]}/{view}"
+                    files[path] = ledger.Stamp.of(path, digest)
+                log = f"{name.removesuffix('.json')}{shard_files.LOG_SUFFIX}"
+                history[log] = ledger.Stamp.of(log)
+            job = ledger.Job([name], files, history, {path: stamps[path] for path in read})
+            jobs.append(job)
+        Path(NOTES).write_text("".join(map(_line, jobs)))
         os.utime(NOTES, (time, time))
 
 
@@ -291,3 +306,47 @@ def workers(folder, dataset, views="*"):
         for line in read_json_lines(journal)
         if "pid" in line
     }
+
+
+def memory_of_views(record):
+    """Return the memory in bytes that each view of a shard took, in the order of rendering."""
+    journal = record.with_suffix(shard_files.JOURNAL_SUFFIX)
+    lines = read_json_lines(journal)
+    return [line["memory_bytes"] for line in lines if line.get("memory_bytes")]
+
+
+# ---- families -------------------------------------------------------------------------------
+
+
+def begun_members(folder, family):
+    """Return the members of a family that were begun, in their order, once for each time."""
+    return [
+        line["member"]
+        for journal in sorted(_journals(folder, f"{family}/batches"))
+        for line in read_json_lines(journal)
+        if "began" in line
+    ]
+
+
+# ---- a storage ------------------------------------------------------------------------------
+
+
+def stored_views(store):
+    """Return the names of the finished views in a storage in a folder."""
+    notes = Path(store).glob("views/keys/*/*.exr@*")
+    return {note.name.split("@")[1].removesuffix(".exr") for note in notes}
+
+
+def take_stored(store, digest, path):
+    """Copy the file with a SHA-256 from a storage to a path. Return whether the storage has it."""
+    return ViewStore(str(store)).take(digest, path)
+
+
+def bring_stored(store, path):
+    """Copy a declared file from a storage to the same path in the current folder."""
+    ViewStore(store).bring(str(path))
+
+
+def lose_stored(store, digest):
+    """Remove the file with a SHA-256 from a storage in a folder."""
+    Path(store, "views/sums", digest).unlink()

@@ -46,7 +46,8 @@ def build(folder: Path) -> list[Dataset]:
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
-    bookkeeping.note_build(folder, datasets, inputs, WHEN)
+    shards = {record: dataset.folder for dataset in datasets for record in dataset.all_records}
+    bookkeeping.note_build(folder, inputs, shards, WHEN)
     return datasets
 
 

@@ -4,6 +4,7 @@ import json
 import tarfile
 from collections import Counter
 
+import bookkeeping
 import pytest
 import yaml
 from checkouts import PUBLISHED_VIEWS, ROOT
@@ -14,9 +15,6 @@ import cloud
 from cloud import Cloud, kill_group
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset import shard_files
-from lightfield.dataset.view_store import ViewStore
-from lightfield.validation.integrity import Integrity
 
 PANORAMAS = "smoke/LFLattice_2panos"
 WORDS = (
@@ -28,7 +26,7 @@ WORDS = (
     "render=shard",
     "reproject=shard",
     "--",
-    f"work/{PANORAMAS}/perspective/0-2.json",
+    bookkeeping.shard(PANORAMAS, "perspective", "0-2"),
     f"results/{PANORAMAS}/perspective/transforms.json",
 )
 
@@ -68,13 +66,13 @@ def test_settings_of_a_killed_run_are_sent_by_the_next(tmp_path):
 @pytest.mark.usefixtures("in_forks")
 def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smoke, tmp_path):
     folder = tmp_path / "store"
-    build, store = Cloud(tmp_path / "cloud", 2, str(folder)), ViewStore(str(folder))
-    run, keys = build.start(*WORDS), folder / "views/keys"
-    wait_until(lambda: any(keys.glob("*/*.exr@*")), run)
+    build = Cloud(tmp_path / "cloud", 2, str(folder))
+    run = build.start(*WORDS)
+    wait_until(lambda: bookkeeping.stored_views(folder), run)
     for group in build.running():
         kill_group(group)
-    kept = {path.name.split("@")[1].removesuffix(".exr") for path in keys.glob("*/*.exr@*")}
-    # A node is gone: the journals of other jobs show what was rendered afterwards.
+    kept = bookkeeping.stored_views(folder)
+    # A node is gone. The other jobs note what was rendered afterwards.
     build.jobs.rename(tmp_path / "gone")
     build.jobs.mkdir()
     said, _ = run.communicate()
@@ -82,11 +80,10 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
     assert build.render_counts() == Counter({"view_0000f", "view_0001f"} - kept)
 
     for stage in ("render", "perspective"):
-        record = f"work/{PANORAMAS}/{stage}/0-2.json"
-        files = shard_files.read_record(folder / record)
-        assert files == shard_files.read_record(smoke / record)
+        files = bookkeeping.files_of_shard(folder, PANORAMAS, stage, "0-2")
+        assert files == bookkeeping.files_of_shard(smoke, PANORAMAS, stage, "0-2")
         for name, (_, digest) in files.items():
-            assert store.take(digest, tmp_path / name)
+            assert bookkeeping.take_stored(folder, digest, tmp_path / name)
             assert (tmp_path / name).read_bytes() == (
                 smoke / "results" / PANORAMAS / name
             ).read_bytes()
@@ -195,7 +192,7 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     said, _ = (run := build.start(*BROUGHT_WORDS)).communicate()
     assert run.returncode == 0, said
 
-    work, store = folder / "work", ViewStore(str(folder))
+    work = folder / "work"
     arguments = (
         "--blend",
         root / "blends/mine.blend",
@@ -203,21 +200,22 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
         work / "brought/inventory.json",
     )
     arguments += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
-    arguments += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
-    run_program("render_shard.py", *arguments)
-    files = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
-    assert files == shard_files.read_record(tmp_path / "here.json")
+    run_program("render_shard.py", *arguments, "--output", tmp_path / "exr")
+    files = bookkeeping.files_of_shard(folder, "brought/LFPlane", "render", "0-2")
+    assert len(files) == 2
+    for name, (_, digest) in files.items():
+        assert digest == sha256(tmp_path / name)
 
-    files = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
+    files = bookkeeping.files_of_shard(folder, "theirs/LFPlane", "render", "0-2")
     for name, (_, digest) in files.items():
         assert digest == sha256(root / "published/LFPlane" / name)
-        assert store.take(digest, tmp_path / "theirs" / name)
+        assert bookkeeping.take_stored(folder, digest, tmp_path / "theirs" / name)
 
     frames = [f"results/modelled/LFPair/f{number:05}" for number in (1, 2)]
     for path in (*frames, "results/modelled/LFPair", PUBLISHED):
         run_program("take_dataset.py", "--store", folder, path, cwd=tmp_path)
     rig = tmp_path / "results/modelled/LFPair"
-    assert list(Integrity(rig).faults()) == []
+    assert bookkeeping.problems([rig], work=None) == {}
     assert len([*rig.glob("exports/dnerf/*/f0000?_view_*.png")]) == 4
     (shard,) = (tmp_path / PUBLISHED).glob("modelled_LFPair-*.tar")
     with tarfile.open(shard) as archive:
@@ -226,7 +224,7 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
         assert "modelled_LFPair/exports/dnerf/transforms_train.json" in archive.getnames()
 
     dry_run = ("--dry-run", "--quiet", "rules", *BROUGHT_WORDS)
-    (folder / "views/sums" / sha256(root / "textures/walls.png")).unlink()
+    bookkeeping.lose_stored(folder, sha256(root / "textures/walls.png"))
     said, _ = build.start(*dry_run).communicate()
     assert "inventory" in said.split(), said
     (root / "textures/box.png").write_bytes((root / "textures/walls.png").read_bytes())
@@ -270,8 +268,7 @@ def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path)
     with (tmp_path / "cloud/program/scripts/scenes/room/__init__.py").open("a") as builder:
         builder.write(BROKEN)
     run = build.start("--config", "scenes=rooms", "rigs=all", "preset=full")
-    journal = folder / "work/rooms/batches/seeds_0000_0031.journal.jsonl"
-    wait_until(lambda: journal.is_file() and '"0001"' in journal.read_text(), run)
+    wait_until(lambda: "0001" in bookkeeping.begun_members(folder, "rooms"), run)
     first = folder / "results/rooms/0000/member.json"
     time = first.stat().st_mtime_ns
     for group in build.running():
@@ -284,10 +281,7 @@ def test_members_in_isolated_folders_are_kept_when_their_job_is_killed(tmp_path)
     assert "2 of 3 members of rooms built, 1 failed" in said
     assert first.stat().st_mtime_ns == time
     # The second node knew at which member the first one was, and built it last.
-    lines = [json.loads(line) for line in journal.read_text().splitlines()]
-    assert sum("started" in line for line in lines) == 2
-    began = [line["member"] for line in lines if "began" in line]
-    assert began == ["0000", "0001", "0002", "0001"]
+    assert bookkeeping.begun_members(folder, "rooms") == ["0000", "0001", "0002", "0001"]
     failure = json.loads((folder / "results/rooms/0002/member.json").read_text())["failure"]
     assert failure["cause"] == "ValueError: no walls"
     assert "Traceback" in (folder / failure["log"]).read_text()
