@@ -1,15 +1,14 @@
-"""Measure how planning, a run with nothing to do, and the status grow with the number of views.
+"""Measure how plans, runs with nothing to do, and the status grow with views and members.
 
 Writes a scene with one plane of cameras into a folder of its own, and plans it with Snakemake. Then
 it writes the files of a finished build, with views of one pixel. It plans and runs that again, and
-shows its status. After that it renders one shard of the test room, and compares the memory in the
-first and the last quarter of its views. With --built it also builds a dataset of tiny views, from
-the scene to the page.
+shows its status. It does the same with a family of many members. After that it renders one shard of
+the test room, and compares the memory in the first and the last quarter of its views. With --built
+it also builds a dataset of tiny views, from the scene to the page.
 """
 
 import argparse
 import contextlib
-import json
 import multiprocessing
 import os
 import statistics
@@ -19,18 +18,22 @@ import tempfile
 import time
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+import bookkeeping
+from checkouts import jobs_on
 
 from lightfield.core.files import read_json, sha256, write_json, write_text
-from lightfield.dataset import configuration, keys, ledger
+from lightfield.dataset import configuration, keys
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import load_datasets
+from lightfield.dataset.loading import chosen_families, load_datasets
 from lightfield.dataset.names import ROOT
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
 
@@ -59,6 +62,7 @@ exports:
     sources: [perspective]
 """
 )
+SETTINGS = {"scenes": ["scale"], "preset": "full", "rigs": "all", "device": "cpu"}
 # The shards of a real build.
 BUILT_SHARDS = 20
 
@@ -68,12 +72,14 @@ def main() -> None:
     add = parser.add_argument
     add("--views", type=int, default=100_000, help="views of the simulated build (default: 100000)")
     add("--shards", type=int, default=2000, help="shards of the simulated build (default: 2000)")
+    add("--members", type=int, default=10_000, help="members of the family (default: 10000)")
     add("--rendered", type=int, default=500, help="views of the rendered shard (default: 500)")
     add("--built", type=int, default=0, help="views of the real build, of 8² (default: no build)")
     arguments = parser.parse_args()
     print("| what | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |", flush=True)
     for measure, views in (
         (partial(plans, shards=arguments.shards), arguments.views),
+        (a_family, arguments.members),
         (a_shard, arguments.rendered),
         (a_build, arguments.built),
     ):
@@ -97,16 +103,30 @@ def plans(views: int, shards: int) -> None:
     row("plan with one view lost", "--dry-run")
 
 
+def a_family(members: int) -> None:
+    """Measure plans before and after a simulated build of a family, and a run without work."""
+    scene = PLANNED_SCENE.format(columns=3, rows=1)
+    write_text("configs/scenes/scale.yaml", f"{scene}family: {{seeds: 0-{members - 1}}}\n")
+    write_json("config.yaml", SETTINGS)
+    row(f"plan of {members} members", "--dry-run")
+    simulation = multiprocessing.Process(target=simulate_family)
+    simulation.start()
+    simulation.join()
+    row("plan of finished members", "--dry-run")
+    row("run of finished members")
+    row("status of members", "--nolock", "status")
+    next(Path("results").glob("*/*/*/sha256sums.txt")).unlink()
+    row("plan with one member lost", "--dry-run")
+
+
 def a_shard(views: int) -> None:
     """Measure one process that renders ``views`` views."""
     write_settings(views, views)
     (dataset,) = chosen()
     ((first, end),) = dataset.shards
-    record = Path(dataset.record("render", first, end))
-    row(f"a shard of {end} views", str(record))
-    lines = record.with_name(f"{record.stem}{JOURNAL_SUFFIX}").read_text().splitlines()
-    entries = [json.loads(line) for line in lines]
-    memory = [entry["memory_bytes"] / 1e6 for entry in entries if entry.get("memory_bytes")]
+    record = bookkeeping.shard(dataset.name, "render", f"{first}-{end}")
+    row(f"a shard of {end} views", record)
+    memory = [size / 1e6 for size in bookkeeping.memory_of_views(Path(record))]
     quarter = len(memory) // 4
     print(
         f"its memory: {statistics.median(memory[:quarter]):.0f} MB in the first quarter "
@@ -141,16 +161,20 @@ def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE)
     columns = round(views**0.5)
     rows = views // columns
     write_text("configs/scenes/scale.yaml", scene.format(columns=columns, rows=rows))
-    settings = {"scenes": ["scale"], "preset": "full", "views_per_shard": views_per_shard}
-    write_json("config.yaml", settings | {"rigs": "all", "device": "cpu"})
+    write_json("config.yaml", SETTINGS | {"views_per_shard": views_per_shard})
     return columns * rows
 
 
 def chosen() -> list[Dataset]:
     """Return the datasets that the settings choose."""
+    return load_datasets(chosen_settings())
+
+
+def chosen_settings() -> configuration.Configuration:
+    """Return the settings of the present folder."""
     repository = configuration.read_config(ROOT / "config.yaml")
     build = configuration.read_config(Path("config.yaml"))
-    return load_datasets(configuration.load_config(repository | build))
+    return configuration.load_config(repository | build)
 
 
 def row(label: str, *arguments: str) -> float:
@@ -204,48 +228,57 @@ def simulate() -> None:
     )
     content = Path("view.exr").read_bytes()
     for first, end in dataset.shards:
-        lines = []
-        files = {}
+        files = []
         for view in lightfield.views[first:end]:
             path = folder / f"{view.name}.exr"
             key = keys.render_key(lightfield, view)
             path.write_bytes(content.replace(pattern.encode(), key.encode()))
             sums = {"bytes": len(content), "sha256": sha256(path)}
-            files[f"exr/{path.name}"] = sums
-            lines.append(json.dumps({"file": f"exr/{path.name}", "key": key, **sums}) + "\n")
-        record = Path(dataset.record("render", first, end))
-        record.parent.mkdir(parents=True, exist_ok=True)
-        record.with_suffix(LOG_SUFFIX).write_text("".join(lines))
-        record.write_text(json.dumps({"files": files}))
-    published = [*dataset.files, *dataset.intermediates]
-    for name in [*published, "results/index.html"]:
+            files.append((f"exr/{path.name}", key, sums))
+        record = bookkeeping.shard(dataset.name, "render", f"{first}-{end}")
+        bookkeeping.write_shard(Path(record), files)
+    finish(dict.fromkeys(dataset.all_records, dataset.folder))
+
+
+def simulate_family() -> None:
+    """Write the files of a finished family that a plan looks at: no views, but all notes."""
+    (family,) = chosen_families(chosen_settings()).values()
+    for name, members in family.batches().items():
+        names = [member.name for member in members]
+        bookkeeping.write_batch(Path(f"work/scale/batches/{name}.json"), names, ["LFPlane"])
+        for member in names:
+            write_text(f"results/scale/{member}/member.json", "{}")
+            write_text(f"results/scale/{member}/LFPlane/sha256sums.txt", "sums\n")
+    finish({})
+
+
+def finish(shards: dict[str, str]) -> None:
+    """Write all other files that a build makes, and note that their jobs are finished.
+
+    ``shards`` are the records of shards, with the folders of their datasets.
+    """
+    inputs = {name: job["input"] for job in planned_jobs() for name in job["output"]}
+    for name in inputs:
         if not Path(name).exists():
             write_text(name, '{"valid": true}')
     timestamp = 1_700_000_000
     for root in ("results", "work"):
         for path in Path(root).rglob("*"):
             os.utime(path, (timestamp, timestamp))
-    note_jobs(dataset)
+    bookkeeping.note_build(".", inputs, shards, timestamp)
 
 
-def note_jobs(dataset: Dataset) -> None:
-    """Write the ledger of the finished build: one job for each shard and for each other file."""
-    job_ledger = ledger.Ledger(Path("work", ledger.NAME))
-    records = dataset.all_records
-    other_files = sorted({*dataset.files, *dataset.intermediates} - {*records})
-    from_scene = {name: ledger.Stamp.of(name) for name in other_files if name.startswith("work/")}
-    for name in records:
-        log = f"{name.removesuffix('.json')}{LOG_SUFFIX}"
-        files = {name: ledger.Stamp.of(name)}
-        for view, entry in json.loads(Path(name).read_bytes())["files"].items():
-            path = f"{dataset.folder}/{view}"
-            files[path] = ledger.Stamp.of(path, entry["sha256"])
-        job_ledger.note(ledger.Job([name], files, {log: ledger.Stamp.of(log)}, from_scene))
-    # The validation reads all views.
-    from_views = {name: ledger.Stamp.of(name) for name in records}
-    for name in [*other_files, "results/index.html"]:
-        read = from_views if name.endswith("/validation.json") else {}
-        job_ledger.note(ledger.Job([name], {name: ledger.Stamp.of(name)}, {}, read))
+def planned_jobs() -> list[dict[str, Any]]:
+    """Return all jobs of a build, as the tests' logger plugin prints them."""
+    command = ["snakemake", "--snakefile", str(ROOT / "Snakefile"), "--dry-run", "--forceall"]
+    result = subprocess.run(
+        [*command, "--logger", "jobs"],
+        env=os.environ | {"PYTHONPATH": str(ROOT / "tests")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return jobs_on(result.stderr)
 
 
 if __name__ == "__main__":
