@@ -82,6 +82,38 @@ def transparent_film():
     bpy.context.scene.render.film_transparent = True
 
 
+def shaded_ground():
+    """Let a board above the view shade the ground."""
+    import bpy
+
+    studio()
+    board = _put(bpy.context.scene.collection, "Board", _plane("Board", 1), location=(0, 0, 4))
+    board.rotation_euler.x = 0.3
+    bpy.data.lights["Sun"].energy = 5
+
+
+def cull_by_the_camera():
+    """Leave out what the camera does not see, also its shadow."""
+    _cull("camera")
+
+
+def cull_by_distance():
+    """Leave out what is far from the camera."""
+    import bpy
+
+    _cull("distance")
+    bpy.context.scene.cycles.distance_cull_margin = 1
+
+
+def _cull(kind):
+    import bpy
+
+    scene = bpy.context.scene
+    scene.render.use_simplify = True
+    setattr(scene.cycles, f"use_{kind}_cull", True)
+    setattr(bpy.data.objects["Board"].cycles, f"use_{kind}_cull", True)
+
+
 def scaled_camera():
     """Roll the camera, and scale it along its own axes, which changes no picture."""
     import bpy

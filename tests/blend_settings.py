@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import blend_scenes as scenes
+import camera_followers as followers
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "blend.md"
 # The table is between these lines of the page.
@@ -215,6 +216,37 @@ ROWS = [
             Case({"cube.is_holdout": True}),
         ],
         "[no surface](files.md#transparency)",
+    ),
+    Row(
+        "constraints, drivers, parents and geometry nodes that follow the camera",
+        TAKEN,
+        [
+            Case(followers.track_to, note="Billboard follows the file's camera in all views"),
+            Case(followers.driver_of_the_scene, note="Driven follows the file's camera"),
+            Case(followers.culled, note="Culled follows the file's camera"),
+            Case(
+                followers.active_camera,
+                yaml={"scene": {"followed_camera": "view"}},
+                note="Turned follows each view's camera",
+            ),
+        ],
+        "[the file's camera, in all views](#what-follows-the-camera)",
+        "`scene: {followed_camera: view}`",
+    ),
+    Row(
+        "adaptive subdivision, and its dicing camera",
+        TAKEN,
+        [Case(followers.diced_for_the_view), Case(followers.diced_for_another_camera)],
+        "without a dicing camera, for each view's",
+    ),
+    Row(
+        "culling of objects by the camera or by distance (*Simplify*)",
+        IGNORED,
+        [
+            Case(scenes.cull_by_the_camera, scenes.shaded_ground, note="culling ignored"),
+            Case(scenes.cull_by_distance, scenes.shaded_ground, note="culling ignored"),
+        ],
+        "it would hide other objects in each view",
     ),
     Row("film exposure", TAKEN, [Case({"cycles.film_exposure": 2})]),
     Row(

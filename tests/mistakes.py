@@ -440,6 +440,7 @@ REFUSED = [
     *(("scene.frame", value) for value in (-1, 1048575, 1.0, "last", "file")),
     *(("scene", value) for value in (None, [], {})),
     ("scene.view_layers", ["a"]),
+    ("scene.followed_camera", "view"),
     ("scene.allow_missing", True),
     ("scene.scene_name", "a"),
 ]

@@ -43,6 +43,8 @@ def inventory_settings(dataset):
     if settings["camera_frames"]:
         # Raise this number when the program takes or refuses other cameras.
         settings["camera_version"] = 1
+    if written.scene.followed_camera:
+        settings["followed_camera"] = written.scene.followed_camera
     if written.render.light_groups:
         settings["light_groups"] = written.render.light_groups
     return settings

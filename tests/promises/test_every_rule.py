@@ -451,6 +451,13 @@ ROUNDS = {
         "built": ("frame: 1", "frame: 2", {"inventory", "mesh"} | CAMERAS),
         "brought": ("scene_name: First", "scene_name: Second", {"inventory", "free_places"}),
     },
+    "what follows the camera": {
+        "brought": (
+            "scene_name: First",
+            "scene_name: First\n  followed_camera: file",
+            {"inventory"},
+        ),
+    },
     "the place, and the error": {
         "built": ("center: [0, 0, 1]", "center: [0, 0, 2]", OF_PLANE),
         "brought": ("target_error: 0.1", "target_error: 0.2", CAMERAS),

@@ -92,21 +92,41 @@ def is_shutter_reset(blend: Settings, render: Settings) -> bool:
     )
 
 
+def followed_camera(blend: Settings, choice: str | None) -> str | None:
+    """Return which camera objects of a .blend follow: "file", or "view" for each view's own.
+
+    ``choice`` is the key of the scene YAML. Return None if no view depends on the choice.
+    """
+    followers = _followers_of(blend)
+    # What names the file's camera follows that one, unless something is done.
+    needs_choice = followers["active"] or (choice == "view" and followers["by_name"])
+    return choice or "file" if needs_choice else None
+
+
+def _followers_of(blend: Settings) -> Mapping[str, Sequence[str]]:
+    """Return the names of what follows the .blend's camera."""
+    # Inventories of earlier versions lack this key.
+    followers: Mapping[str, Sequence[str]] = blend.get("followers", {"by_name": [], "active": []})
+    return followers
+
+
 def usage_notes(
     inventory: Settings,
     frames: Sequence[float],
     render: Settings,
     uses_camera: bool,
+    followed: str | None,
 ) -> list[str]:
     """Return notes on which settings of a .blend a dataset takes and which it ignores.
 
     ``frames`` and the ``render`` block say what is rendered. ``uses_camera`` says whether a rig
-    uses the .blend's own camera.
+    uses the .blend's own camera, and ``followed`` is `followed_camera`.
     """
     blend = inventory["blend"]
     return [
         *_scene(blend, frames, render),
         *_camera(blend["camera"], uses_camera),
+        *_followers(_followers_of(blend), followed),
         *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
         *_switches(blend, render),
         *_exposure(blend, render),
@@ -150,6 +170,15 @@ def _camera(camera: Settings | None, is_taken: bool) -> Iterator[str]:
     near, far = camera.get("clip", _BLENDERS_CLIP)
     if is_taken and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
         yield f"clip planes at {near:g} and {far:g} m ignored"
+
+
+def _followers(followers: Mapping[str, Sequence[str]], followed: str | None) -> Iterator[str]:
+    """Yield a note on what follows the .blend's camera."""
+    names = sorted({*followers["by_name"], *followers["active"]})
+    if names:
+        listed = f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}"
+        camera = "each view's camera" if followed == "view" else "the file's camera in all views"
+        yield f"{listed} {'follow' if len(names) > 1 else 'follows'} {camera}"
 
 
 def _switches(blend: Settings, render: Settings) -> Iterator[str]:

@@ -20,7 +20,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
-SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
+SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
 # The same for a model.
 MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
 # The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
@@ -78,7 +78,14 @@ class Capture:
                 rig = rig.model_copy(update={"camera": camera})
             return replace(
                 self,
-                source=self.source.model_copy(update={"frame": frame}),
+                source=self.source.model_copy(
+                    update={
+                        "frame": frame,
+                        "followed_camera": blend.followed_camera(
+                            facts, self.source.followed_camera
+                        ),
+                    }
+                ),
                 render=render,
                 rig=rig,
                 external_files=external_files,

@@ -292,6 +292,12 @@ class LightField:
         return "relight" in self.content.get("reprojection", {})
 
     @property
+    def follows_views(self) -> bool:
+        """Whether objects of the scene follow each view's camera: each view shows another scene."""
+        scene = self.content.get("scene")
+        return isinstance(scene, Mapping) and scene.get("followed_camera") == "view"
+
+    @property
     def transparent(self) -> bool:
         """Whether the views' channel A is how much of a pixel the scene covers."""
         return bool(self._render.get("transparent"))

@@ -68,14 +68,15 @@ def inventory_outdated(dataset: Dataset, store: ViewStore | None) -> bool:
     """Return whether a file that the user's .blend reads differs from its inventory.
 
     Also return True if a view store has lost such a file, or if an earlier version wrote the
-    inventory without the exposure of blurred views.
+    inventory without the exposure of blurred views, or without what follows the camera.
     """
     if not dataset.source.blend:
         return False
     home = Path(dataset.source.blend).parent
 
     def differs(inventory: Mapping[str, Any]) -> bool:
-        if blend.lacks_exposure(inventory["blend"], dataset.render):
+        facts = inventory["blend"]
+        if blend.lacks_exposure(facts, dataset.render) or "followers" not in facts:
             return True
         for file in inventory["external_files"]:
             if _has_changed(home, file):

@@ -93,7 +93,9 @@ SharedFolder = Annotated[
 # The word in a scene YAML that stands for the .blend's own value.
 FILE = "file"
 # Keys of `SceneSource` that only a .blend takes.
-BLEND_KEYS = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
+BLEND_KEYS = (
+    *("scene_name", "view_layers", "followed_camera", "allow_missing", "sha256", "url", "page"),
+)
 # Keys of `SceneSource` that only a model takes.
 MODEL_KEYS = tuple(ModelOptions.model_fields)
 
@@ -141,6 +143,12 @@ class Origin(Settings):
         1,
         description="Frame of the animation to render. file: the frame at which the .blend was "
         "saved. The size of a model is measured at this frame.",
+    )
+    followed_camera: Literal["file", "view"] | None = Field(
+        None,
+        description="Camera that objects of the .blend follow, as billboards do. file, which is "
+        "the default: the .blend's camera, so all views show the same scene. view: each view's "
+        "own, as if Blender rendered the .blend with that camera.",
     )
     allow_missing: bool | None = Field(
         None,

@@ -363,6 +363,11 @@ class Scene(Credits):
             self._check_sensor(self.sensor)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
+        for key in ("flow", "mesh"):
+            if getattr(self, key) is not None and self.scene.followed_camera == "view":
+                raise ValueError(
+                    f"{key}: needs one scene for all views, but scene.followed_camera is view"
+                )
         if self.flow and self.render and self.render.depth == "none":
             raise ValueError("flow: follows from depth, but render.depth is none")
         self._check_split_rigs()

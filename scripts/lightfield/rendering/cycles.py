@@ -11,11 +11,13 @@ from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import AOV_PREFIX, GROUP_PREFIX, Pass
+from lightfield.dataset.scene_source import FILE
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import (
     animation,
     blend_file,
     drawings,
+    followed_camera,
     frames,
     ids,
     instances,
@@ -75,6 +77,9 @@ def set_up(
     frames.go_to(lightfield.frame)
     ids.assign({"object" if kind == "instance" else kind for kind in numbered})
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
+    file_camera = scene.camera
+    if file_camera and lightfield.content.get("scene", {}).get("followed_camera") == FILE:
+        followed_camera.freeze(file_camera)
     for marker in scene.timeline_markers:
         marker.camera = None
     # Settings that are not set below keep their values of this frame.
@@ -102,6 +107,8 @@ def set_up(
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
         _set_focus(scene.camera.data, focused)
+    if file_camera and lightfield.follows_views:
+        followed_camera.follow_views(file_camera, scene.camera)
     if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)

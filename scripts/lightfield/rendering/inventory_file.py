@@ -12,12 +12,14 @@ from lightfield.dataset import blend, scene_yaml
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.light_groups import resolved
 from lightfield.dataset.loading import rendered_frames, scene_datasets
+from lightfield.dataset.scene_source import FILE
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
 from lightfield.rendering import (
     blend_facts,
     blend_file,
     external_files,
+    followed_camera,
     frames,
     light,
     motion_blur,
@@ -83,6 +85,13 @@ def write_of_datasets(
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
+    if chosen.get("blend"):
+        frames.go_to(shown_frames[0])
+        try:
+            followers = followed_camera.followers(chosen.get("followed_camera") or FILE)
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        contents["blend"]["followers"] = followers
     # Close the scene, because the measurement opens it again.
     blend_file.new_scene()
     if measures_memory:
@@ -107,7 +116,8 @@ def _print_notes(
     resolved = [dataset.resolved(inventory_file) for dataset in datasets]
     shown = sorted({dataset.frame for dataset in resolved})
     own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
-    notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera)
+    followed = resolved[0].source.followed_camera if resolved else None
+    notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera, followed)
     print(f"note: {path}: {' · '.join(notes)}")
 
 

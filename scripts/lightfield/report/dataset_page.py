@@ -144,7 +144,10 @@ def _taken(origin: Origin, lightfield: LightField) -> list[str]:
     if origin.inventory is None:
         return []
     uses_camera = isinstance(origin.rig, rigs.BlendCamera)
-    return blend.usage_notes(origin.inventory, [lightfield.frame], lightfield.render, uses_camera)
+    followed = lightfield.scene.get("followed_camera")
+    return blend.usage_notes(
+        origin.inventory, [lightfield.frame], lightfield.render, uses_camera, followed
+    )
 
 
 def _failed(validation: Mapping[str, Any] | None) -> Iterator[tuple[str, dict[str, Any]]]:

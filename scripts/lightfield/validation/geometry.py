@@ -49,6 +49,8 @@ def check(
     name = f"{image_set.prefix}geometry"
     if image_set.lightfield.depth is None:
         return Check(name, None, "the views have no depth")
+    if image_set.lightfield.follows_views:
+        return Check(name, None, "each view shows another scene: objects follow its camera")
     if len(patches_of_files) < 2:
         return Check(name, None, f"{len(patches_of_files)} views with depth have no neighbours")
     pairs = _pair_answers(name, image_set, patches_of_files, ask)

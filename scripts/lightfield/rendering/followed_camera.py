@@ -1,0 +1,142 @@
+"""Decides which camera the scene's objects follow: the file's in all views, or each view's own.
+
+Constraints, drivers, parents, modifiers and geometry nodes may follow a camera. They name it, or
+they take the scene's active one, which is each view's own while Cycles renders. Blender tells what
+it evaluates anew after a camera has changed.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.scene_source import FILE
+from lightfield.rendering import animation
+from lightfield.rendering.ids import has_no_surface
+
+_ACTIVE_CAMERA = "GeometryNodeInputActiveCamera"
+# Constraints that take the active camera if they name none.
+_TRACKS = ("FOLLOW_TRACK", "OBJECT_SOLVER")
+
+
+def followers(choice: str) -> dict[str, list[str]]:
+    """Return the names of what follows the file's camera: by its name, or as the ``active`` one.
+
+    They are objects, lamps, materials and worlds. ``choice`` is the scene YAML's key
+    ``followed_camera``. The scene must be at its frame, and is changed. Raises `UserError` if
+    nothing can follow the file's camera alone.
+    """
+    scene = bpy.context.scene
+    file_camera = scene.camera
+    # Markers may choose other cameras at other frames.
+    cameras = {file_camera, *(marker.camera for marker in scene.timeline_markers)} - {None}
+    _show_in_viewport()
+    view_camera = bpy.data.objects.new("plenoforge_view", bpy.data.cameras.new("plenoforge_view"))
+    scene.camera = view_camera
+    # A new object also makes Blender look for all relations again.
+    scene.collection.objects.link(view_camera)
+    by_name = sorted({name for camera in cameras for name in _changed_with(camera)})
+    active = _changed_with(view_camera)
+    if active and choice == FILE:
+        if file_camera is None:
+            raise UserError(
+                f"the scene {scene.name} has no camera, which {_listed(active)} would follow; give "
+                "it one, or let them follow each view's camera: scene: {followed_camera: view}"
+            )
+        freeze(file_camera)
+        if moving := _changed_with(view_camera):
+            raise UserError(
+                f"{_listed(moving)}: would follow each view's camera in a way that cannot be "
+                "turned off, so that each view would show another scene; change that in Blender, "
+                "or allow it: scene: {followed_camera: view}"
+            )
+    return {"by_name": by_name, "active": active}
+
+
+def freeze(camera: Any) -> None:
+    """Let all that takes the active camera take ``camera``, in every view."""
+    for tree in bpy.data.node_groups:
+        for node in [node for node in tree.nodes if node.bl_idname == _ACTIVE_CAMERA]:
+            replacement = tree.nodes.new("GeometryNodeInputObject")
+            replacement.object = camera
+            for link in list(node.outputs[0].links):
+                is_muted = link.is_muted
+                tree.links.new(replacement.outputs[0], link.to_socket).is_muted = is_muted
+            tree.nodes.remove(node)
+    path = f'objects["{bpy.utils.escape_identifier(camera.name)}"]'
+    for _, block in animation.animated():
+        for target in animation.driver_targets(block):
+            # A target without a block reads the current scene.
+            if target.id in (None, bpy.context.scene):
+                target.data_path = re.sub(r"^camera\b", lambda _: path, target.data_path)
+    for obj in bpy.data.objects:
+        bones = obj.pose.bones if obj.pose else ()
+        for owner in (obj, *bones):
+            for constraint in owner.constraints:
+                if constraint.type in _TRACKS and constraint.camera is None:
+                    constraint.camera = camera
+        for modifier in obj.modifiers:
+            if modifier.type == "LINEART" and not modifier.use_custom_camera:
+                modifier.use_custom_camera = True
+                modifier.source_camera = camera
+
+
+def follow_views(file_camera: Any, view_camera: Any) -> None:
+    """Let all that names the file's camera follow the camera of each view."""
+    if file_camera.type == "CAMERA":
+        file_camera.data.user_remap(view_camera.data)
+    file_camera.user_remap(view_camera)
+
+
+def _show_in_viewport() -> None:
+    """Let the viewport evaluate all that a render may. Blender tells changes of the viewport."""
+    layer = bpy.context.view_layer
+    for obj in bpy.context.scene.objects:
+        animation.mute(obj, ("hide_viewport", "modifiers["))
+        obj.hide_viewport = obj.hide_render
+        for modifier in obj.modifiers:
+            modifier.show_viewport = modifier.show_render
+    for obj in layer.objects:
+        obj.hide_set(False)
+    for collection in bpy.data.collections:
+        collection.hide_viewport = collection.hide_render
+    parts = [layer.layer_collection]
+    for part in parts:
+        part.hide_viewport = False
+        parts += part.children
+
+
+def _changed_with(camera: Any) -> list[str]:
+    """Return the names of the blocks that Blender evaluates anew after a camera has changed."""
+    names: set[str] = set()
+
+    def note(_: Any, depsgraph: Any) -> None:
+        names.update(
+            str(update.id.original.name_full) for update in depsgraph.updates if _is_shown(update)
+        )
+
+    bpy.context.view_layer.update()
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        camera.update_tag()
+        if camera.data:
+            camera.data.update_tag()
+        bpy.context.view_layer.update()
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+    return sorted(names)
+
+
+def _is_shown(update: Any) -> bool:
+    """Return whether a block that was evaluated anew is one that views may show."""
+    block = update.id.original
+    if isinstance(block, bpy.types.Object):
+        is_moved = update.is_updated_transform or update.is_updated_geometry
+        return is_moved and (block.type == "LIGHT" or not has_no_surface(block))
+    return isinstance(block, bpy.types.Material | bpy.types.World | bpy.types.Light)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}"
