@@ -318,6 +318,11 @@ def memory_of_views(record):
 # ---- families -------------------------------------------------------------------------------
 
 
+def batch(family, name):
+    """Return the target that makes a batch of members of a family."""
+    return f"work/{family}/batches/{name}.json"
+
+
 def begun_members(folder, family):
     """Return the members of a family that were begun, in their order, once for each time."""
     return [

@@ -10,7 +10,6 @@ import forks
 import numpy as np
 import pytest
 from checkouts import checkout, snakemake
-from faults import FAULTS
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import size_and_time
@@ -21,30 +20,6 @@ from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.imaging.images import write_png
 
 ROOT = Path(__file__).parents[1]
-CAMERA = "{lens: equidistant, fov: 180, resolution: [64, 64]}"
-ROOMS = f"""
-scene: {{builder: room}}
-render: {{samples: 1}}
-rigs:
-  LFPlane:
-    type: plane
-    cameras: [2, 1]
-    size: 0.5
-    center: [0, 0, 1.2]
-    camera: {CAMERA}
-    split: odd
-reprojections:
-  perspective:
-    camera: {{lens: rectilinear, fov: 60, resolution: [16, 16]}}
-    format: png
-exports:
-  instant_ngp: {{sources: [perspective]}}
-  nerf_synthetic: {{sources: [perspective]}}
-family:
-  seeds: 0-3
-  values:
-    rigs.LFPlane.size: {{uniform: [0.25, 0.5]}}
-"""
 
 
 def family(**keys):
@@ -278,110 +253,6 @@ def test_failed_members_are_counted_and_listed(tmp_path):
     assert "2 of 2 members of rooms built" in done.stdout
     assert not (tmp_path / "failed.txt").exists()
     assert (tmp_path / "members.json").exists()
-
-
-# A builder that raises an error for seed 1, and crashes its process for seed 2.
-BROKEN = """
-
-built = build
-
-
-def build(parameters):
-    import os, signal
-    if parameters["seed"] == 1:
-        raise ValueError("no walls")
-    if parameters["seed"] == 2:
-        os.kill(os.getpid(), signal.SIGSEGV)
-    built(parameters)
-"""
-
-
-def assert_two_members_failed(run, folder):
-    """Check the first run: two members failed, and the others are complete datasets."""
-    members = folder / "results/rooms"
-    assert run.returncode == 1
-    assert "2 of 4 members of rooms built, 2 failed: results/rooms/failed.txt" in run.stderr
-    failed = (members / "failed.txt").read_text().splitlines()
-    assert failed[0] == "0001: build_scene: ValueError: no walls"
-    assert failed[1].startswith("0002: build_scene: killed by SIGSEGV")
-    assert sorted(path.name for path in (members / "0001").iterdir()) == ["member.json"]
-    assert "Traceback" in (folder / "work/rooms/0001/member.log").read_text()
-    assert "Traceback" not in run.stderr
-    record = json.loads((members / "0003/member.json").read_text())
-    assert record["seed"] == 3
-    assert record["state"] == "valid"
-    assert 0.25 <= record["values"]["rigs.LFPlane.size"] <= 0.5
-    dataset = members / "0003/LFPlane"
-    for name in ("exr/view_0000f.exr", "perspective/view_0000f.png", "perspective/transforms.json"):
-        assert (dataset / name).is_file()
-    check = subprocess.run(
-        ["sha256sum", "-c", "--quiet", "sha256sums.txt"], cwd=dataset, check=False
-    )
-    assert check.returncode == 0
-
-
-def assert_a_plan_finds_damaged_records(folder, choice):
-    """Damage what jobs have recorded of all members. Check that a plan names it."""
-    fault_of_record = {
-        "work/rooms/batches/seeds_0000_0031.json": "a digit",
-        "work/rooms/members.json": "cut short",
-        "results/rooms/corpus.json": "a bit",
-    }
-    for path, fault in fault_of_record.items():
-        FAULTS[fault][0](folder / path, None)
-    plan = snakemake(folder, "--dry-run", *choice)
-    for path in fault_of_record:
-        assert f"{path}: " in plan.stderr
-
-
-@pytest.mark.slow
-def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
-    folder = checkout(tmp_path / "plenoforge", rooms=ROOMS)
-    builder = folder / "scripts/scenes/room/__init__.py"
-    sound_text = builder.read_text()
-    builder.write_text(sound_text + BROKEN)
-    choice = ("--config", "scenes=[rooms]", "rigs=all", "preset=full")
-
-    run = snakemake(folder, *choice)
-    assert_two_members_failed(run, folder)
-    members = folder / "results/rooms"
-
-    # Nothing is built again, and the failures are named again.
-    journal = folder / "work/rooms/batches/seeds_0000_0031.journal.jsonl"
-    before = journal.read_text()
-    run = snakemake(folder, *choice)
-    assert run.returncode == 1
-    assert "2 of 4 members of rooms built" in run.stderr
-    assert journal.read_text() == before
-
-    # A sound builder makes all members. Their views are kept where the scene is the same.
-    builder.write_text(sound_text)
-    run = snakemake(folder, *choice)
-    assert run.returncode == 0, run.stderr
-    assert "4 of 4 members of rooms built" in run.stderr
-    assert not (members / "failed.txt").exists()
-
-    # A new member leaves the others alone, and a damaged file is made again.
-    scene = folder / "configs/scenes/rooms.yaml"
-    scene.write_text(ROOMS.replace("0-3", "0-4"))
-    times = {name: (members / name / "member.json").stat().st_mtime_ns for name in ("0000", "0003")}
-    view = members / "0001/LFPlane/exr/view_0000f.exr"
-    content = view.read_bytes()
-    view.write_bytes(content[:-1])
-    verify = [forks.python(), ROOT / "scripts/verify.py", "results/rooms"]
-    verified = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
-    assert verified.returncode == 1
-    assert "results/rooms/0001/LFPlane/exr/view_0000f.exr: " in verified.stdout
-    run = snakemake(folder, *choice)
-    assert "5 of 5 members of rooms built" in run.stderr
-    assert times == {name: (members / name / "member.json").stat().st_mtime_ns for name in times}
-    assert view.read_bytes() == content
-    corpus = json.loads((members / "corpus.json").read_text())
-    assert [member["state"] for member in corpus["members"]] == ["valid"] * 5
-    assert len([*(members / "thumbnails").iterdir()]) == 5
-    verified = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
-    assert verified.returncode == 0, verified.stdout
-    assert_a_plan_finds_damaged_records(folder, choice)
 
 
 MODELS = """
