@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from oracles import readers
 from pydantic import TypeAdapter
 from sphere import write_views
 
@@ -51,7 +52,7 @@ from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.measurement.sampling import calibrated
 from lightfield.reprojection import lens_map
-from lightfield.validation import readers, splits_check
+from lightfield.validation import splits_check
 
 TIMES = itertools.count(10**18, 10**6)
 # The number of files of each kind. "few" takes seconds, and runs in each run of the tests.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles import readers
 from scipy import ndimage
 
 from lightfield import export
@@ -14,7 +15,6 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.validation import readers
 
 FRAME = 2
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 0}
@@ -227,7 +227,7 @@ def test_equal_scenes_give_equal_bytes(scene, run_program, tmp_path):
         assert (tmp_path / "again" / name).read_bytes() == (scene / "mesh" / name).read_bytes()
 
 
-def test_validation_reads_the_meshes_and_finds_a_moved_object(scene, tmp_path):
+def test_the_oracle_finds_a_moved_object(scene, tmp_path):
     size = tuple(LENS["resolution"])
     assert not readers.read(scene / "mesh/export.json", size).faults
     for path in (scene / "mesh").iterdir():

@@ -16,8 +16,7 @@ from pathlib import Path
 import forks
 import pytest
 from checkouts import ROOT, checkout
-
-from lightfield.validation.readers.colmap import read_model
+from oracles.readers.colmap import read_model
 
 TUTORIALS = ROOT / "docs/tutorials"
 # Comment, language and content of each block of code.

@@ -16,9 +16,8 @@ from lightfield.dataset.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency, depth_questions, light_sums, reprojected
+from lightfield.validation import consistency, light_sums, reprojected
 from lightfield.validation.consistency import Answer, Patches
-from lightfield.validation.depth_questions import Question
 from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
@@ -58,7 +57,6 @@ class Facts:
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
     - ``sum_error``: by which part of the colour the sum of the light groups differs from it.
     - ``not_summed``: why the light groups need not add up to the colour.
-    - ``of_depth``: the answer to the question about its depth.
     """
 
     checksum: str
@@ -74,7 +72,6 @@ class Facts:
     patches: Patches | None = None
     sum_error: float | None = None
     not_summed: str | None = None
-    of_depth: depth_questions.Answer | None = None
 
     def fault(self, check: str, text: str, is_fault: bool | int = True) -> None:
         """Note a fault for a check, if ``is_fault``."""
@@ -91,11 +88,8 @@ class Examiner:
         self.regions: dict[Any, tuple[Bools, Bools]] = {}
         self.numbers: dict[Pass, set[int]] = {}
 
-    def examine(self, file: File, question: Question | None = None) -> Facts:
-        """Read an image file, and return what it shows by itself.
-
-        The facts of a view with depth hold the answer to the ``question`` about it.
-        """
+    def examine(self, file: File) -> Facts:
+        """Read an image file, and return what it shows by itself."""
         path = self.dataset / file.path
         facts = Facts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
@@ -119,10 +113,6 @@ class Examiner:
                 facts.fault("images", problem)
             else:
                 self._examine_view(file, image, facts)
-                if question and "Z" in image.channels:
-                    camera = image_set.camera(file.view)
-                    depth = image.channels["Z"]
-                    facts.of_depth = depth_questions.answer(question, camera, depth)
         return facts
 
     def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
@@ -138,14 +128,6 @@ class Examiner:
             consistency.ask(patches, image_set.camera(asking), camera, depth)
             for asking, patches in questions
         ]
-
-    def answer_depth(self, file: File, question: Question) -> depth_questions.Answer | None:
-        """Answer a question about a view's depth. None if it cannot be read."""
-        try:
-            depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
-        except UserError:
-            return None
-        return depth_questions.answer(question, self.sets[file.set].camera(file.view), depth)
 
     def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
         image_set = self.sets[file.set]

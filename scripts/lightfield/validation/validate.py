@@ -1,13 +1,9 @@
 """Checks a finished dataset: that it is complete, and that every claim about it is true.
 
-`validate` works in three steps:
-
-1. It reads the exports back (`exported_cameras`).
-2. It reads every image once, and checks each by itself (`pixels`). In the same pass it compares the
-   depth in exports (`exported_depth`).
-3. It reads the views with depth again, and compares them with each other (`geometry`).
-
-Memory holds a few hundred points of each view, and the exported points.
+`validate` reads every image once, and checks each by itself (`pixels`). Then it reads the views
+with depth again, and compares them with each other (`geometry`). Memory holds a few hundred points
+of each view. It checks that the files of exports are as they were written. That exporters write the
+right numbers is up to the tests.
 
 The result is a list of checks. Each has passed, failed, or does not apply. A check that does not
 apply says why.
@@ -29,20 +25,8 @@ from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.shard_files import read_record
-from lightfield.validation import (
-    depth_questions,
-    exported_cameras,
-    exported_pictures,
-    files,
-    geometry,
-    machines,
-    pixels,
-    splits_check,
-)
+from lightfield.validation import files, geometry, machines, pixels, splits_check
 from lightfield.validation.consistency import Answer
-from lightfield.validation.depth_questions import Question
-from lightfield.validation.exported_cameras import SetExport
-from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, ImageSet, Manifest
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
@@ -89,12 +73,8 @@ def validate(
     recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
-    export_checks, set_exports = exported_cameras.check(dataset, sets, manifests, export_lists)
-    checks += export_checks
     images = views + passes + extras
-    facts, image_checks = _check_images(
-        dataset, sets, images, presence_checks, set_exports, volumes, processes
-    )
+    facts, image_checks = _check_images(dataset, sets, images, presence_checks, volumes, processes)
     checks += image_checks
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
@@ -157,48 +137,33 @@ def _check_images(
     sets: Sequence[ImageSet],
     images: Sequence[File],
     presence_checks: Sequence[Check],
-    set_exports: Sequence[SetExport],
     volumes: Sequence[str],
     processes: int,
 ) -> tuple[dict[File, Facts], list[Check]]:
-    """Read all images. Return their facts, and the checks of each set and of exported depth.
+    """Read all images. Return their facts, and the checks of each set.
 
     The check of ``presence_checks`` for a set comes before the others of that set.
     """
     checks = []
     processes = min(processes, _worthwhile_processes(dataset, images))
-    exported_depth = ExportedDepth(dataset, sets, set_exports)
     with _workers(Examiner(dataset, sets), processes) as parallel_map:
-        facts = _read_images(dataset, images, exported_depth, parallel_map)
+        facts = _read_images(dataset, images, parallel_map)
         for number, image_set in enumerate(sets):
             views = {
                 file: fact for file, fact in facts.items() if file.is_view and file.set == number
             }
             checks.append(presence_checks[number])
             checks += _check_set(image_set, views, volumes, parallel_map)
-        answers = {
-            (file.set, file.view): fact.of_depth for file, fact in facts.items() if fact.of_depth
-        }
-        checks += exported_pictures.checks(
-            dataset,
-            sets,
-            set_exports,
-            lambda questions: parallel_map(_answer_pictures, questions),
-        )
-        checks += exported_depth.checks(
-            answers, lambda questions: parallel_map(_answer_depth, questions)
-        )
     return facts, checks
 
 
 def _read_images(
-    dataset: Path, images: Sequence[File], exported_depth: ExportedDepth, parallel_map: ParallelMap
+    dataset: Path, images: Sequence[File], parallel_map: ParallelMap
 ) -> dict[File, Facts]:
     """Read each image once, and return what it shows by itself."""
     facts: dict[File, Facts] = {}
     progress = Progress(len(images), f"validate {dataset.name}", "files")
-    with_questions = [(file, exported_depth.question(file)) for file in images]
-    for file, fact in parallel_map(_examine, with_questions):
+    for file, fact in parallel_map(_examine, images):
         facts[file] = fact
         progress.done()
     return facts
@@ -279,17 +244,8 @@ def _start_worker(examiner: Examiner) -> None:
     oiio.attribute("exr_threads", 1)
 
 
-def _examine(file_and_question: tuple[File, Question | None]) -> tuple[File, Facts]:
-    file, question = file_and_question
-    return file, _examiner.examine(file, question)
-
-
-def _answer_depth(file_and_question: tuple[File, Question]) -> depth_questions.Answer | None:
-    return _examiner.answer_depth(*file_and_question)
-
-
-def _answer_pictures(question: exported_pictures.Question) -> exported_pictures.Answer:
-    return exported_pictures.answer(_examiner.dataset, _examiner.sets, question)
+def _examine(file: File) -> tuple[File, Facts]:
+    return file, _examiner.examine(file)
 
 
 def _answer(question: geometry.Question) -> list[Answer]:

@@ -1,0 +1,96 @@
+"""A nerfstudio dataset, read as its nerfstudio_dataparser.py and cameras.py do.
+
+The reader undoes ``applied_transform`` in the poses and in the point cloud.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.files import read_json, reading
+from oracles.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
+from oracles.readers.contents import (
+    Exported,
+    ExportedCamera,
+    ExportedView,
+    Part,
+    development,
+    number,
+    numbers,
+)
+from oracles.readers.ply import read_ply
+
+PARTS = {"train": "train", "val": "validation", "test": "test"}
+
+
+def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
+    """Read the transforms.json of an export, and its point cloud."""
+    folder = listing.parent
+    path = folder / "transforms.json"
+    exported = Exported()
+    with reading(path, "transforms.json"):
+        content = read_json(path)
+        exported.cameras.append(ExportedCamera(str(path), _camera(content)))
+        applied = np.eye(4)
+        applied[:3] = numbers(content["applied_transform"], (3, 4))
+        undone = np.linalg.inv(applied)
+        frames = content["frames"]
+        for index, frame in enumerate(frames):
+            place = f"frames[{index}]"
+            with reading(f"{path}: {place}", "frame"):
+                name = Path(str(frame["file_path"])).stem
+                matrix = undone @ numbers(frame["transform_matrix"], (4, 4))
+                exported.views.append(ExportedView(path, place, name, matrix))
+                for key in ("file_path", "mask_path", "depth_file_path"):
+                    if key in frame:
+                        picture = folder / str(frame[key])
+                        exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
+                _add_pictures(folder, frame, name, options, exported)
+        # Either all frames have a mask, or none. The options say whether they have depth.
+        masks = sum("mask_path" in frame for frame in frames)
+        exported.expect(f"{path}: frames with a mask_path", masks, len(frames) if masks else 0)
+        depths = sum("depth_file_path" in frame for frame in frames)
+        expected_depths = len(frames) if options["depth"] else 0
+        exported.expect(f"{path}: frames with a depth_file_path", depths, expected_depths)
+        for part, name in PARTS.items():
+            names = [Path(str(file)).stem for file in content[f"{part}_filenames"]]
+            exported.parts.append(Part(f"{path}: {part}_filenames", name, names))
+        cloud, faults = read_ply(folder / str(content["ply_file_path"]), undone)
+    exported.clouds.append(cloud)
+    exported.faults += faults
+    return exported
+
+
+def _add_pictures(
+    folder: Path, frame: dict[str, Any], view: str, options: dict[str, Any], exported: Exported
+) -> None:
+    """Add the picture of a frame, its mask, and its depth in millimetres."""
+    colour = folder / str(frame["file_path"])
+    exported.add_picture(colour, view, "colour", development=development(options))
+    exported.add_mask(folder / str(frame.get("mask_path", f"masks/{view}.png")), view)
+    if "depth_file_path" in frame:
+        # A pinhole's rays have length 1 along the axis. Other rays have length 1.
+        is_pinhole = isinstance(exported.cameras[0].camera, Pinhole)
+        meaning = "z" if is_pinhole else "distance"
+        depth = folder / str(frame["depth_file_path"])
+        exported.add_picture(depth, view, "steps", meaning=meaning, unit=0.001)
+
+
+def _camera(content: dict[str, Any]) -> Camera:
+    """Return the lens that all frames share. Source: Cameras.generate_rays."""
+    width, height = int(content["w"]), int(content["h"])
+    fx, fy, cx, cy = (number(content[key]) for key in ("fl_x", "fl_y", "cx", "cy"))
+    model = content["camera_model"]
+    if model == "PINHOLE":
+        return Pinhole(width, height, fx, fy, cx, cy)
+    if model == "OPENCV_FISHEYE":
+        k1, k2, k3, k4 = (number(content[f"k{index}"]) for index in range(1, 5))
+        return OpenCVFisheye(width, height, fx, fy, cx, cy, k1, k2, k3, k4)
+    if model == "EQUIRECTANGULAR":
+        # A turn of π a focal length, from the principal point.
+        west, east = (math.pi * (x - cx) / fx for x in (0, width))
+        north, south = (-math.pi * (y - cy) / fy for y in (0, height))
+        return Panorama(width, height, west, east, north, south)
+    raise ValueError(f"camera_model: {model!r} is not PINHOLE, OPENCV_FISHEYE or EQUIRECTANGULAR")
