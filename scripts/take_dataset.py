@@ -31,7 +31,7 @@ def main() -> None:
 def take(store: ViewStore, dataset: Path) -> None:
     """Copy all files of a dataset. Raises `UserError` if one is not in the storage."""
     # Only now, so that --help need not wait for it.
-    from lightfield.validation.files import REPORT
+    from lightfield.dataset.layout import REPORT
 
     report = dataset / REPORT
     for name in store.names(str(report)):
@@ -55,8 +55,8 @@ def take(store: ViewStore, dataset: Path) -> None:
 
 def sums_of(store: ViewStore, dataset: Path) -> tuple[Path, dict[Path, str]]:
     """Bring the list of a dataset's files. Return it, and the SHA-256 of each file."""
+    from lightfield.dataset.layout import SUMS, read_sums
     from lightfield.dataset.publication import PUBLISHED_FOLDER, RO_CRATE
-    from lightfield.validation.files import SUMS, read_sums
 
     is_archive = dataset.suffix == ".json"
     is_published = dataset.parent.name == PUBLISHED_FOLDER

@@ -58,9 +58,10 @@ def check(arguments: argparse.Namespace) -> None:
     # Only now, so that --help need not wait for these.
     from lightfield.core.settings import read_settings
     from lightfield.dataset.job_settings import ValidationSettings
+    from lightfield.dataset.layout import REPORT, SUMS, write_sums
     from lightfield.dataset.lightfield import NAME
     from lightfield.export import MANIFESTS
-    from lightfield.validation.files import REPORT, SUMS, remove_strays, write_sums
+    from lightfield.validation.files import remove_strays
     from lightfield.validation.validate import validate
 
     if arguments.settings:

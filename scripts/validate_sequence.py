@@ -42,8 +42,8 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from lightfield.core.settings import read_settings
     from lightfield.dataset.job_settings import SequenceValidationSettings
+    from lightfield.dataset.layout import write_sums
     from lightfield.export import IN_FOLDERS
-    from lightfield.validation.files import write_sums
     from lightfield.validation.sequence import (
         export_lists,
         frame_folders,

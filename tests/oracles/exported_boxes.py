@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.layout import ImageSet
 from lightfield.dataset.passes import PASSES
 from lightfield.imaging import images
-from lightfield.validation.files import ImageSet
 from oracles.readers.contents import Box, Exported
 
 Numbers = NDArray[np.uint32]

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.layout import ImageSet, Manifest
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation.files import ImageSet, Manifest, lists_of
+from lightfield.validation.files import lists_of
 from oracles import exported_boxes, unit_cube
 from oracles.readers import read
 from oracles.readers.cameras import Camera, PolynomialFisheye

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
+from lightfield.dataset.layout import ImageSet, rendered
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
+from lightfield.validation.cameras import camera_of
 from lightfield.validation.consistency import Camera
-from lightfield.validation.files import ImageSet, rendered
 from oracles import unit_cube
 from oracles.exported_cameras import SetExport
 from oracles.readers.contents import FLOAT32, Cloud, DepthMap, DepthRange, same
@@ -78,7 +79,7 @@ def _factors(lens: Lens, meaning: str) -> Floats:
 
 def _read(dataset: Path, image_set: ImageSet, view: int) -> _View:
     path = dataset / image_set.folder / f"{image_set.views[view]}.exr"
-    return _View(image_set.camera(view), images.read_image(path, ["Z"]).channels["Z"])
+    return _View(camera_of(image_set, view), images.read_image(path, ["Z"]).channels["Z"])
 
 
 def _views_of(depth_range: DepthRange, image_set: ImageSet) -> list[int]:

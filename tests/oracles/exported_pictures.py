@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.layout import ImageSet
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.validation.cameras import camera_of
 from lightfield.validation.development import toned
-from lightfield.validation.files import ImageSet
 from oracles.exported_cameras import SetExport
 from oracles.exported_depth import converted
 from oracles.readers.contents import FLOAT32, Picture
@@ -190,7 +191,7 @@ class _ShownView:
         return np.asarray(np.where(self.valid, shown_off_axis, shown == 0))
 
     def _wrong_depth(self, picture: Picture) -> Bools:
-        camera = self.image_set.camera(self.view)
+        camera = camera_of(self.image_set, self.view)
         depth = converted(self.image.channels["Z"], camera, picture.meaning).astype(np.float64)
         depth = np.where(np.isnan(self.rays[..., 2]), np.nan, depth)
         shown = self._channel(picture, "Y").astype(np.float64)

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.layout import ImageSet
 from lightfield.dataset.lightfield import View
 from lightfield.dataset.passes import PASSES
 from lightfield.geometry.flow import shorter
 from lightfield.imaging import images
-from lightfield.validation.files import ImageSet, read_sets
+from lightfield.validation.cameras import camera_of
+from lightfield.validation.files import read_sets
 from lightfield.validation.sequence import export_lists, frame_folders
 from oracles import exported_cameras, exported_depth
 from oracles.exported_cameras import Expected, SetExport
@@ -129,7 +131,7 @@ def _flow_faults(frame: Frame, flow: Flow) -> Iterator[str]:
     """Yield how a view's flow differs from its pass motion: it must lead to the same pixels."""
     image_set = frame.views
     number = image_set.numbers[flow.view]
-    camera = image_set.camera(number)
+    camera = camera_of(image_set, number)
     view = image_set.lightfield.views[number]
     motion_file = PASSES["motion"].path(frame.folder / image_set.name, flow.view)
     try:

@@ -15,13 +15,13 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.exports import MANIFEST, Export, ExportSettings
+from lightfield.dataset.layout import Manifest
 from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export import instant_ngp
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
-from lightfield.validation.files import Manifest
 
 Source = SourceDataset | SourceSequence
 

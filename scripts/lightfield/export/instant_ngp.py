@@ -31,6 +31,7 @@ from lightfield.dataset.exports import (
     ExportSettings,
     InstantNgp,
 )
+from lightfield.dataset.layout import Manifest
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.names import VIEWS
 from lightfield.dataset.view_store import ViewStore
@@ -42,7 +43,6 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
-from lightfield.validation.files import Manifest
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The rotation from world to NeRF coordinates in SILVR's generate_NERF_transforms.py."""

@@ -20,13 +20,13 @@ from lightfield.dataset import scene_yaml
 from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
 from lightfield.dataset.job_settings import BatchSettings
+from lightfield.dataset.layout import SUMS, read_sums
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import datasets_of
 from lightfield.dataset.scene_yaml import Scene
 from lightfield.dataset.splits_file import SPLITS, splits_content
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import model_files
-from lightfield.validation.files import SUMS, read_sums
 
 # Raise this number when the stages make something else of equal settings.
 VERSION = 1

@@ -25,6 +25,7 @@ from lightfield.dataset.job_settings import (
     FreePlacesSettings,
     ImportSettings,
 )
+from lightfield.dataset.layout import SUMS, write_sums
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.names import VIEWS
 from lightfield.dataset.scene_yaml import Scene
@@ -39,7 +40,7 @@ from lightfield.rendering import (
 )
 from lightfield.reprojection import flags, pipeline
 from lightfield.reprojection.job import Job
-from lightfield.validation.files import SUMS, remove_strays, write_sums
+from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
 from lightfield.validation.validate import validate
 

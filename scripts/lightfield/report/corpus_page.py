@@ -13,9 +13,9 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from lightfield.dataset.corpus import PAGE
+from lightfield.dataset.layout import REPORT
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import page
-from lightfield.validation.files import REPORT
 
 # The size of a histogram in units of its SVG.
 WIDTH = 240

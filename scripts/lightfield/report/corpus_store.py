@@ -9,11 +9,11 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset.corpus import SHARDS, THUMBNAILS, CorpusSettings
 from lightfield.dataset.family import RECORD
+from lightfield.dataset.layout import SUMS, read_sums
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.member_record import read_member
 from lightfield.dataset.view_store import ViewStore
 from lightfield.report.corpus_looks import chosen_views
-from lightfield.validation.files import SUMS, read_sums
 
 
 def bring(folder: Path, settings: CorpusSettings, store: ViewStore) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
+from lightfield.dataset.layout import IMAGES, REPORT, SUMS
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.dataset.sensors import settings_in
@@ -22,7 +23,6 @@ from lightfield.imaging import images
 from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
 from lightfield.report import lights as light_pictures
 from lightfield.report.packing import webp
-from lightfield.validation.files import IMAGES, REPORT, SUMS
 
 PICTURES = ("overview", "contact_sheet")
 PLOTS = ("depth", "noise")

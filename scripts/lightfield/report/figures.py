@@ -17,6 +17,7 @@ from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.layout import IMAGES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
@@ -25,7 +26,6 @@ from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
 from lightfield.measurement import noise
 from lightfield.report import contact_sheet
-from lightfield.validation.files import IMAGES
 
 # The viewpoint of the rig's drawing, in degrees: round the rig from −Y, and above the ground.
 AZIMUTH = 30.0

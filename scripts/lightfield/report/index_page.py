@@ -9,9 +9,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.core.paths import files_below
 from lightfield.dataset.corpus import CORPUS
+from lightfield.dataset.layout import REPORT
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page, tables
-from lightfield.validation.files import REPORT
 
 THUMBNAIL = 480
 _PAGE = (REPORT, "index.html")

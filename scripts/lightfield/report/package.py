@@ -19,6 +19,7 @@ from lightfield.core.files import atomic_path, read_keys, sha256
 from lightfield.core.paths import files_below
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.layout import CARD, IMAGES, README, REPORT
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.names import SEQUENCE_EXPORTS
 from lightfield.dataset.passes import PASSES, group_pass
@@ -26,7 +27,6 @@ from lightfield.dataset.scene_yaml import Credits
 from lightfield.export import transforms
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
-from lightfield.validation.files import CARD, IMAGES, README, REPORT
 
 SILVR = (
     "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "

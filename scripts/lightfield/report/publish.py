@@ -8,13 +8,13 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.core.paths import files_below
+from lightfield.dataset.layout import SUMS
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
 from lightfield.dataset.scene_yaml import Credits
 from lightfield.dataset.view_store import ViewStore
 from lightfield.report import croissant, datacite, hugging_face, package, ro_crate, shards
 from lightfield.report.published import Published
-from lightfield.validation.files import SUMS
 
 
 def publish(folder: Path, name: str, scene: Credits, output: Path, most: float | None) -> Published:

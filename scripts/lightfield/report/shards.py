@@ -17,21 +17,20 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_csv
 from lightfield.core.progress import Progress
+from lightfield.dataset.layout import (
+    SUMS,
+    File,
+    ImageSet,
+    pass_files,
+    read_set,
+    read_sums,
+    source_view,
+    view_files,
+)
 from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.names import VIEWS
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report.package import add_entry, tar_size
-from lightfield.validation.files import (
-    SUMS,
-    File,
-    ImageSet,
-    of_passes,
-    of_views,
-    read_sets,
-    read_sums,
-    rendered,
-    source_view,
-)
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
@@ -81,15 +80,17 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
     if folder == root and NAME not in sums:
         return Dataset([], _others(root, folder, [*sums, SUMS]))
     reprojections = sorted(Path(name).parent.name for name in sums if name.endswith(f"/{NAME}"))
-    sets, checks = read_sets(folder, [name for name in reprojections if f"{name}/{NAME}" in sums])
-    for check in checks:
-        if not check.passed:
-            raise UserError(f"{folder}: {check.detail}: {'; '.join(check.problems)}")
-    source = rendered(sets)
-    assert source is not None
+    source = read_set(folder, "")
+    sets = [source]
+    for name in reprojections:
+        if f"{name}/{NAME}" in sums:
+            sets.append(read_set(folder, name, source))
     prefix = "_".join(folder.relative_to(root).parts)
     samples = [_sample(source, number, prefix) for number in range(len(source.views))]
-    for file in [*of_views(folder, sets)[0], *of_passes(folder, sets)[0]]:
+    files = []
+    for number, image_set in enumerate(sets):
+        files += view_files(folder, image_set, number)[0]
+    for file in [*files, *pass_files(folder, sets)[0]]:
         _add_file(samples, source, sets[file.set], file, folder, sums)
     taken = {path for sample in samples for path in sample.files.values()}
     others = [name for name in (*sums, SUMS) if folder / name not in taken]
@@ -107,6 +108,11 @@ def _sample(source: ImageSet, number: int, prefix: str) -> Sample:
     key = "_".join(filter(None, [prefix, view.name])).replace(".", "_")
     # Without a split, all views may train.
     split = view.split or "train"
+    if split not in PARTS:
+        parts = ", ".join(PARTS)
+        raise UserError(
+            f"{source.lightfield.path}: {view.name}: split: is {split!r}; must be {parts}"
+        )
     content = {"view": view.name, "split": split, "pictures": {}}
     return Sample(key, split, content)
 

@@ -16,10 +16,10 @@ from lightfield.core.files import broken, read_json
 from lightfield.core.progress import duration
 from lightfield.dataset import journal, keys, shard_files
 from lightfield.dataset.family import RECORD
+from lightfield.dataset.layout import IMAGES
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.member_record import read_member
 from lightfield.imaging import images
-from lightfield.validation.files import IMAGES
 
 # The rate is measured over this many seconds.
 WINDOW = 600.0

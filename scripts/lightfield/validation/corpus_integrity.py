@@ -11,7 +11,7 @@ from lightfield.core.files import broken, read_json, reading, set_aside
 from lightfield.core.paths import check_inside
 from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
 from lightfield.dataset.family import RECORD
-from lightfield.validation.files import SUMS, read_sums
+from lightfield.dataset.layout import SUMS, read_sums
 from lightfield.validation.integrity import Fault, Integrity, file_problem
 
 

@@ -6,144 +6,49 @@ a folder with its own lightfield.json and images.
 
 import math
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, read_json, set_aside, sha256, write_text
+from lightfield.core.files import absolute_path, read_json, set_aside, sha256
 from lightfield.core.paths import (
     files_below,
-    inside,
     kept_behind_link,
     leads_inside,
     link_above,
-    place_in,
     stray_places,
 )
 from lightfield.dataset.dataset_paths import REPORT_FILES
-from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.passes import FLOW, NAMES, Pass
+from lightfield.dataset.layout import (
+    CARD,
+    DEPTH_PICTURE,
+    IMAGES,
+    OUTPUTS,
+    README,
+    REPORT,
+    File,
+    ImageSet,
+    Manifest,
+    expected_pass_files,
+    file_names,
+    json_files,
+    pass_files,
+    read_set,
+    rendered,
+    source_view,
+    view_files,
+)
+from lightfield.dataset.lightfield import NAME, View
 from lightfield.dataset.sensors import (
     BRACKET_FILES,
-    SensorSettings,
-    parameter_file,
-    settings_in,
 )
 from lightfield.geometry import rotations
 from lightfield.geometry.exposure import pose_between
-from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation.consistency import Camera
 from lightfield.validation.result import Check
-
-IMAGES = "exr"
-"""The folder of a dataset's own views."""
-
-SUMS = "sha256sums.txt"
-"""The file with a dataset's checksums. Only a valid dataset has it."""
-
-OUTPUTS = ("validation.json", SUMS)
-"""The files in a dataset that its validation writes."""
-
-REPORT = "report"
-"""The folder in a dataset that is not published with it."""
-
-README = "README.md"
-CARD = "card.json"
-"""README and CARD are the files that a package adds to a dataset."""
-
-DEPTH_PICTURE = "{view}_depth.png"
-"""The picture that scripts/reproject.py puts beside a view with --depth-png."""
-
-
-@dataclass(frozen=True)
-class Manifest:
-    """How to find the files of one kind of export, so that they are published and checked.
-
-    - ``lists``: a glob pattern for the export's lists, which lie beside a lightfield.json.
-    - ``pictures``: reads a list, and returns the paths of its images, relative to the list. They
-      have the size of the views. Raises `UserError` for a file that is no such list.
-    - ``beside``: names with ``{view}`` of images that may lie beside the views and beside those
-      pictures. They have the same size.
-    - ``files``: returns the SHA-256 of every file of the export, if its list has them.
-    """
-
-    lists: str
-    pictures: Callable[[Path], Sequence[str]]
-    beside: tuple[str, ...] = ()
-    files: Callable[[Path], Mapping[str, str]] = lambda _: {}
-
-
-@dataclass(frozen=True, eq=False)
-class ImageSet:
-    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
-
-    ``grain`` is the angle in radians between two pixels at the centre of a source view. It is 0 for
-    rendered views.
-    """
-
-    name: str
-    lightfield: LightField
-    grain: float
-
-    @property
-    def folder(self) -> str:
-        """The folder of its images, relative to the dataset."""
-        return self.name or IMAGES
-
-    @property
-    def prefix(self) -> str:
-        """The prefix of its files' paths and of its checks' names."""
-        return f"{self.name}/" if self.name else ""
-
-    @cached_property
-    def sensor(self) -> SensorSettings | None:
-        """The settings of the sensor that developed the views. None if there is none."""
-        return settings_in(self.lightfield.content)
-
-    @cached_property
-    def views(self) -> list[str]:
-        return [view.name for view in self.lightfield.views]
-
-    @cached_property
-    def numbers(self) -> dict[str, int]:
-        """The positions of its views by their names."""
-        return {name: number for number, name in enumerate(self.views)}
-
-    def camera(self, view: int) -> Camera:
-        depth = self.lightfield.depth
-        assert depth is not None
-        lens = self.lightfield.lens
-        return Camera(lens, self.lightfield.matrices[view], depth, self.grain, self._spacing)
-
-    @cached_property
-    def _spacing(self) -> int:
-        """How many of its pixels are as wide as a pixel of a source view, in the middle."""
-        angle = _central_angle(self.lightfield.lens)
-        return math.ceil(self.grain / angle) if self.grain > angle > 0 else 1
-
-
-@dataclass(frozen=True)
-class File:
-    """An image file: its ``path`` relative to the dataset, its set, and its view.
-
-    Masks, depth maps and pictures for trainers are not views: their ``view`` is −1. They only need
-    to be readable and of their set's size. ``of_pass`` is the pass of the view that the file holds.
-    """
-
-    path: str
-    set: int
-    view: int = -1
-    of_pass: Pass | None = None
-
-    @property
-    def is_view(self) -> bool:
-        """Whether it is a view's picture, not a pass or a picture beside it."""
-        return self.view >= 0 and self.of_pass is None
 
 
 def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
@@ -151,46 +56,25 @@ def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSe
     sets: list[ImageSet] = []
     checks = []
     for name in ("", *reprojections):
-        path = dataset / name / NAME
         try:
-            lightfield = LightField.read(path)
-            settings_in(lightfield.content)
+            image_set = read_set(dataset, name, rendered(sets))
         except UserError as error:
             problem = str(error).replace(f"{dataset}/", "")
             check = f"{name}/lightfield".removeprefix("/")
             checks.append(Check(check, False, "cannot be understood", problems=[problem]))
             continue
-        source = rendered(sets)
-        sets.append(
-            ImageSet(name, lightfield, _central_angle(source.lightfield.lens) if source else 0.0)
-        )
-        checks.append(_poses(sets[-1], source))
+        sets.append(image_set)
+        checks.append(_poses(image_set))
     return sets, checks
 
 
-def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
-    """Return the set of the rendered views, or None if its lightfield.json could not be read."""
-    return sets[0] if sets and not sets[0].name else None
-
-
-def source_view(source: ImageSet | None, name: str) -> int | None:
-    """Return the number of the view from which the reprojected view ``name`` was made.
-
-    Return None if there is no such view.
-    """
-    numbers = source.numbers if source else {}
-    # The names of a light and of a cube map's face follow the view's name.
-    while name not in numbers and "_" in name:
-        name = name.rpartition("_")[0]
-    return numbers.get(name)
-
-
-def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
+def _poses(image_set: ImageSet) -> Check:
     """Check each view's pose and split.
 
     A pose is rigid, the same in both forms, and at its source's position.
     """
     views = image_set.lightfield.views
+    source = image_set.source
     # Blender keeps poses in float32.
     tolerance = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
     faults = {}
@@ -233,84 +117,17 @@ def _moves_elsewhere(view: View, tolerance: float) -> bool:
         return True  # These are no two matrices.
 
 
-def _central_angle(lens: Lens) -> float:
-    """Return the angle in radians between two pixels in the middle of the image."""
-    x = np.array([lens.width - 1, lens.width + 1]) / 2
-    left_ray, right_ray = lens.rays(x, np.full(2, lens.height / 2))
-    return float(np.arccos(np.clip(left_ray @ right_ray, -1.0, 1.0)))
-
-
 def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[Check]]:
-    """Return the files of the views that exist, and for each set a check that none is missing.
-
-    A reprojection is EXR, PNG or both. If one view has a format, all views must have it.
-    """
+    """Return the files of the views that exist, and for each set a check that none is missing."""
     files: list[File] = []
     checks = []
     for number, image_set in enumerate(sets):
-        present = _files(dataset / image_set.folder)
-        set_files = []
-        missing = {}
-        for suffix in _formats(image_set, present):
-            for view, name in enumerate(image_set.views):
-                path = f"{image_set.folder}/{name}{suffix}"
-                if name + suffix in present:
-                    set_files.append(File(path, number, view))
-                else:
-                    missing[path] = "is missing"
-        detail = f"{len(set_files)} of {len(set_files) + len(missing)} images are there"
-        checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
+        set_files, missing = view_files(dataset, image_set, number)
+        faults = dict.fromkeys(missing, "is missing")
+        detail = f"{len(set_files)} of {len(set_files) + len(faults)} images are there"
+        checks.append(Check.of_files(f"{image_set.prefix}views", faults, detail))
         files += set_files
     return files, checks
-
-
-def _formats(image_set: ImageSet, present: Set[str]) -> list[str]:
-    """Return the suffixes of a set's views: those that any view has. EXR if no view is there."""
-    allowed = (".exr", ".png") if image_set.name else (".exr",)
-    formats = []
-    for suffix in allowed:
-        if any(view + suffix in present for view in image_set.views):
-            formats.append(suffix)
-    return formats or [".exr"]
-
-
-def _files(folder: Path) -> set[str]:
-    """Return the names of the files in a folder."""
-    return {path.name for path in folder.glob("*") if path.is_file()}
-
-
-def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
-    """Return the existing files of passes and flow, and the faults of the others by path."""
-    files = _pass_files(sets)
-    present = [file for file in files if (dataset / file.path).is_file()]
-    missing = {file.path for file in files} - {file.path for file in present}
-    return present, dict.fromkeys(sorted(missing), "is missing")
-
-
-def _pass_files(sets: Sequence[ImageSet]) -> list[File]:
-    """Return the files of passes and flow that the sets must have."""
-    files = []
-    for number, image_set in enumerate(sets):
-        folder = Path(image_set.name)
-        for index, view in enumerate(image_set.lightfield.views):
-            for view_pass in image_set.lightfield.passes:
-                path = view_pass.path(folder, view.name).as_posix()
-                files.append(File(path, number, index, view_pass))
-            if view.flow:
-                path = FLOW.path(folder, view.flow).as_posix()
-                files.append(File(path, number, index, FLOW))
-    return files
-
-
-def json_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the JSON files beside images: names of ids, and sensors' parameters."""
-    rendered_set = rendered(sets)
-    passes = rendered_set.lightfield.passes if rendered_set else []
-    paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
-    for image_set in sets:
-        if image_set.sensor:
-            paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]
-    return paths
 
 
 def lists_of(
@@ -361,7 +178,7 @@ def of_exports(
                 other_files += listed.other_files
                 problems += listed.problems
         for folder in sorted(folders):
-            present = _files(dataset / folder)
+            present = file_names(dataset / folder)
             for view in image_set.views:
                 for pattern in patterns:
                     name = pattern.format(view=view)
@@ -480,7 +297,7 @@ def remove_strays(
     if len(sets) <= len(reprojections):
         return 0
     views, _ = of_views(dataset, sets)
-    views += of_passes(dataset, sets)[0]
+    views += pass_files(dataset, sets)[0]
     extras, lists, exports = of_exports(
         absolute_path(dataset), sets, views, manifests, export_lists
     )
@@ -540,7 +357,7 @@ def checksums(
     rendered_set = rendered(sets)
     views = rendered_set.views if rendered_set else []
     rendered_files = [f"{IMAGES}/{view}.exr" for view in views]
-    rendered_files += [file.path for file in _pass_files(sets[:1])] if rendered_set else []
+    rendered_files += [file.path for file in expected_pass_files(sets[:1])] if rendered_set else []
     for path in sorted(rendered_files):
         if path in sums and path not in recorded:
             faults[path] = "has no record"
@@ -588,25 +405,3 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         detail = f"nothing is nearer to a camera than {nearest:.3g} m"
         figures = {"nearest_metres": round(nearest, 4)}
     return Check.of_files("cameras", faults, detail, figures=figures)
-
-
-def read_sums(path: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file that a sha256sums.txt names.
-
-    Raises `UserError` for a name that leads out of the folder of the list.
-    """
-    sums = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        digest, separator, name = line.partition("  ")
-        if separator:
-            inside(path.parent, name, f"{path}: line {number}")
-            sums[name] = digest
-    return sums
-
-
-def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
-    """Write ``checksums`` as sha256sum does, and the sum of ``result`` if the dataset holds it."""
-    sums = dict(checksums)
-    if place := place_in(dataset, result):
-        sums[place.as_posix()] = sha256(result)
-    write_text(path, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))

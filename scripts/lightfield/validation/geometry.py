@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from lightfield.core.progress import Progress
+from lightfield.dataset.layout import File, ImageSet
 from lightfield.dataset.lightfield import NAME
 from lightfield.validation import consistency
+from lightfield.validation.cameras import camera_of, grain_of
 from lightfield.validation.consistency import Answer, Patches
-from lightfield.validation.files import File, ImageSet
 from lightfield.validation.result import Check
 
 # A view fails if more than half of its pairs exceed one of two limits. The first is the part of
@@ -66,7 +67,7 @@ def _pair_answers(
     """Return one answer for each pair of neighbours: the sum of both directions."""
     files = list(patches_of_files)
     patches = list(patches_of_files.values())
-    pairs = consistency.view_pairs([image_set.camera(file.view) for file in files], patches)
+    pairs = consistency.view_pairs([camera_of(image_set, file.view) for file in files], patches)
     neighbours: dict[int, list[int]] = {}
     for first, second in pairs:
         neighbours.setdefault(first, []).append(second)
@@ -116,7 +117,7 @@ def _judge(
     name: str, image_set: ImageSet, files: Sequence[File], pairs: Mapping[Pair, Answer]
 ) -> Check:
     """Return the check that follows from the pairs' answers. It names the bad views."""
-    limit = REPROJECTED_DISPLACEMENT_LIMIT if image_set.grain else DISPLACEMENT_LIMIT
+    limit = REPROJECTED_DISPLACEMENT_LIMIT if grain_of(image_set) else DISPLACEMENT_LIMIT
     verdicts = _view_verdicts(pairs, limit)
     if not verdicts:
         return Check(name, None, "no two views see enough of the same smooth surfaces")
@@ -130,7 +131,7 @@ def _judge(
             "those of the images",
         )
     scales = _scales(pairs, set(bad_views))
-    scale_limit = REPROJECTED_SCALE_LIMIT if image_set.grain else SCALE_LIMIT
+    scale_limit = REPROJECTED_SCALE_LIMIT if grain_of(image_set) else SCALE_LIMIT
     for quantity, (error, deviation) in scales.items():
         if deviation < SCALE_DEVIATION_LIMIT and abs(error) > scale_limit + 3 * deviation:
             problems.append(

@@ -28,10 +28,10 @@ from lightfield.core.files import (
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
 from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
-from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # The folder of a sequence's frame.
 _FRAME = re.compile(r"f\d{5,7}")

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
+from lightfield.dataset.layout import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.dataset.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency, light_sums, reprojected
+from lightfield.validation.cameras import camera_of
 from lightfield.validation.consistency import Answer, Patches
-from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
@@ -123,9 +124,9 @@ class Examiner:
         image_set = self.sets[file.set]
         path = self.dataset / file.path
         depth = _with_unknown(images.read_image(path, ["Z"]).channels["Z"], path)
-        camera = image_set.camera(file.view)
+        camera = camera_of(image_set, file.view)
         return [
-            consistency.ask(patches, image_set.camera(asking), camera, depth)
+            consistency.ask(patches, camera_of(image_set, asking), camera, depth)
             for asking, patches in questions
         ]
 
@@ -150,7 +151,7 @@ class Examiner:
             wrong = int((depth <= 0).sum())
             facts.fault("depth", f"{wrong} depths are not positive", wrong)
             facts.missed = float(np.isposinf(depth[in_circle]).mean())
-            facts.patches = consistency.sample(image_set.camera(file.view), depth, RAYS_A_VIEW)
+            facts.patches = consistency.sample(camera_of(image_set, file.view), depth, RAYS_A_VIEW)
         if is_rendered and images.MACHINE_ATTRIBUTE in image.attributes:
             facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
         if not is_rendered:
@@ -262,8 +263,8 @@ class Examiner:
             return  # Another check reports it.
         target_path = self.dataset / image_set.folder / f"{image_set.views[target]}.exr"
         target_depth = _with_unknown(target_depth, target_path)
-        camera = image_set.camera(file.view)
-        other = image_set.camera(target)
+        camera = camera_of(image_set, file.view)
+        other = camera_of(image_set, target)
         rows, columns = np.nonzero(np.isfinite(depth) & np.isfinite(flow).all(axis=0))
         points = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
         places = np.stack([columns, rows], axis=-1) + 0.5 + flow[:2, rows, columns].T
@@ -465,9 +466,9 @@ def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim:
     return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
-def of_passes(facts: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
-    """Return the check of the views' passes. ``missing`` maps paths of missing files to texts."""
-    faults = {**missing}
+def of_passes(facts: Mapping[File, Facts], missing: Sequence[str]) -> Check:
+    """Return the check of the views' passes. ``missing`` are the paths of missing files."""
+    faults = dict.fromkeys(missing, "is missing")
     faults |= {
         file.path: ", ".join(fact.faults["passes"]) for file, fact in facts.items() if fact.faults
     }

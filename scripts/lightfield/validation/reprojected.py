@@ -13,11 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.dataset.layout import ImageSet
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging.images import Image
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation.development import toned
-from lightfield.validation.files import ImageSet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

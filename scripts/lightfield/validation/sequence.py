@@ -10,12 +10,12 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.layout import Manifest
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation.files import (
     ListedFiles,
-    Manifest,
     listed_files,
     present_files,
     set_strays_aside,

@@ -9,10 +9,10 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json
 from lightfield.core.paths import inside, place_in
+from lightfield.dataset.layout import ImageSet, rendered, source_view
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.geometry.rigs.split_setting import PARTS
-from lightfield.validation.files import ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
 # Two poses are the same if they agree to this many decimals, in metres and in the rotation matrix.

@@ -23,11 +23,12 @@ from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
+from lightfield.dataset import layout
 from lightfield.dataset.inventory import read_inventory
+from lightfield.dataset.layout import File, ImageSet, Manifest
 from lightfield.dataset.shard_files import read_record
 from lightfield.validation import files, geometry, machines, pixels, splits_check
 from lightfield.validation.consistency import Answer
-from lightfield.validation.files import File, ImageSet, Manifest
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
 
@@ -65,7 +66,7 @@ def validate(
     volumes = read_inventory(inventory, "volumes")["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence_checks = files.of_views(dataset, sets)
-    passes, missing_passes = files.of_passes(dataset, sets)
+    passes, missing_passes = layout.pass_files(dataset, sets)
     extras, export_files, exports_check = files.of_exports(
         dataset, sets, views, manifests, export_lists
     )
@@ -85,7 +86,7 @@ def validate(
     if len(sets) <= len(reprojections):
         files_checks[0] = UNLISTED
     checks += [*_sensor_checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
-    rendered = files.rendered(sets)
+    rendered = layout.rendered(sets)
     view_count = len(rendered.views) if rendered else 0
     return Result(f"{dataset.parent.name}/{dataset.name}", view_count, checks, digests)
 
@@ -101,7 +102,7 @@ Sums = dict[str, tuple[int, str]]
 UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
 
 
-def _sensor_checks(dataset: Path, sets: Sequence[files.ImageSet]) -> list[Check]:
+def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:
     """Return a check of each set that a sensor developed."""
     if not any(image_set.sensor for image_set in sets):
         return []
@@ -205,7 +206,7 @@ def _check_files(
 
 def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
     """Return the sums of the JSON files beside images."""
-    paths = {name: dataset / name for name in files.json_files(sets)}
+    paths = {name: dataset / name for name in layout.json_files(sets)}
     return {
         name: (path.stat().st_size, sha256(path)) for name, path in paths.items() if path.is_file()
     }
