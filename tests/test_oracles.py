@@ -186,6 +186,14 @@ def test_correct_exports_agree_with_their_views(name, dataset):
     assert oracles.faults(dataset, [name]) == []
 
 
+def test_the_exports_of_a_build_agree_with_their_views(smoke):
+    datasets = [path.parent for path in (smoke / "results/smoke").glob("*/lightfield.json")]
+    assert datasets
+    for dataset in datasets:
+        reprojections = [path.parent.name for path in dataset.glob("*/lightfield.json")]
+        assert oracles.faults(dataset, reprojections) == []
+
+
 def other_digit(text, place=0):
     """Return a number of the same length that differs in one digit.
 
