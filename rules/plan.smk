@@ -1,25 +1,7 @@
-# Tables before rendering: the camera setups, and the estimated time and size of their views.
+# A table before rendering: the estimated time and size of the views.
 
 
 include: "helpers/plan.smk"
-
-
-# It has no output: its log is printed.
-rule rig_tables:
-    input:
-        [os.path.relpath(scene_path(name)) for name in [*CHOSEN_SCENES, *FAMILIES]],
-    log:
-        log_of("rig_tables"),
-    localrule: True
-    params:
-        table=f"{RESULTS}/tables/rigs.md",
-        figures=f"{RESULTS}/tables/rigs.csv",
-    message:
-        "Tabulating the camera setups"
-    shell:
-        f"python {SCRIPTS}/rig_table.py"
-        " {input} --markdown {params.table} --csv {params.figures}"
-        " > {log} 2>&1"
 
 
 rule probe:

@@ -136,7 +136,6 @@ WITHOUT_OUTPUT = {
     "gpu_check",
     "synthesis",
     "learn",
-    "rig_tables",
     "plan",
     "status",
     "advise",

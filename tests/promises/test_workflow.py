@@ -161,12 +161,6 @@ def test_a_package_unpacks_to_one_folder_named_after_scene_and_rig(smoke):
     assert not any("report" in name.parts for name in names)
 
 
-def test_rig_tables_are_printed_each_time(other):
-    for _ in range(2):
-        printed = succeeding(other, "--cores", "1", "rig_tables", "--config", "scenes=smoke")
-        assert "| smoke | LFLattice_2panos | 2 (–) |" in printed
-
-
 def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):
     succeeding(smoke, "--cores", "1", "smoke", "--report", str(tmp_path / "report.zip"))
     with zipfile.ZipFile(tmp_path / "report.zip") as file:

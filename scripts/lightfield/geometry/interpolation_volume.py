@@ -1,71 +1,34 @@
-"""The immersive interpolation volume of a rig, and the spacing of its cameras.
+"""The immersive interpolation volume of a rig.
 
 The volume is the set of points at which interpolation gives a light ray of any direction. Source:
 Courteaux et al. 2022 (the SILVR paper), section "Related Datasets". This file makes it exact:
 
-- The cameras span a surface: a mesh of cells, each between neighbouring cameras (four of a grid,
-  three of a sphere).
-- Interpolation gives a ray if the ray crosses a cell and all of the cell's cameras see its
+- The cameras span a surface: a mesh of triangles, each between neighbouring cameras.
+- Interpolation gives a ray if the ray crosses a triangle and all of its cameras see the ray's
   direction. Where cameras face outward, light reaches a point through the surface in front of the
   viewer. Where they face inside, it does so behind the viewer.
 - So a point belongs to the volume if two things hold. The surface surrounds the point. For every
-  cell, each of its cameras sees all rays between the point and the cell.
+  triangle, each of its cameras sees all rays between the point and the triangle.
 
-Within 90° of its axis, a camera's field of view is a cone. A convex cone holds all rays to a cell
-if it holds those to the cell's corners. Each side of the cone and each corner then bound the point
-by a plane. So the volume is a convex polyhedron, and nothing is sampled. For 180° fisheyes, as
-SILVR has, the result is exact. Other fields of view become `CONE_SIDES`-sided pyramids inside the
-cone, which takes less than 1e-4 off the volume. What a lens sees beyond 90° does not count, unless
-it sees all round.
+Within 90° of its axis, a camera's field of view is a cone. A convex cone holds all rays to a
+triangle if it holds the rays to its corners. Each side of the cone and each corner then bound the
+point by a plane. So the volume is a convex polyhedron, and nothing is sampled. For 180° fisheyes,
+as SILVR has, the result is exact. Other fields of view become `CONE_SIDES`-sided pyramids inside
+the cone, which takes less than 1e-4 off the volume. What a lens sees beyond 90° does not count,
+unless it sees all round.
 """
 
 import math
-from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
+from scipy.spatial import ConvexHull, QhullError
 
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.rigs import Rig
 
 CONE_SIDES = 360
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class InterpolationVolume:
-    """Volumes in m³: the immersive interpolation volume, and what the cameras' surface encloses.
-
-    Both are 0 if the surface has an opening, as those of a plane and a cylinder have.
-    """
-
-    immersive: float
-    enclosed: float
-
-
-def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
-    """Return the volumes of a rig with a lens. None if the cameras span no surface."""
-    mesh = rig.cells()
-    if mesh is None:
-        return None
-    views = rig.poses()[:: rig.views_a_position]
-    matrices = np.stack([view.matrix() for view in views])
-    positions = matrices[:, :3, 3]
-    if not is_closed(mesh, positions):
-        return InterpolationVolume(0.0, 0.0)
-    try:
-        hull = ConvexHull(positions)
-    except QhullError:  # All cameras are in a plane.
-        return InterpolationVolume(0.0, 0.0)
-    enclosed = float(hull.volume)
-    if rig.cube_map or sees_all_round(lens):
-        return InterpolationVolume(enclosed, enclosed)
-    planes = immersive_planes(mesh, hull, matrices, lens, rig.face_inside)
-    return InterpolationVolume(0.0 if planes is None else _polyhedron_volume(planes), enclosed)
 
 
 def immersive_planes(
@@ -77,8 +40,8 @@ def immersive_planes(
 ) -> Floats | None:
     """Return the planes (n, 4) around the immersive volume: n · p + c ≤ 0 within.
 
-    ``mesh`` holds the cells of a closed surface between cameras (m, 4, 4). ``hull`` is the convex
-    hull of their positions. None if the lens does not see its own axis: the volume is empty.
+    ``mesh`` holds the triangles of a closed surface between cameras (m, 4, 4). ``hull`` is the
+    convex hull of their positions. None if the lens does not see its own axis: the volume is empty.
     """
     positions = matrices[:, :3, 3]
     outside: Floats = hull.equations
@@ -122,40 +85,8 @@ def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     return parts
 
 
-def spacing(positions: Floats) -> float:
-    """Return the mean distance in metres from each camera (n, 3) to its nearest neighbour.
-
-    Cameras at one position, as on a cuboid's edges, are not each other's neighbours. NaN where
-    all cameras share one position.
-    """
-    places, place_of = np.unique(np.round(positions, 9), axis=0, return_inverse=True)
-    if len(places) < 2:
-        return math.nan
-    distances, _ = KDTree(places).query(places, k=2)
-    return float(distances[place_of.ravel(), 1].mean())
-
-
-def neighbour_spacing(mesh: list[tuple[int, ...]], positions: Floats) -> float:
-    """Return the mean length in metres of the cells' edges, each counted once, or NaN."""
-    edges = {frozenset((a, b)) for cell in mesh for a, b in _edges(cell) if a != b}
-    if not edges:
-        return math.nan
-    ends = positions[[sorted(edge) for edge in edges]]
-    return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1).mean())
-
-
-def is_closed(mesh: list[tuple[int, ...]], positions: Floats) -> bool:
-    """Return whether each edge joins two cells. Cameras at one place are one corner."""
-    _, place_of = np.unique(np.round(positions, 9), axis=0, return_inverse=True)
-    place_of = place_of.ravel()
-    edges = Counter(
-        frozenset((int(place_of[a]), int(place_of[b]))) for cell in mesh for a, b in _edges(cell)
-    )
-    return bool(edges) and all(len(edge) == 2 and n == 2 for edge, n in edges.items())
-
-
 def neighbours(mesh: list[tuple[int, ...]]) -> list[tuple[int, int]]:
-    """Return all pairs (camera, corner) within a cell. A camera also pairs with itself."""
+    """Return all pairs (camera, corner) within a triangle. A camera also pairs with itself."""
     return sorted({(camera, corner) for cell in mesh for camera in cell for corner in cell})
 
 
@@ -214,32 +145,9 @@ def _is_visible(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
     return is_visible
 
 
-def _edges(cell: tuple[int, ...]) -> list[tuple[int, int]]:
-    return list(zip(cell, (*cell[1:], cell[0]), strict=True))
-
-
 def _tightest(planes: Floats) -> Floats:
     """Keep only the tightest of parallel planes n · p + c ≤ 0. A flat side has many of them."""
     normals, group = np.unique(np.round(planes[:, :3], 9), axis=0, return_inverse=True)
     constants = np.full(len(normals), -np.inf)
     np.maximum.at(constants, group.ravel(), planes[:, 3])
     return np.column_stack([normals, constants])
-
-
-def _polyhedron_volume(planes: Floats) -> float:
-    """Return the volume of {p : n · p + c ≤ 0} for all rows (n, c), 0 if it is empty or flat."""
-    # The centre of the largest ball inside, by linear programming, is well inside.
-    lengths = np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
-    ball = linprog(
-        [0, 0, 0, -1],
-        A_ub=np.hstack([planes[:, :3], lengths]),
-        b_ub=-planes[:, 3],
-        bounds=[(None, None)] * 3 + [(0, None)],
-    )
-    if not ball.success or ball.x[3] < 1e-9:
-        return 0.0
-    try:
-        corners = HalfspaceIntersection(planes, ball.x[:3]).intersections
-        return float(ConvexHull(corners).volume)
-    except QhullError:
-        return 0.0

@@ -302,8 +302,7 @@ PROGRAM_PAGES = {
         "Programs that report",
         "These programs make pictures, pages, tables and schemas.",
         [
-            "report_figures", "report_html", "report_index", "costs", "rig_table", "schema",
-            "reference",
+            "report_figures", "report_html", "report_index", "costs", "schema", "reference",
         ],
     ),
     "programs-measure.md": (

@@ -75,7 +75,6 @@ class Grid(Rig):
 class Box(Grid):
     shape = "CUBOID"
     fewest = (2, 2, 2)
-    unit_volume = 1.0
 
     cameras: Annotated[tuple[Count, Count, Count], as_list(3)] = Field(
         description="Number of cameras along x, y and z."

@@ -25,7 +25,6 @@ class Random(CountedRig):
     """
 
     shape = "CUBOID"
-    unit_volume = 1.0
 
     type: Literal["random"]
     seed: int = Field(

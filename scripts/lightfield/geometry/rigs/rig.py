@@ -144,8 +144,6 @@ class Rig(Settings):
     is_round: ClassVar[bool] = False
     # Whether the rig is as large as the box around its cameras, whatever its ``size``.
     is_loose: ClassVar[bool] = False
-    # The volume inside the cameras' surface, in the unit box. None if the surface is open.
-    unit_volume: ClassVar[float | None] = None
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
 

@@ -1,6 +1,5 @@
 """A sphere: a camera on each vertex of Blender's icosphere, in Blender's order, looking outward."""
 
-import math
 from typing import Literal, Self
 
 import numpy as np
@@ -18,7 +17,6 @@ SAME_LEVEL = 1e-3
 class Sphere(Rig):
     shape = "SPHERE"
     is_round = True
-    unit_volume = math.pi / 6
 
     type: Literal["sphere"]
     subdivisions: int = Field(
