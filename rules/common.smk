@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from functools import cache, lru_cache
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from lightfield.core.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, ledger, memory, presence, shard_counts
+from lightfield.dataset import ledger, memory, presence, shard_counts
 from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.blend_lock import accept_blend
 from lightfield.dataset.scene_yaml import load_scene, scene_content, scene_path

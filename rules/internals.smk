@@ -39,13 +39,6 @@ def limit_resource(name, amount):
         workflow.register_resource(name, amount)
 
 
-def given_slurm_extra():
-    """Return the arguments for Slurm in the user's profile, which a rule's value would replace."""
-    resource = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
-    # Without a value, Snakemake has an entry without text.
-    return resource.raw.strip("'\"") if resource and resource.raw else ""
-
-
 def rule_name(name):
     """Return the name of a rule. A workflow that uses this one as a module may change it."""
     return workflow.modifier.modify_rulename(name)

@@ -49,7 +49,6 @@ rule render:
         mem_mb=shard_memory,
         runtime=shard_minutes,
         gpu=GPUS,
-        slurm_extra=avoided_nodes,
         stall_seconds=stall_seconds,
     params:
         folder=f"{DATASET}/exr",

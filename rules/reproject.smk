@@ -78,8 +78,6 @@ rule reproject:
         times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
     resources:
         mem_mb=2000,
-        # Reprojections and renders form groups, whose jobs must agree on this.
-        slurm_extra=avoided_nodes,
     params:
         views=f"{DATASET}/exr",
         lens_map=LENS_MAP,

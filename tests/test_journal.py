@@ -1,4 +1,4 @@
-"""What follows from journals: machines to avoid, views that hang, and suspect views."""
+"""What follows from journals: views that hang, and suspect views."""
 
 import json
 import signal
@@ -10,43 +10,7 @@ from conftest import SCRIPTS, largest_file
 
 from lightfield.core import files
 from lightfield.core.errors import UserError
-from lightfield.dataset.journal import Journal, Run, avoided, is_suspect, read
-
-
-def runs(*hosts):
-    """Return a shard's runs, in the order of their start. A host with ! has failed."""
-    return [
-        Run(
-            {"started": float(number), "host": host.rstrip("!")},
-            end=None if host.endswith("!") else {"ended": number + 0.5},
-        )
-        for number, host in enumerate(hosts)
-    ]
-
-
-@pytest.mark.parametrize(
-    ("shard", "others", "expected"),
-    [
-        # This is the first submission, and nobody has failed.
-        ([], [], []),
-        ([], [["a"], ["b"]], []),
-        # The job failed once, so it should run elsewhere.
-        (["a!"], [["a"], ["b"]], ["a"]),
-        # There may be no other machine.
-        (["a!"], [["a"]], []),
-        (["a!", "a!", "a!"], [], []),
-        # The machine failed thrice with other shards. The last run may still be at work.
-        ([], [["a!", "a!", "a!", "b"]], ["a"]),
-        ([], [["a!", "a!", "b"], ["a!"]], []),
-        # Earlier results do not matter.
-        ([], [["a", "a!", "a!", "a!", "b"]], ["a"]),
-        # The failures are not consecutive.
-        ([], [["a!", "a!", "a", "a!", "b"]], []),
-        (["c!"], [["a!", "a!", "a!", "b"]], ["a", "c"]),
-    ],
-)
-def test_a_machine_that_fails_while_others_do_not_is_avoided(shard, others, expected):
-    assert avoided(runs(*shard), [runs(*hosts) for hosts in others]) == expected
+from lightfield.dataset.journal import Journal, is_suspect, read
 
 
 def test_a_view_that_took_far_less_time_than_others_is_suspect():

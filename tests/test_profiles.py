@@ -35,7 +35,7 @@ def planned(tmp_path_factory):
     """Return a function that plans the smoke build, by profile and device. It returns the jobs."""
 
     @cache
-    def plan(profile, device):
+    def plan(profile, device, *options):
         folder = tmp_path_factory.mktemp("planned")
         results = folder / "results"
         arguments = [
@@ -44,6 +44,7 @@ def planned(tmp_path_factory):
             "jobs",
             "--profile",
             f"profiles/{profile}",
+            *options,
             "--config",
             f"results={results}",
             f"work={folder / 'work'}",
@@ -75,6 +76,13 @@ def test_renders_take_every_cpu_of_a_job(planned):
     for job in planned("slurm", "cpu"):
         if job["rule"] in ("render", "render_panorama"):
             assert job["cpus"] == settings("slurm")["cores"]
+
+
+def test_a_users_arguments_for_slurm_reach_every_job(planned):
+    options = ("--default-resources", "mem_mb=2000", "runtime=30", "slurm_extra='--qos=long'")
+    jobs = planned("slurm", "cpu", *options)
+    assert {job["rule"] for job in jobs} >= SUBMITTED
+    assert {job["slurm_extra"] for job in jobs} == {"--qos=long"}
 
 
 def test_only_renders_request_a_gpu_and_only_for_a_gpu_device(planned):

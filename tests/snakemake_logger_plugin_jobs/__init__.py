@@ -24,6 +24,6 @@ class LogHandler(LogHandlerBase):
         job = {"rule": record.rule_name, "reason": record.reason, "cpus": record.threads}
         job |= {name: [str(file) for file in getattr(record, name)] for name in FILES}
         job["command"] = record.shellcmd
-        for name in ("mem_mb", "runtime", "gpu"):
+        for name in ("mem_mb", "runtime", "gpu", "slurm_extra"):
             job[name] = record.resources.get(name)
         print(json.dumps(job), file=sys.stderr)

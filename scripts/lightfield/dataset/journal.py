@@ -16,8 +16,7 @@ a process are in this order:
 import os
 import socket
 import time
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -32,8 +31,6 @@ from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 # The journals of all shards in a folder. 0-6.journal.jsonl is for the views from 0 to 5.
 JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
 
-# A machine that has failed so often in a row is avoided.
-MOST_FAILURES = 3
 # A view is suspect if it took less than this part of the median time of its shard's views.
 SUSPECT_PART = 0.02
 # This needs at least this many other views.
@@ -157,34 +154,6 @@ def read(path: Path) -> list[Run]:
         else:
             runs[-1].views.append(entry)
     return runs
-
-
-def avoided(shard: Sequence[Run], other_shards: Iterable[Sequence[Run]]) -> list[str]:
-    """Return the hosts to avoid when a shard is submitted again. All its runs have stopped.
-
-    These are the host of its last failure, and hosts whose last `MOST_FAILURES` runs failed. The
-    last run of each of the ``other_shards`` may still be at work. Returns no hosts unless another
-    host has ended a run: there may be no other host.
-    """
-    stopped_runs = list(shard)
-    for runs in other_shards:
-        stopped_runs += runs[:-1]
-        stopped_runs += [run for run in runs[-1:] if run.end]
-    outcomes: dict[str, list[bool]] = defaultdict(list)
-    for run in sorted(stopped_runs, key=_start_host_and_outcome):
-        outcomes[run.start["host"]].append(bool(run.end))
-    failing_hosts = {
-        host
-        for host, past in outcomes.items()
-        if len(past) >= MOST_FAILURES and not any(past[-MOST_FAILURES:])
-    }
-    failing_hosts |= {run.start["host"] for run in shard[-1:] if not run.end}
-    good_hosts = [host for host, past in outcomes.items() if any(past)]
-    return sorted(failing_hosts) if set(good_hosts) - failing_hosts else []
-
-
-def _start_host_and_outcome(run: Run) -> tuple[float, str, bool]:
-    return run.start["started"], run.start["host"], bool(run.end)
 
 
 def is_suspect(seconds: float, other_seconds: Sequence[float]) -> bool:
