@@ -1,6 +1,6 @@
 """Write a finished dataset as it is published: WebDataset shards, and descriptions of them.
 
-The descriptions are a card for Hugging Face, Croissant, RO-Crate and DataCite. The scene YAML's key
+The descriptions are a card for Hugging Face, and Croissant. The scene YAML's key
 `publish` says what only the author knows. The same files give the same bytes.
 
 A settings file is JSON with the same keys as that of package.py.

@@ -56,22 +56,15 @@ def take(store: ViewStore, dataset: Path) -> None:
 def sums_of(store: ViewStore, dataset: Path) -> tuple[Path, dict[Path, str]]:
     """Bring the list of a dataset's files. Return it, and the SHA-256 of each file."""
     from lightfield.dataset.layout import SUMS, read_sums
-    from lightfield.dataset.publication import PUBLISHED_FOLDER, RO_CRATE
 
     is_archive = dataset.suffix == ".json"
-    is_published = dataset.parent.name == PUBLISHED_FOLDER
-    listing = dataset if is_archive else dataset / (RO_CRATE if is_published else SUMS)
+    listing = dataset if is_archive else dataset / SUMS
     if not store.bring(str(listing)):
         raise UserError(f"{listing}: is not in {store.url}: no run has finished it there")
     if is_archive:
         entries = read_keys(listing, "package.py", "parts")["parts"]
         with reading(f"{listing}: parts", "list of files and their sha256"):
             sums = {str(entry["file"]): str(entry["sha256"]) for entry in entries}
-    elif is_published:
-        entities = read_keys(listing, "publish.py", "@graph")["@graph"]
-        with reading(f"{listing}: @graph", "list of entities"):
-            files = [entity for entity in entities if "sha256" in entity]
-            sums = {str(entity["@id"]): str(entity["sha256"]) for entity in files}
     else:
         sums = read_sums(listing)
     folder = listing.parent

@@ -428,10 +428,11 @@ REFUSED = [
     *(("publish", PUBLISH | {"url": value}) for value in ("example.org", 7)),
     *(("publish", PUBLISH | {"licence": value}) for value in ("CC BY", "")),
     *(("publish", PUBLISH | {"doi": value}) for value in ("https://doi.org/10.1/2", 10.1)),
-    *(("publish", PUBLISH | {"contact": value}) for value in ("Ada", "a b@c.org", 7)),
-    *(("publish", PUBLISH | {"publisher_ror": v}) for v in ("https://ror.org/03f0f6041", "1", 7)),
-    ("publish", PUBLISH | {"publisher_url": "zenodo.org"}),
-    ("publish", PUBLISH | {"creators": [{"name": "A", "ror": "03f0f604"}]}),
+    *(("publish", PUBLISH | {key: "1"}) for key in ("contact", "publisher_ror", "publisher_url")),
+    *(
+        ("publish", PUBLISH | {"creators": [{"name": "A", key: "1"}]})
+        for key in ("affiliation", "ror")
+    ),
     *(("publish", PUBLISH | {key: ""}) for key in ("limitations", "biases", "use_cases")),
     *(("publish", value) for value in (True, [])),
     *(("scene.parameters.detail", value) for value in (0, 1.1, "1")),

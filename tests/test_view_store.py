@@ -231,7 +231,7 @@ HOSTILE = ["../../x", "exr/../../../../x", "{outside}/x", ""]
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-@pytest.mark.parametrize("kind", ["sums", "archive", "crate"])
+@pytest.mark.parametrize("kind", ["sums", "archive", "published"])
 def test_no_dataset_of_a_storage_is_written_outside_its_folder(
     kind, name, tmp_path, monkeypatch, store, run_program
 ):
@@ -242,15 +242,12 @@ def test_no_dataset_of_a_storage_is_written_outside_its_folder(
     store.put(write(tmp_path / "hostile", b"hostile"), digest(b"hostile"))
     (tmp_path / "hostile").unlink()
     stored = Path(store.url, "results/s")
-    if kind == "sums":
-        write(stored / "rig/sha256sums.txt", f"{digest(b'hostile')}  {name}\n".encode())
-    elif kind == "archive":
+    path = {"sums": "rig", "archive": "rig.json", "published": "published/rig"}[kind]
+    if kind == "archive":
         entry = {"file": name, "bytes": 7, "sha256": digest(b"hostile")}
-        write_json(stored / "rig.json", {"parts": [entry]})
+        write_json(stored / path, {"parts": [entry]})
     else:
-        entity = {"@id": name, "sha256": digest(b"hostile")}
-        write_json(stored / "published/rig/ro-crate-metadata.json", {"@graph": [entity]})
-    path = {"sums": "rig", "archive": "rig.json", "crate": "published/rig"}[kind]
+        write(stored / path / "sha256sums.txt", f"{digest(b'hostile')}  {name}\n".encode())
     before = files(tmp_path)
     result = run_program("take_dataset.py", "--store", store.url, f"results/s/{path}", check=False)
     assert result.returncode == 1

@@ -31,19 +31,11 @@ PUBLISHED = {
     "licence": "CC-BY-4.0",
     "publish": {
         "creators": [
-            {
-                "name": "Ada Lovelace",
-                "orcid": "0000-0002-1825-0097",
-                "affiliation": "London",
-                "ror": "04cw6st05",
-            },
-            {"name": "A Laboratory", "type": "organization", "ror": "03f0f6041"},
+            {"name": "Ada Lovelace", "orcid": "0000-0002-1825-0097"},
+            {"name": "A Laboratory", "type": "organization"},
         ],
         "url": "https://example.org/sphere",
         "publisher": "Zenodo",
-        "publisher_url": "https://zenodo.org",
-        "publisher_ror": "01ggx4157",
-        "contact": "ada@example.org",
         "doi": "10.5281/zenodo.1234567",
         "date": "2026-11-30",
         "limitations": "Few pixels.",

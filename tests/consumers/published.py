@@ -1,23 +1,13 @@
 """Validates what is published, each description with its own validator, and iterates the shards."""
 
-import json
 import os
 from importlib.metadata import version
-from importlib.resources import files
 
 import numpy as np
-
-# The recommended checks of the RO-Crate that may fail, and why.
-UNMET = {
-    "51.1": "nothing is at the DOI before the dataset is published",
-    "90.1": "only an organization itself knows its contact",
-}
 
 
 def check(folder):
     croissant(folder / "croissant.json")
-    ro_crate(folder)
-    datacite(folder / "datacite.json")
     hugging_face(folder / "README.md")
     webdataset(folder)
 
@@ -41,54 +31,6 @@ def croissant(path):
     assert not issues.errors
     assert not issues.warnings
     assert {*counts.values()} == {6}
-
-
-def ro_crate(folder):
-    """Validate the RO-Crate by the profile 1.2, without a network."""
-    import requests
-    from rocrate_validator import models, services
-    from rocrate_validator.utils.http import HttpRequester
-
-    # The validator would download the context 1.2. ro-crate-py has that of 1.3. It has all terms of
-    # 1.2, and those that are used here have the same meaning.
-    context = files("rocrate").joinpath("data", "ro-crate.jsonld").read_bytes()
-
-    def get(self, url, **options):
-        response = requests.Response()
-        response.status_code = 200 if url.startswith("https://w3id.org/ro/crate/") else 404
-        response.url = url
-        response._content = context
-        response.headers["Content-Type"] = "application/ld+json"
-        return response
-
-    HttpRequester.get = get
-    failed = {}
-    for severity in (models.Severity.REQUIRED, models.Severity.RECOMMENDED):
-        settings = services.ValidationSettings(
-            rocrate_uri=str(folder),
-            profile_identifier="ro-crate-1.2",
-            requirement_severity=severity,
-        )
-        issues = services.validate(settings).get_issues()
-        failed[severity.name] = {
-            issue.check.identifier.rpartition("_")[2]: issue.check.name for issue in issues
-        }
-    print(
-        f"roc-validator {version('roc-validator')}: RO-Crate 1.2: {len(failed['REQUIRED'])} "
-        f"required and {len(failed['RECOMMENDED'])} recommended checks fail"
-    )
-    for number, name in failed["RECOMMENDED"].items():
-        print(f"    {number} {name}: {UNMET.get(number, 'a mistake')}")
-    assert not failed["REQUIRED"], failed
-    assert failed["RECOMMENDED"].keys() <= UNMET.keys()
-
-
-def datacite(path):
-    from datacite import schema45
-
-    content = json.loads(path.read_text())
-    schema45.validate(content)
-    print(f"datacite {version('datacite')}: schema 4.5: valid, with {len(content)} properties")
 
 
 def hugging_face(path):

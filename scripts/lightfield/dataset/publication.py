@@ -1,11 +1,12 @@
 """What only the author of a dataset knows, and publishing needs: the key `publish` of a scene YAML.
 
-Croissant, RO-Crate, DataCite and Hugging Face ask for these facts. The responsible-AI texts are
+Croissant and Hugging Face ask for these facts. The responsible-AI texts are
 those that NeurIPS asks for since 2026.
 """
 
 import datetime
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -30,10 +31,8 @@ Date = Annotated[
 PUBLISHED_FOLDER = "published"
 CARD = "README.md"
 CROISSANT = "croissant.json"
-DATACITE = "datacite.json"
-RO_CRATE = "ro-crate-metadata.json"
-# The files that describe a published dataset.
-DOCUMENTS = (CARD, CROISSANT, DATACITE, RO_CRATE)
+# The files that describe a published dataset, and the checksums of all its files.
+DOCUMENTS = (CARD, CROISSANT, "sha256sums.txt")
 
 # The form of a licence's short name at https://spdx.org/licenses.
 SPDX = r"^[A-Za-z0-9][A-Za-z0-9.+-]*$"
@@ -50,16 +49,14 @@ Text = Annotated[
 ]
 
 
-Ror = Annotated[
-    str,
-    Field(
-        pattern=pattern(r"^0[a-hj-km-np-tv-z0-9]{6}[0-9]{2}$", "an identifier such as 03f0f6041")
-    ),
-]
+# What to do about keys that only RO-Crate and DataCite had.
+_LEFT_OUT = "no published file has it: leave it out, and tell the repository when you upload"
 
 
 class Creator(Settings):
     """A person or an organization that made a dataset."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(("affiliation", "ror"), _LEFT_OUT)
 
     name: Text = Field(description="Full name.")
     type: Literal["person", "organization"] = Field(
@@ -71,12 +68,6 @@ class Creator(Settings):
             r"^[0-9]{4}-[0-9]{4}-[0-9]{4}-[0-9]{3}[0-9X]$", "digits such as 0000-0002-1825-0097"
         ),
         description="ORCID of the person.",
-    )
-    affiliation: str | None = Field(
-        None, description="Name of the institution where the person works."
-    )
-    ror: Ror | None = Field(
-        None, description="ROR of the organization, or of the institution where the person works."
     )
 
 
@@ -99,6 +90,10 @@ class Publication(Settings):
     `date`, `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
     """
 
+    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("publisher_url", "publisher_ror", "contact"), _LEFT_OUT
+    )
+
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
         None, description="People and organizations that made the dataset."
     )
@@ -114,13 +109,6 @@ class Publication(Settings):
         None,
         description="Name of the publisher that hosts the dataset, such as Zenodo, Hugging Face or "
         "a university.",
-    )
-    publisher_url: Address | None = Field(None, description="Address of the publisher's web page.")
-    publisher_ror: Ror | None = Field(None, description="ROR of the publisher.")
-    contact: str | None = Field(
-        None,
-        pattern=pattern(r"^[^@\s]+@[^@\s]+$", "an e-mail address"),
-        description="E-mail address for questions about the dataset. It becomes public.",
     )
     date: Date | None = Field(None, description="Date of publication, such as 2026-11-30.")
     limitations: Text | None = Field(

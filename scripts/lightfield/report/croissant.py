@@ -124,7 +124,7 @@ def _generation(published: Published) -> str:
     software = published.card["software"]
     if not software:
         return "The views were imported as others had made them."
-    return f"Plenoforge rendered the views by {software}, with settings in ro-crate-metadata.json."
+    return f"Plenoforge rendered the views by {software}, with the settings in lightfield.json."
 
 
 def _sources(published: Published) -> list[dict[str, str]]:

@@ -10,10 +10,10 @@ from lightfield.core.files import write_json, write_text
 from lightfield.core.paths import files_below
 from lightfield.dataset.layout import SUMS
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.publication import CARD, CROISSANT, DATACITE, RO_CRATE
+from lightfield.dataset.publication import CARD, CROISSANT
 from lightfield.dataset.scene_yaml import Credits
 from lightfield.dataset.view_store import ViewStore
-from lightfield.report import croissant, datacite, hugging_face, package, ro_crate, shards
+from lightfield.report import croissant, hugging_face, package, shards
 from lightfield.report.published import Published
 
 
@@ -47,12 +47,12 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
         sum(len(dataset.samples) for dataset in datasets),
     )
     write_text(output / CARD, hugging_face.describe(published))
-    write_json(output / DATACITE, datacite.describe(published))
     write_json(output / CROISSANT, croissant.describe(published))
-    documents = package.listed([output / name for name in (CARD, CROISSANT, DATACITE)])
-    write_json(output / RO_CRATE, ro_crate.describe(published, documents))
+    entries = [*published.files, *package.listed([output / CARD, output / CROISSANT])]
+    sums = sorted(f"{entry['sha256']}  {entry['file']}\n" for entry in entries)
+    write_text(output / SUMS, "".join(sums))
     store = ViewStore.configured()
     if store:
         # The job declares the descriptions. Nobody knows before how many shards there will be.
-        store.put_list(output / RO_CRATE, [output / entry["file"] for entry in published.files])
+        store.put_list(output / SUMS, [output / entry["file"] for entry in published.files])
     return published
