@@ -17,11 +17,9 @@ first measurement counts as busy throughout.
                   "killed_runs",            those of them that did not end by themselves
                   "repeated_seconds"}],     spent again: views rendered again, later start-ups
       "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
-      "device", "cores", "watts", "price_per_kwh", "currency",
-      "energy_kwh", "price", "attribution",
+      "device", "cores", "watts", "energy_kwh", "attribution",
       "extrapolation": {"views", "resolution", "samples", "core_hours", "core_hours_uncertainty",
-                        "energy_kwh", "energy_kwh_uncertainty", "price", "price_uncertainty",
-                        "gigabytes", "basis"}
+                        "energy_kwh", "energy_kwh_uncertainty", "gigabytes", "basis"}
     }
 
 Energy is the machine's wattage, times the wall time, times the busy part of its cores. The busy
@@ -75,7 +73,7 @@ def main() -> None:
         required=True,
         type=Path,
         metavar="JSON",
-        help="settings file with the keys energy (watts, price_per_kwh, currency and cores), full "
+        help="settings file with the keys energy (watts and cores), full "
         "(views and resolution of the full dataset, and samples and denoise if they differ), and "
         "reprojections (their names)",
     )
@@ -103,7 +101,7 @@ def main() -> None:
         arguments.journals,
         arguments.benchmarks,
         arguments.scene_benchmarks,
-        costs.Tariff.read(settings.energy.model_dump()),
+        costs.Power.read(settings.energy.model_dump()),
         full,
         settings.reprojections,
     )

@@ -104,8 +104,6 @@ def sphere(tmp_path_factory):
         {
             "stages": [{"stage": "render", "jobs": 1, "wall_seconds": 200.0, "bytes": 2_500_000}],
             "energy_kwh": 0.25,
-            "price": 0.08,
-            "currency": "EUR",
             "extrapolation": {"core_hours": 12.03, "core_hours_uncertainty": 1.5},
         },
     )
@@ -167,7 +165,7 @@ def test_the_page_loads_completely_from_one_file(sphere, show):
     for part in ("not valid", "equidistant fisheye, 180°", "12 of 12 images", "snakemake"):
         assert part in text
     # The costs are in words, also those at full size, with no more digits than are known.
-    for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h"):
+    for part in ("3 min 20 s", "2.5 MB", "0.25 kWh", "12 h"):
         assert part in text
     assert "±" not in text
     for part in ("180° × 180°", "Frame\n7", "Pixels without a hit\n0 %", "snakemake --cores all"):

@@ -422,7 +422,7 @@ ROUNDS = {
         ),
         "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
         "imported": ("Few pixels.", "Few views.", {"imported pack", "imported publish"}),
-        "config.yaml": ("price_per_kwh: 0.32", "price_per_kwh: 0.4", {"costs"}),
+        "config.yaml": ("watts: 65", "watts: 66", {"costs"}),
     },
     "samples, and what may be missing": {
         "built": ("samples: 4", "samples: 5", CAMERAS),

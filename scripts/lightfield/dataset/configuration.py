@@ -86,7 +86,12 @@ class Preset(Settings):
 
 
 class Energy(Settings):
-    """The power and price from which report/costs.json computes energy and costs."""
+    """The power from which report/costs.json computes energy."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("price_per_kwh", "currency"),
+        "leave it out, and multiply energy_kwh in report/costs.json by your price",
+    )
 
     watts: float = Field(
         65,
@@ -101,14 +106,6 @@ class Energy(Settings):
         "the costs has.",
         json_schema_extra={"unit": "cores"},
     )
-    price_per_kwh: float = Field(
-        0.32,
-        ge=0,
-        le=1e6,
-        description="Price of electricity, in the currency below.",
-        json_schema_extra={"unit": "currency/kWh"},
-    )
-    currency: str = Field("EUR", max_length=20, description="Currency of that price.")
 
 
 _SHARDS_ARE_AUTOMATIC = (

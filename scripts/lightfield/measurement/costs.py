@@ -79,16 +79,14 @@ class CostSettings(Settings):
 
 
 @dataclass(frozen=True)
-class Tariff:
-    """The wattage of a machine, the number of its cores, and the price of a kWh."""
+class Power:
+    """The wattage of a machine when all its ``cores`` work."""
 
     watts: float
-    price_per_kwh: float
-    currency: str
     cores: int
 
     @classmethod
-    def read(cls, settings: Mapping[str, Any]) -> "Tariff":
+    def read(cls, settings: Mapping[str, Any]) -> "Power":
         """Read the key `energy` of config.yaml."""
         cores = os.cpu_count() or 1 if settings["cores"] == "auto" else settings["cores"]
         return cls(**{**settings, "cores": cores})
@@ -96,10 +94,6 @@ class Tariff:
     def kwh(self, machine_seconds: float) -> float:
         """Return the energy that the whole machine takes in ``machine_seconds``."""
         return self.watts * machine_seconds / 3.6e6
-
-    def price(self, kwh: float) -> float:
-        """Return the price of ``kwh`` of energy."""
-        return kwh * self.price_per_kwh
 
 
 def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
@@ -260,7 +254,7 @@ def costs(
     journals: Path,
     benchmarks: Path,
     scene_benchmarks: Iterable[Path],
-    tariff: Tariff,
+    power: Power,
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any]:
@@ -280,7 +274,6 @@ def costs(
     stages = in_order(job_stages(benchmarks, scene_benchmarks) | {"render": render_stage(shards)})
     sizes = stage_bytes(stages, dataset, blend)
     device = latest_device(runs)
-    kwh = tariff.kwh(machine_seconds(stages, runs, tariff.cores))
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
         "stages": [
@@ -290,15 +283,12 @@ def costs(
         "shards": shards,
         **{name: round(sum(shard[name] for shard in shards), 3) for name in totals},
         "device": device,
-        "cores": tariff.cores,
-        "watts": tariff.watts,
-        "price_per_kwh": tariff.price_per_kwh,
-        "currency": tariff.currency,
-        "energy_kwh": kwh,
-        "price": tariff.price(kwh),
+        "cores": power.cores,
+        "watts": power.watts,
+        "energy_kwh": power.kwh(machine_seconds(stages, runs, power.cores)),
         "attribution": (
-            f"{tariff.watts:g} W, the whole machine's, times wall time, times the part of its "
-            f"{tariff.cores} cores that was busy"
+            f"{power.watts:g} W, the whole machine's, times wall time, times the part of its "
+            f"{power.cores} cores that was busy"
             + ("; all of it while a graphics card renders" if any(map(on_card, runs)) else "")
         ),
         "extrapolation": extrapolation(
@@ -306,7 +296,7 @@ def costs(
             stages,
             sizes["render"],
             LightField.read(dataset / NAME),
-            tariff,
+            power,
             full,
             reprojections,
         ),
@@ -376,7 +366,7 @@ def extrapolation(
     stages: Mapping[str, Stage],
     view_bytes: int,
     lightfield: LightField,
-    tariff: Tariff,
+    power: Power,
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
@@ -402,7 +392,7 @@ def extrapolation(
         missing_part = max(0.0, 1 - len(times) / scale.views)
         error = scale.views * standard_error(times) * math.sqrt(missing_part)
     # Beside a graphics card, a core's time is only a part of the machine's.
-    part = 1 if by_processor else 1 / tariff.cores
+    part = 1 if by_processor else 1 / power.cores
     growing_stages = {"validate", FLOW.name, *reprojections}
     each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
         stage.cpu_seconds for name, stage in stages.items() if name in growing_stages
@@ -416,18 +406,15 @@ def extrapolation(
     first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
     once = first_views + part * (start_ups + fixed_stages)
     seconds = scale.views * (mean(times) + each_view * scale.pixels) + once
-    machine = seconds / tariff.cores if by_processor else seconds
-    uncertainty = None if error is None else tariff.kwh(error * machine / seconds)
+    machine = seconds / power.cores if by_processor else seconds
     return {
         "views": scale.views,
         "resolution": full["resolution"],
         "samples": scale.samples,
         "core_hours": seconds / 3600,
         "core_hours_uncertainty": None if error is None else error / 3600,
-        "energy_kwh": tariff.kwh(machine),
-        "energy_kwh_uncertainty": uncertainty,
-        "price": tariff.price(tariff.kwh(machine)),
-        "price_uncertainty": None if uncertainty is None else tariff.price(uncertainty),
+        "energy_kwh": power.kwh(machine),
+        "energy_kwh_uncertainty": (None if error is None else power.kwh(error * machine / seconds)),
         "gigabytes": view_bytes / len(lightfield.views) * scale.views * scale.pixels / 1e9,
         "basis": basis(len(times), lightfield, scale, by_processor),
     }

@@ -200,7 +200,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
         page.plot(path.with_suffix("")),
         shown,
         {name.capitalize(): table for name, table in folded.items()},
-        _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
+        _with_units(measured_on) if isinstance(measured_on, Mapping) else [],
     )
 
 
@@ -242,13 +242,12 @@ def costs(path: Path) -> dict[str, Any] | None:
         {key: value for key, value in content.items() if key != "extrapolation"}
     )
     full = full or {}
-    currency = str(content.get("currency") or "")
     return {
         "tables": tables,
-        "facts": _with_units(facts, currency),
+        "facts": _with_units(facts),
         "notes": _sentences(facts),
         # An extrapolation is exact to two digits at most.
-        "full": _with_units({name: _two_digits(value) for name, value in full.items()}, currency),
+        "full": _with_units({name: _two_digits(value) for name, value in full.items()}),
         "basis": _sentences(full),
     }
 
@@ -257,18 +256,16 @@ def _two_digits(value: Any) -> Any:
     return float(f"{value:.2g}") if isinstance(value, float) else value
 
 
-def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
+def _with_units(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return titles and figures. A figure has the unit at the end of its name."""
     titled_figures = []
     for name, value in facts.items():
-        if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
+        if name.endswith("_uncertainty") or _is_sentence(value):
             continue
         if name == "resolution" and isinstance(value, list):
             text = " × ".join(map(str, value))
         else:
             text = page.measure(value, name)
-        if "price" in name:
-            text = f"{text} {currency}"
         titled_figures.append((page.title(name), text))
     return titled_figures
 
