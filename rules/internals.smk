@@ -7,8 +7,6 @@ from snakemake.io import _IOFile
 from snakemake.scheduling.job_scheduler import JobScheduler
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
-from lightfield.core import processors
-
 # Each job on a cluster reads the Snakefile again. These say which process reads it.
 IS_MAIN_PROCESS = workflow.is_main_process
 RUNS_ELSEWHERE = workflow.remote_exec
@@ -25,12 +23,6 @@ USES_CONTAINERS = "APPTAINER" in {
     method.name for method in workflow.deployment_settings.deployment_method
 }
 ASKS_FOR_GPUS = "gpu" in (workflow.resource_settings.default_resources or ())
-
-# Snakemake refuses to run without --cores and --jobs. `cores: all` in a profile would take all cores
-# of the machine, although a container may have fewer.
-if (CORES, NODES) == (None, None):
-    workflow.resource_settings.cores = processors.available()
-    workflow.register_resource("_cores", processors.available())
 
 
 def limit_resource(name, amount):

@@ -48,7 +48,7 @@ def take(store: ViewStore, dataset: Path) -> None:
     if lost_files:
         raise UserError(
             f"{len(lost_files)} files are not in {store.url} as {listing} has them, such as "
-            f"{lost_files[0]}; `snakemake verify` with the storage names them, and --mend makes "
+            f"{lost_files[0]}; the target `verify` with the storage names them, and --mend makes "
             "them again"
         )
 

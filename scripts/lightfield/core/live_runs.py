@@ -100,7 +100,7 @@ def refusal(live_runs: list[Run]) -> str:
         )
     return (
         f"another run makes these files, process {run.pid}: wait for it, or end it "
-        f"(kill {run.pid}); snakemake status shows its progress"
+        f"(kill {run.pid}); snakemake --cores 1 status shows its progress"
     )
 
 

@@ -43,7 +43,7 @@ CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
 + shown pixels × {2e6 * REPORT_SECONDS:g} µs
 + jobs × {JOB_SECONDS:g} s, with Blender {START_UP_SECONDS:g} s.
 Size = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
-After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
+After the target `plan`, the seconds and bytes of a view are those that its probes measured."""
 
 # The phase of the jobs that develop views as a sensor sees them, and their part of the formulas.
 SENSOR_PHASE = "sensor"
