@@ -144,17 +144,9 @@ wildcard_constraints:
     end=r"\d+",
 
 
-# As a module of another workflow, these rules may have other names there.
-RENDER = rule_name("render")
-RENDER_PANORAMA = rule_name("render_panorama")
-CALIBRATE = rule_name("calibrate")
-CHECK_GPU = rule_name("check_gpu")
-CHECK_BLEND = rule_name("check_blend")
-INVENTORY = rule_name("inventory")
-IMPORT_VIEWS = rule_name("import_views")
-MEASURE_LEARNING = rule_name("measure_learning")
-BUILD_MEMBERS = rule_name("build_members")
-COUNT_MEMBERS = rule_name("count_members")
+def is_of(job, *names):
+    """Return whether a job's rule is one of these. A workflow that has them as a module may rename it."""
+    return job.rule.name in {getattr(rules, name).rule.name for name in names}
 
 
 def log_of(job):

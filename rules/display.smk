@@ -15,10 +15,8 @@ from lightfield.measurement.forecast import (
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
-# The phase of a rule, or of all rules in a file. Other rules have their file's name as the phase.
+# The phase of all rules in a file. Other rules have their file's name as the phase.
 PHASES = {
-    "measure_error": "measurement",
-    "try_changes": "measurement",
     "rig": "cameras",
     "render": "views",
     "error": "calibration",
@@ -71,7 +69,7 @@ def views_of(job):
 
 def rendered_views(job):
     """Return the number of the dataset's views that a job renders."""
-    return views_of(job) if job.rule.name == RENDER else 0
+    return views_of(job) if is_of(job, "render") else 0
 
 
 def is_of_sensor(job):
@@ -85,8 +83,10 @@ def phase_of(job):
     """Return the phase of a job."""
     if is_of_sensor(job):
         return SENSOR_PHASE
+    if is_of(job, "measure_error", "try_changes"):
+        return "measurement"
     stem = Path(job.rule.snakefile).stem
-    return PHASES.get(job.rule.name, PHASES.get(stem, stem))
+    return PHASES.get(stem, stem)
 
 
 def is_of_dataset(job):
@@ -99,9 +99,8 @@ def is_of_dataset(job):
 
 def estimated_seconds(job):
     """Return the estimated seconds of a job on one core. None if they are unknown."""
-    name = job.rule.name
     wildcards = job.wildcards
-    if name == CALIBRATE:
+    if is_of(job, "calibrate"):
         dataset = first_dataset(wildcards.scene)
         target, most = map(dataset.render.get, ("target_error", "most_samples"))
         if target is None:
@@ -109,25 +108,25 @@ def estimated_seconds(job):
         return calibration_seconds(target, min(dataset.rig.camera.resolution), most)
     if phase_of(job) in UNKNOWN_PHASES:
         return None
-    if name == BUILD_MEMBERS:
+    if is_of(job, "build_members"):
         return START_UP_SECONDS + batch_seconds(wildcards)
-    if name in BLENDER_RULES:
+    if is_of(job, *BLENDER_RULES):
         return START_UP_SECONDS
     if not is_of_dataset(job):
         return JOB_SECONDS
     estimate = dataset_of(wildcards).estimate
-    if name == RENDER:
+    if is_of(job, "render"):
         return START_UP_SECONDS + views_of(job) * estimate.view_seconds
-    if name == RENDER_PANORAMA:
+    if is_of(job, "render_panorama"):
         return estimate.panorama_seconds
-    if name == "import_views":
+    if is_of(job, "import_views"):
         return JOB_SECONDS + views_of(job) * estimate.import_seconds
-    if name == "reproject":
+    if is_of(job, "reproject"):
         seconds = estimate.reprojection_seconds(wildcards.reprojection)
         return JOB_SECONDS + views_of(job) * seconds
-    if name in ("export", "export_to_instant_ngp", "validate"):
+    if is_of(job, "export", "export_to_instant_ngp", "validate"):
         return JOB_SECONDS + estimate.check_seconds
-    if name in ("figures", "page"):
+    if is_of(job, "figures", "page"):
         return JOB_SECONDS + estimate.report_seconds
     return JOB_SECONDS
 
@@ -202,7 +201,7 @@ def quiet_snakemake():
 
 def begin_display():
     """Show the progress of the run from now on."""
-    note_failures()
+    logging.getLogger("snakemake.logging").addHandler(NotesOfFailures())
     quiet_snakemake()
     # A job without output takes seconds, and its log is printed at the end.
     jobs = [job for job in needed_jobs() if job.log and job.output]
@@ -218,9 +217,9 @@ def begin_display():
 def announce_calibrations(jobs):
     """Print the estimated time of each calibration, and of the datasets that depend on it."""
     for job in jobs:
-        if job.rule.name == CALIBRATE:
+        if is_of(job, "calibrate"):
             scene = job.wildcards.scene
-            renders = [each for each in jobs if each.rule.name == RENDER]
+            renders = [each for each in jobs if is_of(each, "render")]
             render_seconds = sum(
                 estimated_seconds(render)
                 for render in renders
@@ -268,7 +267,7 @@ def print_pages():
 def print_families():
     """Print how many members of each family are built, if this run has counted them."""
     for job in needed_jobs():
-        if job.rule.name == COUNT_MEMBERS:
+        if is_of(job, "count_members"):
             print(Path(job.log[0]).read_text().strip(), file=sys.stderr)
 
 
@@ -285,7 +284,7 @@ def dataset_name_of(job):
 
 def work_of(job):
     """Return a job's part of the forecast."""
-    if job.rule.name == BUILD_MEMBERS:
+    if is_of(job, "build_members"):
         views, size = batch_views(job.wildcards)
     else:
         views = rendered_views(job)

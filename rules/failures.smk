@@ -1,10 +1,13 @@
 # The causes of failed jobs, for the end of a run.
+import logging
 import signal
 
-# The executor's message on each failed job or group.
+from snakemake_interface_logger_plugins.common import LogEvent
+
+# The executor's messages on failed jobs, such as that a job was refused, by the jobs' numbers.
 EXECUTOR_MESSAGES = {}
 # The message if a run ends early, and no job has failed.
-UNFINISHED = "error: the run was stopped before its last job: snakemake again goes on"
+UNFINISHED = "error: the run was stopped before its last job: the same command goes on"
 
 
 def announce_stop():
@@ -19,9 +22,12 @@ def announce_stop():
     signal.signal(signal.SIGTERM, stop_and_say_so)
 
 
-def note_failures():
-    """Note the executor's messages on failed jobs, such as that they were refused."""
-    hear_executor(EXECUTOR_MESSAGES.__setitem__)
+class NotesOfFailures(logging.Handler):
+    """Notes the executor's messages on failed jobs. For groups, Snakemake logs none."""
+
+    def emit(self, record):
+        if getattr(record, "event", None) is LogEvent.JOB_ERROR and record.rule_msg:
+            EXECUTOR_MESSAGES[record.jobid] = first_sentence(record.rule_msg)
 
 
 def full_cause(log):
@@ -75,8 +81,10 @@ def cause_without_log(entry, jobs):
     """
     name, log = min((job.rule.name, Path(job.log[0])) for job in jobs)
     batch = batch_log(entry.name, start_of_run() - 5)
-    message = first_sentence(EXECUTOR_MESSAGES.get(entry) or "")
-    why = (batch and cause(batch)) or message
+    messages = [
+        EXECUTOR_MESSAGES[job.jobid] for job in jobs if job.jobid in EXECUTOR_MESSAGES
+    ]
+    why = (batch and cause(batch)) or "; ".join(messages)
     # A full disk takes no log at all.
     why = why or obstacle(log) or "it said nothing"
     return name, why, batch or log

@@ -1,11 +1,8 @@
 # The only file that reaches inside Snakemake, for what has no public interface. Each piece says why.
 import functools
 import inspect
-import threading
 
 from snakemake.io import _IOFile
-from snakemake.scheduling.job_scheduler import JobScheduler
-from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
 # Each job on a cluster reads the Snakefile again. These say which process reads it.
 IS_MAIN_PROCESS = workflow.is_main_process
@@ -29,11 +26,6 @@ def limit_resource(name, amount):
     """Limit a resource that jobs share, as --resources does, unless the command line does so."""
     if name not in workflow.global_resources:
         workflow.register_resource(name, amount)
-
-
-def rule_name(name):
-    """Return the name of a rule. A workflow that uses this one as a module may change it."""
-    return workflow.modifier.modify_rulename(name)
 
 
 def stored(path):
@@ -171,28 +163,6 @@ def keep_locks_of_others():
         persistence.unlock = unlock
 
 
-def look_for_jobs_once_a_second():
-    """Let Snakemake's scheduler have only one timer for its next look at the ready jobs.
-
-    It looks when a job has finished, and a second after each look. Each look starts a timer. So
-    after some dozen jobs Snakemake would look without a pause, and take a core from the jobs.
-    """
-    is_waiting = threading.Lock()
-
-    def look_later(scheduler, seconds):
-        def look():
-            is_waiting.release()
-            scheduler._open_jobs.release()
-
-        if is_waiting.acquire(blocking=False):
-            threading.Timer(seconds, look).start()
-
-    JobScheduler._schedule_reevalutation = look_later
-
-
-look_for_jobs_once_a_second()
-
-
 def is_ancient(file):
     """Return whether an input is declared as ``ancient``, so that its content does not matter."""
     return file.is_ancient
@@ -245,31 +215,3 @@ def is_planned_dry_run():
 def start_of_run():
     """Return the time at which this run began, in seconds since 1970."""
     return workflow.start_time.timestamp()
-
-
-def hear_executor(note):
-    """Call ``note`` with each failed job and the executor's message.
-
-    Snakemake does not write the message to a group's log. If Slurm's executor cannot submit a
-    group, for example with a wrong account, it reports nothing, and Snakemake waits for ever.
-    """
-    executor = workflow.scheduler._executor
-    report_job_error = executor.report_job_error
-    run_job = executor.run_job
-
-    def report_and_note(job_info, msg=None, **details):
-        note(job_info.job, msg)
-        report_job_error(job_info, msg=msg, **details)
-
-    def run_or_report(job):
-        try:
-            run_job(job)
-        except AttributeError as error:
-            if not (job.is_group() and error.__context__):
-                raise
-            report_and_note(
-                SubmittedJobInfo(job), f"not submitted: {error.__context__}"
-            )
-
-    executor.report_job_error = report_and_note
-    executor.run_job = run_or_report

@@ -13,7 +13,7 @@ def check_device():
     """Raise `UserError` for a missing device, if this machine renders."""
     jobs = needed_jobs()
     device = SETTINGS.device
-    if device == "auto" and any(job.rule.name == CHECK_GPU for job in jobs):
+    if device == "auto" and any(is_of(job, "check_gpu") for job in jobs):
         device = "gpu"
     renders = device == "gpu" or any(job.resources.get("gpu") for job in jobs)
     if renders and RUNS_HERE:
@@ -38,14 +38,14 @@ def check_memory():
 def check_disk_space():
     """Warn of disks that this run nearly fills. Raise `UserError` for a disk that is too small."""
     jobs = [job for job in needed_jobs() if job.output]
-    renders = [job for job in jobs if job.rule.name == RENDER]
+    renders = [job for job in jobs if is_of(job, "render")]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
     needs = []
     for dataset in datasets.values():
         views = presence.missing_views(dataset)
         size = views * dataset.estimate.all_view_bytes
         needs.append(disk_space.Need(Path(RESULTS), size, views))
-    batches = [job.wildcards for job in jobs if job.rule.name == BUILD_MEMBERS]
+    batches = [job.wildcards for job in jobs if is_of(job, "build_members")]
     for wildcards in batches:
         views, size = batch_views(wildcards)
         needs.append(disk_space.Need(Path(RESULTS), size, views))
@@ -103,13 +103,13 @@ def check_start():
 
 def check_input(job):
     """Raise `UserError` for a user's file that a job would refuse."""
-    if job.rule.name == CHECK_BLEND and not SETTINGS.accept_blend:
+    if is_of(job, "check_blend") and not SETTINGS.accept_blend:
         blend = Path(scene_of(job.wildcards).source.blend)
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))
-    elif job.rule.name == INVENTORY:
+    elif is_of(job, "inventory"):
         presence.check_external_files(scene_of(job.wildcards))
-    elif job.rule.name == IMPORT_VIEWS:
+    elif is_of(job, "import_views"):
         presence.check_imported(dataset_of(job.wildcards))
 
 
@@ -129,7 +129,7 @@ def announce_refusals():
 
 def keep_shards():
     """Note the number of shards of each planned dataset, which keeps them."""
-    jobs = [job for job in all_jobs() if job.rule.name == RENDER]
+    jobs = [job for job in all_jobs() if is_of(job, "render")]
     datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
     counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
     if counts:

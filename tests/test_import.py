@@ -52,23 +52,6 @@ from snakemake.cli import main
 main(sys.argv[1:])
 """
 
-# Runs Snakemake likewise, then writes the largest number of simultaneous timers.
-TIMING = """
-import atexit, json, sys, threading
-waiting = most = 0
-class Timer(threading.Timer):
-    def run(self):
-        global waiting, most
-        waiting += 1
-        most = max(most, waiting)
-        super().run()
-        waiting -= 1
-threading.Timer = Timer
-atexit.register(lambda: json.dump(most, open("timers.json", "w")))
-from snakemake.cli import main
-main(sys.argv[1:])
-"""
-
 
 @pytest.fixture
 def published(tmp_path):
@@ -332,15 +315,6 @@ def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
         for folder in (*roots, ".snakemake"):
             shutil.rmtree(tmp_path / folder)
     assert of_views_and_records[0] == of_views_and_records[1]
-
-
-@pytest.mark.slow
-def test_waiting_for_jobs_costs_the_same_for_any_number_of_finished_jobs(published, tmp_path):
-    """With a timer for each of hundreds of jobs, Snakemake would check jobs without a pause."""
-    command = [*run_of_theirs(tmp_path, TIMING), "views_per_shard=1"]
-    command += ["--", "results/theirs/LFPlane/validation.json"]
-    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
-    assert json.loads((tmp_path / "timers.json").read_text()) <= 2
 
 
 def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):

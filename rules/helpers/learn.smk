@@ -6,7 +6,7 @@ CONSUMERS_PYTHON = shlex.quote(os.path.relpath(CONSUMERS / "bin/python"))
 
 def check_consumers():
     """Raise `UserError` for a job that learns without the consumers' environment."""
-    learns = any(job.rule.name == MEASURE_LEARNING for job in needed_jobs())
+    learns = any(is_of(job, "measure_learning") for job in needed_jobs())
     if learns and not (CONSUMERS / "complete").exists():
         raise UserError(
             f"learn: torch is missing: set up {os.path.relpath(CONSUMERS)} "
