@@ -97,51 +97,49 @@ rule inventory:
         " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
-# Several scenes may share a .blend.
+# The users' .blend files, by path. Several scenes may share one.
 BLENDS = {d.source.blend: name for name, d in SCENES.items() if d.source.blend}
+# Only a file that is missing is downloaded. Snakemake removes a rule's output before it makes it
+# again, as with --forceall, and a user's file may be the work of weeks.
+MISSING = [
+    blend
+    for blend, name in BLENDS.items()
+    if SCENES[name].source.url and not Path(blend).exists()
+]
 
-# A .blend has a download rule only if the scene YAML has a URL and the user has not brought the
-# file. Snakemake removes a rule's output before it makes it again, as with --forceall, and the
-# user's file may be the work of weeks.
-for blend, name in BLENDS.items():
-    if not SCENES[name].source.url or Path(blend).exists():
-        continue
 
-    rule:
-        name:
-            f"fetch_{name}"
-        output:
-            local(blend),
-        log:
-            log_of(f"{name}/fetch_blend"),
-        # Run beside Snakemake, because a cluster's nodes may not reach the Internet.
-        localrule: True
-        params:
-            name=name,
-        message:
-            "Downloading {output}"
-        shell:
-            f"python {SCRIPTS}/fetch_blend.py"
-            " --scene {params.name} --output {output:q}"
-            " > {log} 2>&1"
+rule fetch_blend:
+    output:
+        local("{blend}"),
+    log:
+        log_of("fetch_blend/{blend}"),
+    wildcard_constraints:
+        blend="|".join(map(re.escape, MISSING)) or "(?!)",
+    # Run beside Snakemake, because a cluster's nodes may not reach the Internet.
+    localrule: True
+    params:
+        name=lambda wildcards: BLENDS[wildcards.blend],
+    message:
+        "Downloading {output}"
+    shell:
+        f"python {SCRIPTS}/fetch_blend.py"
+        " --scene {params.name} --output {output:q} > {log} 2>&1"
 
 
 # If jobs share no folder, Snakemake fetches the copy in its storage for them.
-for blend, name in BLENDS.items() if STORE else ():
-
-    rule:
-        name:
-            f"store_{name}"
-        input:
-            # The checked file may have changed, although it is older than the copy.
-            check=SCENES[name].blend_check,
-            blend=local(blend),
-        output:
-            blend,
-        log:
-            log_of(f"{name}/store_blend"),
-        localrule: True
-        message:
-            "Storing {input.blend}"
-        shell:
-            "cp {input.blend:q} {output:q} > {log} 2>&1"
+rule store_blend:
+    input:
+        # The checked file may have changed, although it is older than the copy.
+        check=lambda wildcards: SCENES[BLENDS[wildcards.blend]].blend_check,
+        blend=local("{blend}"),
+    output:
+        "{blend}",
+    log:
+        log_of("store_blend/{blend}"),
+    wildcard_constraints:
+        blend="|".join(map(re.escape, BLENDS if STORE else ())) or "(?!)",
+    localrule: True
+    message:
+        "Storing {input.blend}"
+    shell:
+        "cp {input.blend:q} {output:q} > {log} 2>&1"

@@ -401,8 +401,7 @@ def test_a_downloaded_blend_needs_no_builder_and_a_built_one_no_download(server,
     jobs = planned(folder, *chosen)
     assert jobs["render"] == 4
     assert jobs["check_blend"] == 3
-    assert jobs["fetch_fetched"] == jobs["build_scene"] == 1
-    assert not any(name.startswith("fetch_") for name in jobs if name != "fetch_fetched")
+    assert jobs["fetch_blend"] == jobs["build_scene"] == 1
 
     result = snakemake(folder, "blends/fetched.blend", *chosen)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -410,4 +409,4 @@ def test_a_downloaded_blend_needs_no_builder_and_a_built_one_no_download(server,
     # An existing file is never removed to be downloaded again.
     jobs = planned(folder, "--forceall", *chosen)
     assert jobs["check_blend"] == 3
-    assert not any(name.startswith("fetch_") for name in jobs)
+    assert "fetch_blend" not in jobs

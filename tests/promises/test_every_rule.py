@@ -297,8 +297,8 @@ def build(pristine):
 def test_all_rules_have_jobs_in_the_build_and_none_runs_twice(build):
     listed = {*snakemake(build.folder, "--list-rules", *CHOSEN).stdout.split()}
     made = {job["rule"] for job in build.jobs.values()}
-    # The .blend exists, so no rule downloads it.
-    assert made == listed - WITHOUT_OUTPUT | {"fetch_brought"}
+    # Only a storage has copies of the .blend files of users.
+    assert made == listed - WITHOUT_OUTPUT - {"store_blend"}
     assert not build.plan()
 
 
@@ -309,7 +309,7 @@ def test_target_rules_name_an_output_of_every_job(build):
     named = {name for job in without_output for name in job["input"]}
     unnamed = [job for job in build.jobs.values() if named.isdisjoint(job["output"])]
     # The user may remove a downloaded .blend once its views are rendered.
-    assert {job["rule"] for job in unnamed} - {*TARGETS} == {"fetch_brought"}
+    assert {job["rule"] for job in unnamed} - {*TARGETS} == {"fetch_blend"}
 
 
 def test_a_missing_output_is_made_again_with_the_others_of_its_job(build):
@@ -402,7 +402,7 @@ ROUNDS = {
         ),
         # A missing file is downloaded again if a job needs it.
         "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
-        "scene.blend": (None, None, {"fetch_brought"}),
+        "scene.blend": (None, None, {"fetch_blend"}),
     },
     # The inventory lists the emitters, of which a light field's groups are made.
     "light groups, and another light": {

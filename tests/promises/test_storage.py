@@ -230,7 +230,7 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     (root / "textures/box.png").write_bytes((root / "textures/walls.png").read_bytes())
     said, _ = build.start(*dry_run).communicate()
     assert {"inventory", "lightfield", "render"} <= set(said.split()), said
-    assert not {"check_blend", "store_brought", "import_views"} & set(said.split())
+    assert not {"check_blend", "store_blend", "import_views"} & set(said.split())
 
 
 ROOMS = """
