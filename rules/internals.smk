@@ -61,41 +61,14 @@ def before_jobs_are_chosen(mark):
 
     At that time, all input functions have written their settings.
     """
-    dag = workflow.dag
-    choose = dag.update_needrun
-    search = dag.bfs
+    choose = workflow.dag.update_needrun
     mark_once = functools.cache(mark)
-
-    def readers_of_content(_, *jobs):
-        return search(ReadersOfContent(dag.depending), *jobs)
 
     async def mark_and_choose(*arguments, **options):
         mark_once()
-        dag.bfs = readers_of_content
-        try:
-            await choose(*arguments, **options)
-        finally:
-            dag.bfs = search
+        await choose(*arguments, **options)
 
-    dag.update_needrun = mark_and_choose
-
-
-class ReadersOfContent:
-    """Maps each job to the jobs that read the content of its outputs.
-
-    It leaves out jobs that declare all these files as ``ancient``: they do not run because of the
-    job. Snakemake looks for no other reason in the jobs that follow, and would overlook these.
-    """
-
-    def __init__(self, depending):
-        self._depending = depending
-
-    def __getitem__(self, job):
-        return {
-            reader: files
-            for reader, files in self._depending[job].items()
-            if not all(map(is_ancient, files))
-        }
+    workflow.dag.update_needrun = mark_and_choose
 
 
 def take_as_missing(is_damaged):
@@ -161,11 +134,6 @@ def keep_locks_of_others():
 
     if hasattr(persistence, "_lockfile"):
         persistence.unlock = unlock
-
-
-def is_ancient(file):
-    """Return whether an input is declared as ``ancient``, so that its content does not matter."""
-    return file.is_ancient
 
 
 # Rules see one job at a time. The display, the ledger and the first checks need all jobs.

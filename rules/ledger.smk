@@ -288,7 +288,7 @@ class JobNotes(logging.Handler):
 
 def read_files(job):
     """Return the paths of the files that a job reads."""
-    return [unstored(file) for file in job.input if not is_ancient(file)]
+    return [unstored(file) for file in job.input]
 
 
 def read_stamps(job):

@@ -4,7 +4,8 @@
 include: "helpers/validate.smk"
 
 
-# An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
+# An invalid dataset is an outcome too: it gets its validation.json, and fails below. It also gets its
+# page, because the profile lets a run go on with other jobs after a failure (`keep-going`).
 rule validate:
     input:
         settings=settings_of(
@@ -52,8 +53,6 @@ rule checksums:
     input:
         validation=f"{DATASET}/validation.json",
         sums=f"{MADE}/checksums.txt",
-        # An invalid dataset fails here, and has its page by then.
-        page=ancient(f"{DATASET}/report/index.html"),
     output:
         f"{DATASET}/sha256sums.txt",
     log:
@@ -61,11 +60,13 @@ rule checksums:
     wildcard_constraints:
         scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
     localrule: True
+    params:
+        page=f"{DATASET}/report/index.html",
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/publish_checksums.py"
-        " --validation {input.validation} --page {input.page}"
+        " --validation {input.validation} --page {params.page}"
         " --sums {input.sums} --output {output} > {log} 2>&1"
 
 
