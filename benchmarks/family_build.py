@@ -70,8 +70,3 @@ class FamilyBuild:
         if not counts:
             raise UserError(f"the build failed:\n{output}")
         return counts
-
-    def status(self) -> str:
-        """Return what `snakemake status` prints."""
-        output, _ = self.start("status").communicate()
-        return output

@@ -1,8 +1,8 @@
 """Leaves out of a render what no pixel depends on.
 
 Leaving something out must not change a byte of any view. So the render key does not name it. It
-must save measurable time: benchmarks/pruning.py measures each of these. Fewer bounces for volumes,
-transmission and transparency that a scene does not have saved nothing.
+must save measurable time: docs/explanation/pruning.md has the time that each of these saves. Fewer
+bounces for volumes, transmission and transparency that a scene does not have saved nothing.
 
 What is left out is left out of every frame. So the decision never depends on values that keyframes,
 a driver or a simulation may change.
