@@ -83,7 +83,7 @@ def phase_of(job):
     """Return the phase of a job."""
     if is_of_sensor(job):
         return SENSOR_PHASE
-    if is_of(job, "measure_error", "try_changes"):
+    if is_of(job, "measure_error"):
         return "measurement"
     stem = Path(job.rule.snakefile).stem
     return PHASES.get(stem, stem)

@@ -1,4 +1,8 @@
-"""Measure the error of renders against their time: plain, adaptive, guided and denoised."""
+"""Measure the error of renders against their time: plain, adaptive, guided and denoised.
+
+Also try changes of the scene's settings, such as fewer bounces. The .md and the .json say which of
+them reach the same error in less time.
+"""
 
 import argparse
 from pathlib import Path
@@ -9,7 +13,9 @@ from lightfield.measurement import trial_flags
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     trial_flags.add_arguments(parser, "lightfield.json")
     trial_flags.add_size(parser)
     trial_flags.add_calibration(parser)

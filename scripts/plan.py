@@ -28,8 +28,8 @@ def main() -> None:
         nargs=2,
         default=[],
         metavar=("NAME", "JSON"),
-        help="advice for a dataset: scene/rig, and the JSON that scripts/try_changes.py wrote for "
-        "its scene",
+        help="advice for a dataset: scene/rig, and the JSON that scripts/error_vs_time.py wrote "
+        "for its scene",
     )
     parser.add_argument(
         "--family", action="append", default=[], metavar="NAME", help="name of a family of scenes"
@@ -51,7 +51,7 @@ def main() -> None:
         for name, frames, probe in arguments.dataset
     ]
     advice = {
-        name: read_keys(path, "try_changes.py", "own", "unchanged")
+        name: read_keys(path, "error_vs_time.py", "changes")["changes"]
         for name, path in arguments.advice
     }
     text = plan.table(probes, advice)

@@ -1,21 +1,17 @@
-"""Advice on cheaper settings: from simulated renders with known answers, and by the programs."""
+"""Advice on cheaper settings: from simulated renders with known answers."""
 
 import json
-import os
-import signal
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
-from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
-from lightfield.measurement import advice, calibration, error_vs_time, threads, trials
+from lightfield.measurement import advice, calibration, error_vs_time, strata, trials
+from lightfield.measurement.experiment import Experiment
 from lightfield.measurement.metrics import make_reference
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -40,6 +36,7 @@ class Simulated:
     """
 
     has_volumes = False
+    inventory = INVENTORY
 
     def __init__(self):
         self.lightfield = lightfield()
@@ -72,8 +69,13 @@ class Simulated:
         return trials.Trial(light.astype(np.float32), None, samples, seconds, "CPU", parts)
 
 
+def experiment_of(maker, size, windows, reference_samples):
+    chosen, areas = strata.choose(maker, size, windows)
+    return Experiment.stratified(maker, chosen, areas, reference_samples, "room")
+
+
 def advice_of(maker, windows, reference_samples):
-    experiment = advice.probe_experiment(maker, 32, windows, reference_samples, "room")
+    experiment = experiment_of(maker, 32, windows, reference_samples)
     return advice.measure(experiment, RENDER, INVENTORY, "room")
 
 
@@ -87,7 +89,7 @@ def test_windows_too_small_for_a_stratum_are_refused():
     with pytest.raises(
         UserError, match=r"room: its windows of 7 × 7 pixels have no 64 pixels.*--size"
     ):
-        advice.probe_experiment(Simulated(), 7, 1, 64, "room")
+        experiment_of(Simulated(), 7, 1, 64)
 
 
 @pytest.mark.parametrize(("asked", "rendered"), [(1, 8), (8, 8), (12, 16)])
@@ -134,7 +136,7 @@ def test_a_change_that_saves_is_advised_with_its_yaml(simulated):
     assert abs(whole_views["light"]) < 1e-6 and whole_views["same_picture"] and entry["advised"]
     assert entry["savings"]["diffuse"] == whole_views
     assert advice_content["yaml"] == {"light_tree": False}
-    text = advice.table("room", {**advice_content, "threads": []})
+    text = "\n".join(advice.table(advice_content))
     assert "render:\n  light_tree: false\n" in text
     assert "- lights: 1, sun" in text and "- volumes: 1, Fog" in text
     assert "| `light_tree: false` | path tracing | yes | 2.0" in text
@@ -191,70 +193,4 @@ def test_without_light_nothing_is_advised(monkeypatch):
     )
     advice_content = advice_of(Simulated(), 1, 64)
     assert advice_content["yaml"] == {}
-    assert "Nothing is advised" in advice.table("black", advice_content | {"threads": []})
-
-
-def killed(*arguments):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_a_process_killed_for_memory_is_named(monkeypatch, tmp_path):
-    write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
-    monkeypatch.setattr(threads.probe, "rendered", killed)
-    with pytest.raises(UserError, match=r"room: one of 1 .* was killed"):
-        threads.measure(lightfield(), "a.blend", tmp_path / "inventory.json", "cpu", 2, "room")
-
-
-def on_gpu(lightfield, blend, inventory, device, threads, folder):
-    """Stand in for a process that renders on a GPU. Leave a file that shows that it started."""
-    Path(inventory).with_name(f"started-{os.getpid()}").touch()
-    run = journal.Run({"device": "GPU", "start_up_seconds": 1.0})
-    run.views += [{"wall_seconds": 1.0}, {"wall_seconds": 1.0}]
-    return run
-
-
-def test_a_gpu_renders_in_one_process_alone(monkeypatch, tmp_path):
-    write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
-    monkeypatch.setattr(threads.probe, "rendered", on_gpu)
-    scene = ("a.blend", tmp_path / "inventory.json")
-    assert threads.measure(lightfield(), *scene, "auto", 4, "room") == []
-    assert len(list(tmp_path.glob("started-*"))) == 1
-
-
-def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
-    lightfield().write(tmp_path / "lightfield.json")
-    inventory, output = tmp_path / "inventory.json", tmp_path / "room.json"
-    run_program("inventory.py", "--blend", room, "--output", inventory)
-    arguments = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
-    arguments += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
-    arguments += ("--reference", "1024", "--cores", "2", "--output", output)
-    run_program("try_changes.py", *arguments)
-    content = json.loads(output.read_text())
-    assert "diffuse" in content["strata"]
-    savings = {json.dumps(entry["change"]): entry["savings"] for entry in content["tried"]}
-    sampling = json.loads(inventory.read_text())["sampling"]
-    # In a closed room with a lamp, fewer bounces make it darker. No other change does.
-    fewer = savings[json.dumps({"max_bounces": sampling["max_bounces"] // 4})]["whole views"]
-    assert fewer["light"] < -0.01 and not fewer["same_picture"]
-    tree = savings[json.dumps({"light_tree": not sampling["light_tree"]})]["whole views"]
-    assert 0 < abs(tree["light"]) < 0.02
-    # Each change reaches Cycles: no two make the same pixels. Two are exceptions: a clamp clamps
-    # nothing here, and on some processors the denoiser has one filter for two qualities.
-    same = ("clamp_indirect", "denoise_quality")
-    wholes = [
-        saved["whole views"]
-        for change, saved in savings.items()
-        if not any(name in change for name in same)
-    ]
-    assert len({(saving["bias"], saving["light"]) for saving in wholes}) == len(wholes)
-    qualities = [saved for change, saved in savings.items() if "denoise_quality" in change]
-    assert any(saved["whole views"] not in wholes for saved in qualities)
-    # Two processes of one thread hold the scene twice. One process of two threads holds it once.
-    single, double = content["threads"]
-    assert (single["threads"], single["processes"]) == (1, 2)
-    assert (double["threads"], double["processes"]) == (2, 1)
-    assert single["memory_bytes"] > 1.5 * double["memory_bytes"]
-    assert min(single["view_core_seconds"], double["view_core_seconds"]) > 0
-    said = run_program("advise.py", output).stdout
-    assert said == output.with_suffix(".md").read_text() + "\n"
-    assert "| `denoise_prefilter: fast` | denoised |" in said
+    assert "Nothing is advised" in "\n".join(advice.table(advice_content))

@@ -2,11 +2,13 @@
 
 
 def advice_arguments():
-    """Return the arguments that name the files of `snakemake advise` to scripts/plan.py."""
+    """Return the arguments that name the files of `error_vs_time` to scripts/plan.py."""
     file_of_rig = {}
     for dataset in CHOSEN:
         name = f"{dataset.scene_folder}/{dataset.rig_name}"
-        file_of_rig[name] = f"{RESULTS}/benchmarks/advise/{dataset.scene_name}.json"
+        file_of_rig[name] = (
+            f"{RESULTS}/benchmarks/error_vs_time/{dataset.scene_name}.json"
+        )
     arguments = []
     for name, file in file_of_rig.items():
         if Path(file).exists():

@@ -110,7 +110,6 @@ TARGETS = [
     "all",
     "package",
     "plan",
-    "advise",
     "error_vs_time",
     "reprojection_benchmark",
     "stability",
@@ -138,7 +137,6 @@ WITHOUT_OUTPUT = {
     "learn",
     "plan",
     "status",
-    "advise",
     "verify",
 }
 # Stands in for every program. It writes what identifies its job, in a form that rules can read. It
@@ -229,8 +227,7 @@ class Build:
         """Tell the stand-ins what each job reads and writes. Return all jobs."""
         jobs = self.plan("--forceall", "--ignore-incomplete")
         work = {job["log"][0]: job for job in jobs.values()}
-        for log in ("plan", "advise"):
-            work[f"work/logs/{log}.log"] = {"input": [], "output": []}
+        work["work/logs/plan.log"] = {"input": [], "output": []}
         for log, job in work.items():
             path = self.folder / "work_to_do" / log
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -73,7 +73,6 @@ TARGETS = [
     "stability",
     "extremes",
     "render_overhead",
-    "advise",
     "gpu_check",
     "synthesis",
     "learn",

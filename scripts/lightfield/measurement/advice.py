@@ -20,11 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.measurement import metrics, strata
+from lightfield.measurement import metrics
 from lightfield.measurement.calibration import effort_for
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
-from lightfield.measurement.trials import Trials
 
 # Changes are rendered with this many samples a pixel, the unchanged scene also with half and twice.
 SAMPLES = 8
@@ -157,14 +156,6 @@ def changes_to_try(sampling: Mapping[str, Any], on_cpu: bool) -> list[Change]:
     return changes
 
 
-def probe_experiment(
-    maker: Trials, size: int, windows: int, reference_samples: int, name: str
-) -> Experiment:
-    """Return the experiment on ``windows`` windows of ``size``² pixels of each stratum."""
-    chosen, areas = strata.choose(maker, size, windows)
-    return Experiment.stratified(maker, chosen, areas, reference_samples, name)
-
-
 def measure(
     experiment: Experiment, render: Mapping[str, Any], inventory: Mapping[str, Any], name: str
 ) -> dict[str, Any]:
@@ -184,7 +175,6 @@ def measure(
         experiment.run([combined.method], SEEDS, title)
         measured.append((combined, savings(experiment, combined)))
     return {
-        **experiment.described(),
         "seeds": len(SEEDS),
         "device": experiment.device,
         "strata": experiment.areas,
@@ -384,28 +374,21 @@ def geometric_mean(factors: Sequence[float]) -> tuple[float, float]:
     return mean, mean * standard_error(logarithms)
 
 
-# The keys of the content that `table` reads.
-SHOWN = ("device", "seeds", "strata", "tried", "unchanged", "threads", "costly", "yaml")
+def table(content: Mapping[str, Any]) -> list[str]:
+    """Return the lines of the results of `measure`, in Markdown."""
+    return [
+        *_savings_table(content),
+        *_unchanged_table(content),
+        *_costly_list(content),
+        *_advised_yaml(content),
+    ]
 
 
-def table(name: str, content: Mapping[str, Any]) -> str:
-    """Return the results of `measure` and of the trial of threads, in Markdown."""
-    return "\n".join(
-        [
-            *_savings_table(name, content),
-            *_unchanged_table(content),
-            *_threads_table(content),
-            *_costly_list(content),
-            *_advised_yaml(content),
-            "",
-        ]
-    )
-
-
-def _savings_table(name: str, content: Mapping[str, Any]) -> list[str]:
+def _savings_table(content: Mapping[str, Any]) -> list[str]:
     columns = [WHOLE_VIEWS, *content["strata"]]
     lines = [
-        f"# {name}: what could be cheaper at equal error",
+        "",
+        "## What could be cheaper at equal error",
         "",
         "Each figure is a factor: the unchanged scene takes that many times as long to the same",
         f"error. ± is the standard error over {content['seeds']} seeds. The columns are whole "
@@ -454,23 +437,6 @@ def _unchanged_table(content: Mapping[str, Any]) -> list[str]:
             f"| {of} | {point['samples']} | {point['seconds']:.3g} | {point['error']:.2g} |"
             for of, points in content["unchanged"].items()
             for point in points
-        ),
-    ]
-
-
-def _threads_table(content: Mapping[str, Any]) -> list[str]:
-    if not content["threads"]:
-        return []
-    return [
-        "",
-        "Processes that fill the same cores, in seconds of a core. Idle cores count:",
-        "",
-        "| threads a process | processes | s a small view | s to the first view | GB of all |",
-        "| ---: | ---: | ---: | ---: | ---: |",
-        *(
-            f"| {split['threads']} | {split['processes']} | {split['view_core_seconds']:.3g} "
-            f"| {split['start_up_core_seconds']:.3g} | {split['memory_bytes'] / 1e9:.2g} |"
-            for split in content["threads"]
         ),
     ]
 

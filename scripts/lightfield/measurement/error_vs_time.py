@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import write_csv, write_json, write_text
 from lightfield.imaging import plots
-from lightfield.measurement import metrics, strata
+from lightfield.measurement import advice, metrics, strata
 from lightfield.measurement.experiment import (
     WHOLE_VIEWS,
     Experiment,
@@ -134,8 +134,8 @@ def measure(
 
     One more window shows the same place in the first one's neighbouring view. ``render`` is the
     scene's own block. Sample counts are 1 to 2^``octaves``, each rendered with ``seeds`` seeds.
-    Errors of whole views are the mean of the strata's, weighted by their areas. ``name`` starts the
-    progress lines.
+    Errors of whole views are the mean of the strata's, weighted by their areas. Then try changes of
+    the settings on the same windows. ``name`` starts the progress lines.
     """
     chosen, areas = strata.choose(maker, size, windows)
     neighbour = nearest_view(maker.lightfield.views, chosen[0].view)
@@ -170,6 +170,7 @@ def measure(
             for stratum, places in experiment.strata.items()
         },
         "neighbouring_views": neighbour_disagreements(experiment, methods) if neighbour else [],
+        "changes": advice.measure(experiment, render, maker.inventory, name),
     }
 
 
@@ -454,11 +455,16 @@ def csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def tables(name: str, content: Mapping[str, Any]) -> str:
-    """Return the methods at equal time and at equal error, and all figures, in Markdown."""
-    if not content["methods"]:
-        return f"# {name}\n\nNo point of plain path tracing is above the references' own error.\n"
-    lines = [*_equal_table(name, content), *_figures_table(content), *_strata_table(content)]
-    return "\n".join([*lines, ""])
+    """Return the methods at equal time and at equal error, all figures, and advice, in Markdown."""
+    if content["methods"]:
+        lines = [*_equal_table(name, content), *_figures_table(content), *_strata_table(content)]
+    else:
+        lines = [
+            f"# {name}",
+            "",
+            "No point of plain path tracing is above the references' own error.",
+        ]
+    return "\n".join([*lines, *advice.table(content["changes"]), ""])
 
 
 def _equal_table(name: str, content: Mapping[str, Any]) -> list[str]:

@@ -310,7 +310,7 @@ PROGRAM_PAGES = {
         "These programs measure error, quality, and time.",
         [
             "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time",
-            "try_changes", "advise", "plan", "gpu_check",
+            "plan", "gpu_check",
         ],
     ),
 }  # fmt: skip
