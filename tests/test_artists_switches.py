@@ -50,40 +50,9 @@ def render(tmp_path):
     return render
 
 
-def burn_a_stamp(scene, layer):
-    scene.render.use_stamp = True
-    scene.render.use_stamp_note = True
-    scene.render.stamp_note_text = "draft"
-
-
-def leave_out_denoising(scene, layer):
-    layer.cycles.use_denoising = False
-
-
 def leave_out_blur(scene, layer):
     scene.render.use_motion_blur = True
     layer.use_motion_blur = False
-
-
-def cull_what_is_far(scene, layer):
-    scene.render.use_simplify = True
-    scene.cycles.use_distance_cull = True
-    scene.cycles.distance_cull_margin = 1
-    for obj in scene.objects:
-        obj.cycles.use_distance_cull = True
-
-
-@pytest.mark.parametrize(
-    ("switch", "settings"),
-    [
-        (burn_a_stamp, {}),
-        (cull_what_is_far, {}),
-        (leave_out_denoising, {"denoise": True}),
-        (leave_out_blur, {"motion_blur": True}),
-    ],
-)
-def test_a_switch_does_not_change_what_the_yaml_asks_for(render, switch, settings):
-    np.testing.assert_array_equal(render(switch, **settings), render(**settings))
 
 
 def test_a_layer_without_blur_stays_sharp_unless_the_yaml_asks_for_blur(render):

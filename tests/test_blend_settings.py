@@ -56,22 +56,23 @@ def of_blender(path, file_format):
 
     open_file(path)
     render = bpy.context.scene.render
-    is_linear = file_format == "OPEN_EXR"
+    suffix = "exr" if file_format == "OPEN_EXR" else "png"
     render.image_settings.file_format = file_format
     render.image_settings.color_mode = "RGBA"
-    render.image_settings.color_depth = "32" if is_linear else "16"
-    render.filepath = str(path.with_suffix(".colour.exr" if is_linear else ".png"))
+    render.image_settings.color_depth = "32" if suffix == "exr" else "16"
+    render.filepath = str(path.with_suffix(f".colour.{suffix}"))
     render_quietly()
-    if not is_linear:
-        return images.read_png(path.with_suffix(".png"))
     # Of a stereo pair there is a file for each eye.
-    file = next(path.parent.glob(f"{path.stem}.colour*.exr"))
+    file = next(path.parent.glob(f"{path.stem}.colour*.{suffix}"))
     image = images.read_image(file, "RGBA")
     return np.stack([image.channels[name] for name in "RGBA"], axis=-1).astype(np.float32)
 
 
 def depth_of_blender(path):
-    """Return Blender's depth (height, width) of a .blend at the pixels' centres, at its frame."""
+    """Return Blender's depth (height, width) of a .blend at the pixels' centres, at its frame.
+
+    As in the datasets, it sees through fog.
+    """
     import bpy
 
     open_file(path)
@@ -81,7 +82,9 @@ def depth_of_blender(path):
     scene.cycles.filter_width = 0.01
     scene.render.use_motion_blur = False
     scene.camera.data.dof.use_dof = False
-    layer = scene.view_layers[0]
+    if "Fog" in scene.objects:
+        scene.objects["Fog"].hide_render = True
+    layer = next(layer for layer in scene.view_layers if layer.use)
     layer.use_pass_z = True
     scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
     scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"

@@ -227,7 +227,9 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
         yield "film transparent ON"
     elif blend["film_transparent"]:
         yield "film transparent on, ignored"
-    # Inventories of earlier versions lack this key.
+    # Inventories of earlier versions lack these keys.
+    if not blend.get("environment", True):
+        yield "environment left out by the view layer, the background is black"
     if blend.get("pixel_aspect", 1) != 1:
         yield f"pixel aspect {blend['pixel_aspect']:g} ignored, pixels are square"
     for name, title in (

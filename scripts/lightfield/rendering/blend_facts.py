@@ -44,6 +44,7 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
         "sequencer": bool(
             render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips
         ),
+        "environment": bool(layer.use_sky),
         "film_transparent": bool(render.film_transparent),
         "view_transform": view.view_transform,
         "look": view.look,

@@ -131,6 +131,9 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles.time_limit = 0
     cycles.use_layer_samples = "IGNORE"
     cycles.use_sample_subset = False
+    # A switch for debugging moves all rays of a sample away from the centres of the pixels.
+    if hasattr(cycles, "use_pixel_jitter"):  # Blender 5.0 lacks it.
+        cycles.use_pixel_jitter = False
     # Culling would leave other objects out of each view, and out of its reflections and shadows.
     cycles.use_camera_cull = False
     cycles.use_distance_cull = False
