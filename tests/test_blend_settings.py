@@ -62,8 +62,8 @@ def of_blender(path, file_format):
     render.image_settings.color_depth = "32" if suffix == "exr" else "16"
     render.filepath = str(path.with_suffix(f".colour.{suffix}"))
     render_quietly()
-    # Of a stereo pair there is a file for each eye.
-    file = next(path.parent.glob(f"{path.stem}.colour*.{suffix}"))
+    # A stereo pair has a file for each eye, and the left one is often where the camera is.
+    file = max(path.parent.glob(f"{path.stem}.colour*.{suffix}"))
     image = images.read_image(file, "RGBA")
     return np.stack([image.channels[name] for name in "RGBA"], axis=-1).astype(np.float32)
 
@@ -91,7 +91,7 @@ def depth_of_blender(path):
     scene.render.image_settings.color_depth = "32"
     scene.render.filepath = str(path.with_suffix(".depth.exr"))
     render_quietly()
-    file = next(path.parent.glob(f"{path.stem}.depth*.exr"))
+    file = max(path.parent.glob(f"{path.stem}.depth*.exr"))
     channel = f"{layer.name}.Depth.Z"
     return images.read_image(file, [channel]).channels[channel]
 
