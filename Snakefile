@@ -13,7 +13,7 @@ sys.path.insert(0, str(FOLDER / "scripts"))
 from lightfield.core.errors import UserError
 from lightfield.core.disk_space import obstacle
 from lightfield.core.yaml_files import as_written
-from lightfield.dataset.configuration import read_config
+from lightfield.configuration.config_file import read_config
 
 # Snakemake ends with a traceback if it cannot write its notes.
 if cause := obstacle(Path(".snakemake")):

@@ -26,7 +26,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_csv, write_text
 from lightfield.core.progress import Progress
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import blend_file, cycles, limits, shard

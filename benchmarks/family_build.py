@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json_lines, write_json, write_text
-from lightfield.dataset.names import ROOT
+from lightfield.core.names import ROOT
 
 
 class FamilyBuild:

@@ -28,14 +28,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import bookkeeping
 from checkouts import jobs_on
 
+from lightfield.configuration import config_file as configuration
+from lightfield.configuration import keys
 from lightfield.core.files import read_json, sha256, write_json, write_text
-from lightfield.dataset import configuration, keys
-from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import chosen_families, load_datasets
-from lightfield.dataset.names import ROOT
+from lightfield.core.names import ROOT
+from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
+from lightfield.workflow.dataset import Dataset
+from lightfield.workflow.loading import chosen_families, load_datasets
 
 SCENE = """
 scene: {{builder: room}}

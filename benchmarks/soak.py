@@ -32,8 +32,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import bookkeeping
 
 from lightfield.core.files import write_json, write_text
+from lightfield.core.names import ROOT
 from lightfield.core.progress import Progress
-from lightfield.dataset.names import ROOT
 from lightfield.imaging import images
 
 SCENE = """

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from lightfield.dataset.lightfield import LightField  # noqa: E402
+from lightfield.formats.lightfield import LightField  # noqa: E402
 from lightfield.geometry import rigs  # noqa: E402
 from lightfield.report import pass_pictures  # noqa: E402
 

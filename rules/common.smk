@@ -19,7 +19,7 @@ SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
 from lightfield.core import disk_space, leftovers
-from lightfield.core.failures import (
+from lightfield.workflow.failures import (
     batch_log,
     cause,
     failure_report,
@@ -28,16 +28,17 @@ from lightfield.core.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import ledger, memory, presence, shard_counts
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.blend_lock import accept_blend
-from lightfield.dataset.scene_yaml import load_scene, scene_content, scene_path
-from lightfield.dataset.configuration import load_config
-from lightfield.dataset.dataset_paths import PICTURES, PLOTS
-from lightfield.dataset.description import Cluster
-from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
-from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS, VIEWS
-from lightfield.dataset.job_settings import (
+from lightfield.planning import memory
+from lightfield.workflow import ledger, presence, shard_counts
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.blend_lock import accept_blend
+from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
+from lightfield.configuration.config_file import load_config
+from lightfield.configuration.dataset_paths import PICTURES, PLOTS
+from lightfield.configuration.description import Cluster
+from lightfield.configuration.exports import MANIFEST, InstantNgp, export_settings_of
+from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
+from lightfield.configuration.job_settings import (
     BuildSettings,
     FiguresSettings,
     FreePlacesSettings,
@@ -50,17 +51,17 @@ from lightfield.dataset.job_settings import (
     SynthesisSettings,
     ValidationSettings,
 )
-from lightfield.dataset.loading import (
+from lightfield.workflow.loading import (
     chosen_families,
     family_folder,
     load_datasets,
     rendered_frames,
     scene_datasets,
 )
-from lightfield.dataset.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.splits_file import SPLITS
-from lightfield.dataset.view_store import ViewStore
+from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
+from lightfield.workflow.shard_files import JOURNAL_SUFFIX
+from lightfield.formats.splits_file import SPLITS
+from lightfield.workflow.view_store import ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
 

@@ -3,10 +3,10 @@ import logging
 import resource
 
 from lightfield.core.progress import duration
-from lightfield.core.run_display import RunDisplay, Task
-from lightfield.dataset.scene_yaml import SensorReprojection
-from lightfield.dataset.unit_costs import JOB_SECONDS, START_UP_SECONDS
-from lightfield.measurement.forecast import (
+from lightfield.workflow.run_display import RunDisplay, Task
+from lightfield.configuration.scene_yaml import SensorReprojection
+from lightfield.planning.unit_costs import JOB_SECONDS, START_UP_SECONDS
+from lightfield.planning.forecast import (
     SENSOR_PHASE,
     Work,
     calibration_seconds,

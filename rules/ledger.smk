@@ -10,7 +10,7 @@ from lightfield.core.files import (
     unreadable,
     write_json_if_changed,
 )
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
+from lightfield.workflow.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
 # The records of the present shards. Records of shards with other bounds are obsolete.
 SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}

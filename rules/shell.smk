@@ -1,5 +1,5 @@
 # What the shell of each job does before its program.
-from lightfield.dataset.view_store import VARIABLE
+from lightfield.workflow.view_store import VARIABLE
 
 # The rules call `python`: the one that runs Snakemake, or a container's own.
 OWN_PYTHON = (

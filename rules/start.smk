@@ -2,8 +2,8 @@
 import functools
 import resource
 
-from lightfield.core import live_runs
-from lightfield.dataset.blend_lock import expected_blend
+from lightfield.workflow import live_runs
+from lightfield.configuration.blend_lock import expected_blend
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9

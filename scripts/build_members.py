@@ -33,8 +33,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import BatchSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import BatchSettings
     from lightfield.family import batch
 
     settings = read_settings(BatchSettings, arguments.settings)

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
-from lightfield.dataset.names import builders
+from lightfield.core.names import builders
 
 
 def main() -> None:
@@ -23,8 +23,8 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from pydantic import TypeAdapter
 
+    from lightfield.configuration.job_settings import BuildSettings
     from lightfield.core.settings import checked, read_settings
-    from lightfield.dataset.job_settings import BuildSettings
     from lightfield.rendering import built_scene
 
     if arguments.settings:

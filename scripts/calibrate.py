@@ -15,7 +15,7 @@ from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_json
 from lightfield.measurement import trial_flags
-from lightfield.measurement.sampling import PROBES
+from lightfield.planning.sampling import PROBES
 
 
 def main() -> None:
@@ -41,7 +41,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.lightfield import LightField
+    from lightfield.formats.lightfield import LightField
     from lightfield.measurement import calibration, trials
 
     lightfield = LightField.read(arguments.lightfield)

@@ -29,7 +29,7 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from importlib.metadata import version
 
-    from lightfield.dataset import blend_lock, scene_yaml
+    from lightfield.configuration import blend_lock, scene_yaml
 
     source = scene_yaml.load_scene(arguments.scene).scene
     if source.blend is None:

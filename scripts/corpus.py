@@ -33,8 +33,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.corpus import CorpusSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.corpus import CorpusSettings
     from lightfield.report import corpus
 
     settings = read_settings(CorpusSettings, arguments.settings)

@@ -28,7 +28,7 @@ machine counts. Waiting and idle time do not count.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
 samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
-samples (see `lightfield.measurement.sampling`). The uncertainty is the standard error of that mean
+samples (see `lightfield.planning.sampling`). The uncertainty is the standard error of that mean
 over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
 a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
 views and pixels. Everything else stays as it was. The first view of each process prepares the scene
@@ -84,9 +84,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.scene_source import FILE
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.inventory import read_inventory
-    from lightfield.dataset.scene_source import FILE
+    from lightfield.formats.inventory import read_inventory
     from lightfield.measurement import costs
 
     settings = read_settings(costs.CostSettings, arguments.settings)

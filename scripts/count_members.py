@@ -28,9 +28,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for it.
+    from lightfield.configuration.family import summary
+    from lightfield.configuration.job_settings import CountSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.family import summary
-    from lightfield.dataset.job_settings import CountSettings
 
     settings = read_settings(CountSettings, arguments.settings)
     members = {}

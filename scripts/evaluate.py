@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
-from lightfield.dataset.names import VIEWS
+from lightfield.core.names import VIEWS
 
 NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
-from lightfield.dataset.names import EXPORTS, VIEWS
+from lightfield.core.names import EXPORTS, VIEWS
 
 
 def main() -> None:
@@ -35,8 +35,8 @@ def main() -> None:
     from pydantic import TypeAdapter
 
     from lightfield import export
+    from lightfield.configuration.exports import export_settings_of
     from lightfield.core.settings import checked, read_settings
-    from lightfield.dataset.exports import export_settings_of
 
     model = export_settings_of(arguments.format)
     if arguments.settings:

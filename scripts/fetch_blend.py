@@ -18,7 +18,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset import blend_lock, download, scene_yaml
+    from lightfield.configuration import blend_lock, scene_yaml
+    from lightfield.core import download
 
     source = scene_yaml.load_scene(arguments.scene).scene
     if source.url is None:

@@ -41,13 +41,13 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     import numpy as np
 
-    from lightfield.dataset import keys
-    from lightfield.dataset.lightfield import LightField
-    from lightfield.dataset.passes import FLOW
-    from lightfield.dataset.records import ShardRecord
+    from lightfield.configuration import keys
     from lightfield.export.source import SourceDataset
+    from lightfield.formats.lightfield import LightField
+    from lightfield.formats.passes import FLOW
     from lightfield.geometry.flow import flow
     from lightfield.imaging import images
+    from lightfield.workflow.records import ShardRecord
 
     lightfield = LightField.read(arguments.lightfield)
     source = SourceDataset(lightfield.folder, "", ".exr")

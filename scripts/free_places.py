@@ -26,8 +26,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import FreePlacesSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import FreePlacesSettings
     from lightfield.rendering import camera_files
 
     settings = read_settings(FreePlacesSettings, arguments.settings)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lightfield.core.cli import check_settings, run
 from lightfield.core.files import keep_apart
-from lightfield.dataset.names import LIGHTS, SOFTBOXES
+from lightfield.core.names import LIGHTS, SOFTBOXES
 
 
 def main() -> None:
@@ -27,8 +27,8 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     from pydantic import TypeAdapter
 
+    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.core.settings import checked, read_settings
-    from lightfield.dataset.job_settings import ImportSettings
     from lightfield.rendering import model
 
     if arguments.settings:

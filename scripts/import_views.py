@@ -33,8 +33,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.lightfield import LightField
-    from lightfield.dataset.records import ShardRecord
+    from lightfield.formats.lightfield import LightField
+    from lightfield.workflow.records import ShardRecord
 
     views = LightField.read(arguments.lightfield).views
     names = [f"{view.name}.exr" for view in views[view_slice(arguments.views, len(views))]]

@@ -14,11 +14,11 @@ def main() -> None:
     arguments = parse()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.capture import LightfieldSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset import lightfield_file
-    from lightfield.dataset.capture import LightfieldSettings
-    from lightfield.dataset.loading import rig_dataset
-    from lightfield.measurement.sampling import calibrated
+    from lightfield.planning.sampling import calibrated
+    from lightfield.workflow import lightfield_file
+    from lightfield.workflow.loading import rig_dataset
 
     if arguments.settings:
         settings = read_settings(LightfieldSettings, arguments.settings)

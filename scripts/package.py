@@ -36,9 +36,9 @@ def main() -> None:
     check_settings(arguments, add_settings_flags, "scene")
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.job_settings import PackSettings
-    from lightfield.dataset.view_store import ViewStore
+    from lightfield.configuration.job_settings import PackSettings
     from lightfield.report import package
+    from lightfield.workflow.view_store import ViewStore
 
     settings = PackSettings.given(arguments.settings, arguments.scene, arguments.gigabytes)
     card = package.card(arguments.folder, arguments.output.stem, settings.scene)

@@ -35,7 +35,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.lightfield import LightField
+    from lightfield.formats.lightfield import LightField
     from lightfield.rendering import probe
 
     measured = probe.measure(

@@ -30,7 +30,7 @@ def main() -> None:
     check_settings(arguments, add_settings_flags, "scene")
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.job_settings import PackSettings
+    from lightfield.configuration.job_settings import PackSettings
     from lightfield.report.publish import publish
 
     settings = PackSettings.given(arguments.settings, arguments.scene, arguments.gigabytes)

@@ -27,8 +27,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import FiguresSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import FiguresSettings
     from lightfield.report import figures
 
     settings = read_settings(FiguresSettings, arguments.settings)

@@ -29,9 +29,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import PageSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.inventory import read_inventory
-    from lightfield.dataset.job_settings import PageSettings
+    from lightfield.formats.inventory import read_inventory
     from lightfield.report import dataset_page
 
     settings = read_settings(PageSettings, arguments.settings)

@@ -1,6 +1,6 @@
 """Write the JSON schemas in configs/schema/, with which editors complete and check YAML files.
 
-They are generated from the models in lightfield/dataset/. Run this after a change there.
+They are generated from the models in lightfield/configuration/. Run this after a change there.
 """
 
 import argparse
@@ -20,7 +20,7 @@ def main() -> None:
     folder: Path = parser.parse_args().folder
 
     # Only now, so that --help need not wait for it.
-    from lightfield.dataset import json_schema
+    from lightfield.configuration import json_schema
 
     for name in json_schema.MODELS:
         write_text(folder / f"{name}.schema.json", json_schema.schema(name))

@@ -15,8 +15,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     # Only now, so that --help need not wait for these.
-    from lightfield.dataset.lightfield import LightField
-    from lightfield.dataset.splits_file import splits_content
+    from lightfield.formats.lightfield import LightField
+    from lightfield.formats.splits_file import splits_content
 
     scene = absolute_path(arguments.output).parent
     lightfields: dict[str, LightField] = {}

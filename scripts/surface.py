@@ -31,11 +31,11 @@ def main() -> None:
     import bpy
 
     from lightfield import export
+    from lightfield.configuration.job_settings import MeshSettings
+    from lightfield.configuration.scene_source import FILE
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.inventory import read_inventory
-    from lightfield.dataset.job_settings import MeshSettings
-    from lightfield.dataset.scene_source import FILE
     from lightfield.export import mesh
+    from lightfield.formats.inventory import read_inventory
     from lightfield.rendering import blend_file, ids, pruning
     from lightfield.rendering.surface import visible_surface
 

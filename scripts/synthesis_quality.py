@@ -43,8 +43,8 @@ def main() -> None:
     # Only now, so that --help need not wait for these.
     import numpy as np
 
+    from lightfield.configuration.job_settings import SynthesisSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import SynthesisSettings
     from lightfield.export.source import SourceDataset
     from lightfield.export.trainer_splits import splits
     from lightfield.imaging import images, pictures

@@ -13,7 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading, sha256
 from lightfield.core.paths import inside
 from lightfield.core.progress import Progress
-from lightfield.dataset.view_store import ViewStore
+from lightfield.workflow.view_store import ViewStore
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
 def take(store: ViewStore, dataset: Path) -> None:
     """Copy all files of a dataset. Raises `UserError` if one is not in the storage."""
     # Only now, so that --help need not wait for it.
-    from lightfield.dataset.layout import REPORT
+    from lightfield.formats.layout import REPORT
 
     report = dataset / REPORT
     for name in store.names(str(report)):
@@ -55,7 +55,7 @@ def take(store: ViewStore, dataset: Path) -> None:
 
 def sums_of(store: ViewStore, dataset: Path) -> tuple[Path, dict[Path, str]]:
     """Bring the list of a dataset's files. Return it, and the SHA-256 of each file."""
-    from lightfield.dataset.layout import SUMS, read_sums
+    from lightfield.formats.layout import SUMS, read_sums
 
     is_archive = dataset.suffix == ".json"
     listing = dataset if is_archive else dataset / SUMS

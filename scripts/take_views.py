@@ -15,8 +15,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.paths import place_in
 from lightfield.core.progress import Progress
-from lightfield.dataset import shard_files
-from lightfield.dataset.view_store import VARIABLE, ViewStore
+from lightfield.workflow import shard_files
+from lightfield.workflow.view_store import VARIABLE, ViewStore
 
 
 def main() -> None:

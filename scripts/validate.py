@@ -20,7 +20,7 @@ from lightfield.core import leftovers
 from lightfield.core.cli import check_settings, positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset import ledger
+from lightfield.workflow import ledger
 
 
 def main() -> None:
@@ -56,11 +56,11 @@ def main() -> None:
 def check(arguments: argparse.Namespace) -> None:
     """Check the dataset. Raises `UserError` if it is not valid and no --output says so."""
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import ValidationSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import ValidationSettings
-    from lightfield.dataset.layout import REPORT, SUMS, write_sums
-    from lightfield.dataset.lightfield import NAME
     from lightfield.export import MANIFESTS
+    from lightfield.formats.layout import REPORT, SUMS, write_sums
+    from lightfield.formats.lightfield import NAME
     from lightfield.validation.files import remove_strays
     from lightfield.validation.validate import validate
 

@@ -40,10 +40,10 @@ def main() -> None:
     check_settings(arguments, add_settings_flags)
 
     # Only now, so that --help need not wait for these.
+    from lightfield.configuration.job_settings import SequenceValidationSettings
     from lightfield.core.settings import read_settings
-    from lightfield.dataset.job_settings import SequenceValidationSettings
-    from lightfield.dataset.layout import write_sums
     from lightfield.export import IN_FOLDERS
+    from lightfield.formats.layout import write_sums
     from lightfield.validation.sequence import (
         export_lists,
         frame_folders,

@@ -76,7 +76,7 @@ def main() -> None:
 
 def member_datasets(folder: Path) -> list[Path]:
     """Return the datasets of the members of a family in ``folder``. Empty for a dataset."""
-    from lightfield.dataset.member_record import read_members
+    from lightfield.workflow.member_record import read_members
 
     return [
         folder / member.name / rig for member in read_members(folder) for rig in member.datasets

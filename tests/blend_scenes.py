@@ -15,7 +15,7 @@ def studio():
     """
     import bpy
 
-    from lightfield.dataset.keys import view_seed
+    from lightfield.configuration.keys import view_seed
     from lightfield.rendering import blend_file
 
     blend_file.new_scene()

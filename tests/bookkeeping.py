@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lightfield.core.files import read_json_lines, sha256, write_json
-from lightfield.dataset import ledger, shard_files
-from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.view_store import ViewStore
 from lightfield.validation.integrity import Integrity
+from lightfield.workflow import ledger, shard_files
+from lightfield.workflow.records import ShardRecord
+from lightfield.workflow.view_store import ViewStore
 
 # The notes of all jobs of a build.
 NOTES = f"work/{ledger.NAME}"

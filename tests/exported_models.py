@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.dataset.job_settings import ImportSettings
+from lightfield.configuration.job_settings import ImportSettings
 from lightfield.rendering import blend_file, cycles, model
 from lightfield.rendering.quiet import quiet
 from scenes.library.scene import Scene

@@ -18,7 +18,7 @@ from types import MappingProxyType
 import bpy
 import numpy as np
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.rendering import blend_file, cycles, ids, shard
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry

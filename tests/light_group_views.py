@@ -12,8 +12,8 @@ from pathlib import Path
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.light_groups import resolved
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.light_groups import resolved
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, inventory, light, shard
 

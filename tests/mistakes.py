@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lightfield.dataset.names import ROOT
+from lightfield.core.names import ROOT
 
 RIGHT = {
     "scene": {"builder": "room"},

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
 from lightfield.measurement.trials import Trials, Window

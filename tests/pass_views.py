@@ -16,8 +16,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
-from lightfield.dataset.passes import PASSES
+from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
+from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, shard
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import animation, blend_file, cycles, inventory, pruning
 from lightfield.rendering.colour_pass import render_colour

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import bpy
 
-from lightfield.dataset import keys
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PASSES
+from lightfield.configuration import keys
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, shard
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.rendering import cycles, geometry_pass, shard
 from lightfield.rendering.view import render_view
 

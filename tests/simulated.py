@@ -14,11 +14,11 @@ import numpy as np
 from checkouts import jobs_on, snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.workflow.dataset import Dataset
+from lightfield.workflow.loading import scene_datasets
 
 WHEN = 1_700_000_000
 

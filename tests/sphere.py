@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, shard
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PARTS_OF_LIGHT
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.measurement import advice, calibration, error_vs_time, strata, trials
 from lightfield.measurement.experiment import Experiment

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mirrors import BEHIND, CAMERA, WALL, see, see_framed_mirror
 
-from lightfield.dataset.lightfield import View
+from lightfield.formats.lightfield import View
 from lightfield.geometry import lenses
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.synthesis.view import Sources

@@ -150,7 +150,7 @@ APERTURE = """
 import sys
 from pathlib import Path
 import bpy
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, cycles
 blend_file.open_scene(Path(sys.argv[1]))

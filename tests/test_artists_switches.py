@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 
 pytestmark = pytest.mark.slow

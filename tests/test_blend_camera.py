@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from test_blend_settings import difference, of_blender, save
 
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import datasets_of
-from lightfield.dataset.scene_yaml import Scene
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
+from lightfield.workflow.loading import datasets_of
 
 pytestmark = pytest.mark.slow
 

@@ -10,11 +10,12 @@ from importlib.metadata import version
 import pytest
 from checkouts import checkout, planned, snakemake
 
+from lightfield.configuration import blend_lock, config_file, scene_yaml
+from lightfield.core import download, names
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset import blend_lock, configuration, download, names, scene_yaml
-from lightfield.dataset.loading import load_datasets, scene_datasets
-from lightfield.dataset.presence import check_presence
+from lightfield.workflow.loading import load_datasets, scene_datasets
+from lightfield.workflow.presence import check_presence
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()
@@ -259,7 +260,7 @@ def test_the_yamls_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
 def test_a_missing_file_gives_the_page_and_the_place(scene):
     scene(more=", page: 'https://example.org/scenes'", blend="blends/mine.blend")
     content = {"scenes": ["own"], "preset": "full", "presets": {"full": {}}}
-    settings = configuration.load_config(content)
+    settings = config_file.load_config(content)
     with pytest.raises(UserError) as caught:
         check_presence(load_datasets(settings)[0])
     assert "there is no file blends/mine.blend" in str(caught.value)

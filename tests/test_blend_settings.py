@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from blend_settings import IGNORED, PAGE, REFUSED, ROWS, page
 
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset import lightfield_file
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.loading import datasets_of
-from lightfield.dataset.scene_yaml import Scene
 from lightfield.imaging import images
+from lightfield.workflow import lightfield_file
+from lightfield.workflow.loading import datasets_of
 
 CASES = [
     pytest.param(case, case.outcome or row.outcome, id=f"{row.settings}-{case.name}")

@@ -10,7 +10,7 @@ from conftest import ROOT, SCRIPTS
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json, write_json, write_text
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.report import tables

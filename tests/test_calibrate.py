@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned, snakemake
 
+from lightfield.configuration import config_file, scene_yaml
+from lightfield.configuration.config_file import Preset
 from lightfield.core.errors import UserError
-from lightfield.dataset import configuration, scene_yaml
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
-from lightfield.measurement.sampling import PLAIN
+from lightfield.planning.sampling import PLAIN
+from lightfield.workflow.loading import scene_datasets
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
@@ -125,7 +125,7 @@ def test_a_preset_limits_the_choice(once, calibrated):
 def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
     path = tmp_path / "aimed.yaml"
     path.write_text(SCENE.format(render="target_error: {value: 0.02, denoise: never}"))
-    monkeypatch.setattr("lightfield.dataset.scene_yaml.SCENES", tmp_path)
+    monkeypatch.setattr("lightfield.configuration.scene_yaml.SCENES", tmp_path)
     for preset in (None, Preset(denoise=True, samples=8)):
         (dataset,) = scene_datasets("aimed", limits=preset)
         assert dataset.render["target_error"] == 0.02
@@ -229,7 +229,7 @@ def test_views_are_rendered_with_the_choice_in_unchanged_shards(tmp_path):
     assert written["render"]["target_error"] == 0.05
 
 
-LIMITS = configuration.Preset(samples=12, denoise=True)
+LIMITS = config_file.Preset(samples=12, denoise=True)
 
 
 def test_a_scene_has_samples_or_a_target(tmp_path):

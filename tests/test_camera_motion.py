@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import Scene
+from lightfield.configuration.scene_yaml import Scene
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
 

@@ -12,13 +12,13 @@ import pytest
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
+from lightfield.configuration import config_file, json_schema, scene_yaml
+from lightfield.configuration.config_file import Preset
 from lightfield.core import yaml_files
 from lightfield.core.errors import UserError
-from lightfield.dataset import configuration, json_schema, scene_yaml
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.loading import load_datasets, scene_datasets
-from lightfield.dataset.names import ROOT
+from lightfield.core.names import ROOT
 from lightfield.geometry.rigs import as_written
+from lightfield.workflow.loading import load_datasets, scene_datasets
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 
@@ -118,7 +118,7 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
 )
 def test_a_folder_has_one_path_however_it_is_written(folder, path):
     content = {"scenes": "room", "preset": "full", "presets": {"full": {}}, "results": folder}
-    assert configuration.load_config(content).results == path
+    assert config_file.load_config(content).results == path
 
 
 def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
@@ -201,7 +201,7 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     content = changed("reprojections.faces", faces | {"cube_map": True})
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
-    dataset = scene_datasets("right", limits=configuration.Preset(resolution=32, views=20))[0]
+    dataset = scene_datasets("right", limits=config_file.Preset(resolution=32, views=20))[0]
     assert dataset.reprojections["faces"].settings.as_json() == {
         "camera": {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
         "cube_map": True,
@@ -255,9 +255,9 @@ def test_the_schemas_accept_every_scene_and_find_its_mistakes():
 
 def test_a_single_word_becomes_a_list():
     content = {"preset": "full", "presets": {"full": {}}, "scenes": "artist"}
-    assert configuration.load_config(content).scenes == ["artist"]
-    assert configuration.load_config(content).rigs == "all"
-    assert configuration.load_config({**content, "rigs": "LFSphere"}).rigs == ["LFSphere"]
+    assert config_file.load_config(content).scenes == ["artist"]
+    assert config_file.load_config(content).rigs == "all"
+    assert config_file.load_config({**content, "rigs": "LFSphere"}).rigs == ["LFSphere"]
 
 
 @pytest.mark.parametrize(
@@ -308,7 +308,7 @@ def test_no_two_scenes_may_share_a_folder(tmp_path, monkeypatch):
     def chosen(scene, preset):
         presets = {"tiny": {}, "full": {}}
         content = {"scenes": [scene], "preset": preset, "presets": presets}
-        return load_datasets(configuration.load_config(content))
+        return load_datasets(config_file.load_config(content))
 
     assert chosen("room", "full") and chosen("room_tiny", "tiny")
     for scene, preset in (("room", "tiny"), ("room_tiny", "full")):

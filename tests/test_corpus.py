@@ -12,10 +12,10 @@ import families
 import pytest
 from faults import CORPUS_KINDS, FAULTS, spoil
 
+from lightfield.configuration.corpus import CorpusSettings, Shares
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.dataset.corpus import CorpusSettings, Shares
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.report import corpus, status
 from lightfield.validation.corpus_integrity import corpus_faults

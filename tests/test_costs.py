@@ -9,10 +9,10 @@ import numpy as np
 import psutil
 import pytest
 
-from lightfield.dataset import journal
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.measurement import costs
+from lightfield.workflow import journal
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 POWER = {"watts": 100, "cores": 4}

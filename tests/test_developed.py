@@ -8,12 +8,12 @@ import json
 import numpy as np
 import pytest
 
+from lightfield.configuration.exports import NerfSynthetic
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.files import write_json
-from lightfield.dataset.exports import NerfSynthetic
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import Scene
 from lightfield.export import nerf_synthetic
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb

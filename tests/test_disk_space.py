@@ -18,8 +18,9 @@ from checkouts import checkout, snakemake
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
 
-from lightfield.core import disk_space, files, leftovers, live_runs
+from lightfield.core import disk_space, files, leftovers
 from lightfield.core.errors import UserError
+from lightfield.workflow import live_runs
 
 Usage = namedtuple("Usage", "free")
 
@@ -47,7 +48,7 @@ rigs:
 RUN = """
 import subprocess, sys, time
 from pathlib import Path
-from lightfield.core import live_runs
+from lightfield.workflow import live_runs
 live_runs.enter(Path(sys.argv[1]), sys.argv[2] == "cluster", lambda: None)
 job = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
 print(job.pid, flush=True)
@@ -360,7 +361,7 @@ def start_run(tmp_path):
 ENTER = """
 import sys
 from pathlib import Path
-from lightfield.core import live_runs
+from lightfield.workflow import live_runs
 others = live_runs.enter(Path(sys.argv[1]), False, lambda: print("locks are removed"))
 print(*[run.pid for run in others])
 print(live_runs.refusal(others))

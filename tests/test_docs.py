@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.settings import checked
-from lightfield.dataset.scene_yaml import Scene
 
 # isort: split
 from pydantic import TypeAdapter
@@ -121,11 +121,11 @@ def test_pictures_are_shown_somewhere():
 
 
 def test_the_reference_says_what_the_models_and_programs_say(tmp_path):
-    program = ROOT / "scripts/reference.py"
+    program = ROOT / "docs/reference.py"
     subprocess.run([sys.executable, program, "--folder", tmp_path], check=True)
     written = {path.name: path.read_text() for path in tmp_path.iterdir()}
     committed = {name: (DOCS / "reference" / name).read_text() for name in written}
-    assert committed == written, "run scripts/reference.py"
+    assert committed == written, "run docs/reference.py"
     generated = {page.name for page in (DOCS / "reference").glob("*-keys.md")}
     generated |= {page.name for page in (DOCS / "reference").glob("programs-*.md")}
     assert generated == set(written)

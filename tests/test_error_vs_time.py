@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import PARTS_OF_LIGHT
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import strata, trials
@@ -452,7 +452,7 @@ def test_the_same_wall_is_found_in_both_views():
 ON_TWO_DEVICES = """
 import sys
 from pathlib import Path
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.measurement import trials
 from lightfield.rendering import cycles
 

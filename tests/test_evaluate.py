@@ -11,8 +11,8 @@ import pytest
 from sphere import write_views
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import to_16_bit

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, split_by_stratum
 from lightfield.measurement.metrics import exposed_alike, make_reference

@@ -11,10 +11,10 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 import export_instant_ngp
+from lightfield.configuration.exports import ExportSettings, InstantNgp
 from lightfield.core.errors import UserError
-from lightfield.dataset.exports import ExportSettings, InstantNgp
-from lightfield.dataset.lightfield import LightField
 from lightfield.export import instant_ngp
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 
 ROOT = Path(__file__).parents[1]

@@ -7,10 +7,10 @@ import pytest
 from lightfield.core import files
 from lightfield.core.cli import finite, positive, run, stops
 from lightfield.core.errors import UserError
-from lightfield.core.failures import cause, failure_report
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
 from lightfield.reprojection import lens_map
+from lightfield.workflow.failures import cause, failure_report
 
 
 def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 
+from lightfield.configuration.family import Family, Member, drawn, member_content, outdated_members
+from lightfield.configuration.job_settings import BatchSettings
+from lightfield.configuration.scene_yaml import check_member
 from lightfield.core.errors import UserError
 from lightfield.core.files import size_and_time
-from lightfield.dataset.family import Family, Member, drawn, member_content, outdated_members
-from lightfield.dataset.job_settings import BatchSettings
-from lightfield.dataset.scene_yaml import check_member
 from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.imaging.images import write_png
 
@@ -289,7 +289,7 @@ def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(
 
     before = batch_settings()
     assert all(before.values())
-    text = folder / "scripts/lightfield/dataset/keys.py"
+    text = folder / "scripts/lightfield/configuration/keys.py"
     text.write_text(text.read_text().replace("SOFTBOXES_VERSION = ", "SOFTBOXES_VERSION = 1000"))
     after = batch_settings()
     assert [name for name in scenes if before[name] != after[name]] == ["boxes", "drawn"]

@@ -8,7 +8,7 @@ import pytest
 from lightfield.core import files
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, set_aside
-from lightfield.dataset.ledger import Job, Ledger
+from lightfield.workflow.ledger import Job, Ledger
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 from checkouts import checkout, snakemake
 from sphere import RADIUS, colour_of, look, write_views
 
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import Scene
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow, in_frame
 from lightfield.imaging import images

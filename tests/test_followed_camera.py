@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 from test_blend_settings import difference, of_blender, open_file, save
 
+from lightfield.configuration import keys
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset import keys, lightfield_file
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.loading import datasets_of
-from lightfield.dataset.scene_yaml import Scene
 from lightfield.imaging import images
 from lightfield.validation.validate import validate
+from lightfield.workflow import lightfield_file
+from lightfield.workflow.loading import datasets_of
 
 # What follows, and what the note names.
 BY_NAME = {

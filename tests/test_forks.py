@@ -6,7 +6,7 @@ from checkouts import checkout, snakemake
 
 PROGRAM = """
 import lightfield.core.errors
-from lightfield.dataset import names
+from lightfield.core import names
 print(names.ROOT, lightfield.core.errors.__file__, hasattr(lightfield.core.errors, "added"))
 """
 

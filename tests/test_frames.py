@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightfield.dataset import scene_yaml
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import rendered_frames, scene_datasets
+from lightfield.configuration import scene_yaml
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.workflow.loading import rendered_frames, scene_datasets
 
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 

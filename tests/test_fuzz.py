@@ -26,33 +26,26 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield import export
+from lightfield.configuration import blend_lock, scene_yaml
+from lightfield.configuration.config_file import load_config
+from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
-from lightfield.dataset import (
-    blend_lock,
-    journal,
-    ledger,
-    published,
-    records,
-    scene_yaml,
-    shard_counts,
-    shard_files,
-)
-from lightfield.dataset.configuration import load_config
-from lightfield.dataset.exports import settings_of
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.presence import check_external_files, inventory_outdated
-from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
+from lightfield.formats import published
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import lenses
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
 from lightfield.measurement import plan
-from lightfield.measurement.sampling import calibrated
+from lightfield.planning.sampling import calibrated
 from lightfield.reprojection import lens_map
 from lightfield.validation import splits_check
+from lightfield.workflow import journal, ledger, records, shard_counts, shard_files
+from lightfield.workflow.loading import scene_datasets
+from lightfield.workflow.presence import check_external_files, inventory_outdated
 
 TIMES = itertools.count(10**18, 10**6)
 # The number of files of each kind. "few" takes seconds, and runs in each run of the tests.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import gpu_check
 from lightfield.measurement.trials import Trial
@@ -16,7 +16,7 @@ NOISE = 0.3
 PROGRAM = """
 import json, sys
 from pathlib import Path
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 lightfield = LightField.read("lightfield.json")
 maker = trials.Trials(*sys.argv[1:], lightfield, "cpu", 1, Path("cache"))

@@ -15,7 +15,7 @@ from conftest import SCRIPTS
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.gpus import CUDA, HIP, Gpu
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 
 FAKE = [Gpu(CUDA, "GPU-a"), Gpu(CUDA, "GPU-b")]

@@ -16,16 +16,16 @@ from checkouts import ROOT, planned, snakemake
 from pydantic import TypeAdapter
 from sphere import write_views
 
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
-from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.presence import outgrown_records
-from lightfield.dataset.published import lightfields
-from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.scene_yaml import Scene
+from lightfield.formats.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.workflow.loading import scene_datasets
+from lightfield.workflow.presence import outgrown_records
+from lightfield.workflow.records import ShardRecord
 
 RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "center": [0.3, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [48, 48]}

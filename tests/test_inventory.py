@@ -11,8 +11,8 @@ import pytest
 from checkouts import checkout, planned
 
 from lightfield.core.files import sha256
-from lightfield.dataset.view_store import VARIABLE
 from lightfield.rendering import pruning
+from lightfield.workflow.view_store import VARIABLE
 
 NOTHING = {
     "hidden": [],

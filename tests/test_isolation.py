@@ -14,7 +14,7 @@ from conftest import SCRIPTS
 
 from lightfield.core.files import sha256
 from lightfield.core.isolation import cleaned
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -210,7 +210,7 @@ def test_a_reprojected_view_has_the_same_bytes_without_numbas_compiler(reproject
 
 
 @pytest.mark.parametrize(
-    "first_import", ["lightfield.dataset.scene_yaml", "lightfield.imaging.halves"]
+    "first_import", ["lightfield.configuration.scene_yaml", "lightfield.imaging.halves"]
 )
 def test_numbas_options_in_the_current_folder_are_not_read(run_program, tmp_path, first_import):
     written(tmp_path / ".numba_config.yaml", "disable_jit: 1")

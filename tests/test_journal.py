@@ -10,7 +10,7 @@ from conftest import SCRIPTS, largest_file
 
 from lightfield.core import files
 from lightfield.core.errors import UserError
-from lightfield.dataset.journal import Journal, is_suspect, read
+from lightfield.workflow.journal import Journal, is_suspect, read
 
 
 def test_a_view_that_took_far_less_time_than_others_is_suspect():
@@ -53,7 +53,7 @@ def test_a_journal_continues_after_a_truncated_line(tmp_path):
 HANG = """
 import sys, time
 from pathlib import Path
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.rendering import colour_pass, geometry_pass, shard
 def hang(*_): time.sleep(60)
 colour_pass.render_colour = geometry_pass.render_geometry = hang

@@ -10,7 +10,7 @@ from sphere import LENSES, RADIUS, write_views
 
 import nerfstudio_views
 from lightfield import export
-from lightfield.dataset.exports import settings_of
+from lightfield.configuration.exports import settings_of
 from lightfield.export.source import SourceDataset
 
 RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}

@@ -7,8 +7,8 @@ import pytest
 from faults import FAULTS
 
 from lightfield.core.files import sha256
-from lightfield.dataset import ledger
-from lightfield.dataset.ledger import Job, Ledger, Stamp
+from lightfield.workflow import ledger
+from lightfield.workflow.ledger import Job, Ledger, Stamp
 
 
 def test_a_source_file_is_read_once_for_all_its_readers(tmp_path, monkeypatch):

@@ -10,19 +10,19 @@ import pytest
 import yaml
 from light_group_views import LENSES
 
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.light_groups import names_in, resolved
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.scene_yaml import Scene
+from lightfield.formats.light_groups import names_in, resolved
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.reprojection.filters import FILTERS
 from lightfield.validation.validate import validate
+from lightfield.workflow.loading import scene_datasets
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
 

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lightfield.configuration import keys
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset import keys
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.scene_source import SceneSource
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs, rotations
+from lightfield.workflow.loading import scene_datasets
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
 WIDE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 181})

@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.config_file import Preset
 from lightfield.core import machine
 from lightfield.core.files import write_json
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.configuration import Preset
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
+from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
+from lightfield.workflow.loading import scene_datasets
 
 LIBRARY = ctypes.CDLL(None).gnu_get_libc_version
 LIBRARY.restype = ctypes.c_char_p

@@ -5,14 +5,14 @@ import json
 import pytest
 from checkouts import ROOT
 
+from lightfield.configuration.config_file import load_config, read_config
 from lightfield.core import memory as machine
 from lightfield.core.errors import UserError
-from lightfield.dataset import memory
-from lightfield.dataset.configuration import load_config, read_config
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.planning import memory
 from lightfield.rendering import scene_memory, shard
+from lightfield.workflow.loading import scene_datasets
 
 GB = 10**9
 

@@ -10,9 +10,9 @@ from oracles import readers
 from scipy import ndimage
 
 from lightfield import export
-from lightfield.dataset.exports import settings_of
-from lightfield.dataset.lightfield import LightField
+from lightfield.configuration.exports import settings_of
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 

@@ -11,16 +11,16 @@ import yaml
 from checkouts import checkout, snakemake
 from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
 
+from lightfield.configuration import config_file, scene_yaml
+from lightfield.configuration.exports import ExportSettings, settings_of
+from lightfield.configuration.job_settings import ImportSettings, MeshSettings
+from lightfield.configuration.reprojections import ReprojectionSettings
 from lightfield.core.errors import UserError
+from lightfield.core.names import ROOT
 from lightfield.core.settings import read_settings
-from lightfield.dataset import configuration, scene_yaml
-from lightfield.dataset.exports import ExportSettings, settings_of
-from lightfield.dataset.job_settings import ImportSettings, MeshSettings
-from lightfield.dataset.loading import load_datasets
-from lightfield.dataset.names import ROOT
-from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.geometry.rigs import from_settings
 from lightfield.measurement.costs import CostSettings
+from lightfield.workflow.loading import load_datasets
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 SETTINGS = {
@@ -44,9 +44,9 @@ def read_with_mistake(mistake, file):
         scene_yaml.read_scene(file)
     elif file.name == "config.yaml":
         if not mistake.key:
-            configuration.read_config(file)
+            config_file.read_config(file)
         content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}}
-        load_datasets(configuration.load_config(content | value))
+        load_datasets(config_file.load_config(content | value))
     elif file.name in SETTINGS:
         file.write_text(json.dumps(value))
         read_settings(SETTINGS[file.name], file)

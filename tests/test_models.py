@@ -15,8 +15,8 @@ import pytest
 from checkouts import checkout, jobs_on, snakemake
 from conftest import SCRIPTS
 
+from lightfield.configuration import keys
 from lightfield.core.errors import UserError
-from lightfield.dataset import keys
 from lightfield.rendering import model_files
 
 # The files of `exported_models`.
@@ -165,7 +165,7 @@ def test_an_animated_model_is_measured_at_its_frame(renders, name):
 def imported(path, **settings):
     """Import a model into the open scene, and return its record."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
 
     return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
@@ -387,7 +387,7 @@ BROKEN = [
 def refusal(path, folder, **settings):
     """Return the message with which the import of a model is refused."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
 
     with pytest.raises(UserError) as caught:
@@ -444,7 +444,7 @@ def test_a_missing_texture_is_named(renders, tmp_path, name):
 
 
 def test_a_missing_texture_may_be_allowed(renders, tmp_path):
-    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
 
     shutil.copy(renders.folder / "shape.obj", tmp_path)
@@ -467,7 +467,7 @@ def test_metres_beyond_blenders_precision_are_refused(tmp_path):
     "name", ["a b'c.obj", "stühle—椅.obj", "$(id).OBJ", "-rf.obj", "a" * 200 + ".obj"]
 )
 def test_odd_names_of_files_are_imported(tmp_path, name):
-    from lightfield.dataset.job_settings import ImportSettings
+    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
 
     settings = ImportSettings(model=str(written(tmp_path / name, TRIANGLE)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightfield.core.files import read_json
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 

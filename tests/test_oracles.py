@@ -20,12 +20,12 @@ from sphere import LENSES, look_at_ball, write_views
 
 import export_instant_ngp
 from lightfield import export
+from lightfield.configuration.exports import settings_of
 from lightfield.core.files import read_json, write_json
-from lightfield.dataset.exports import settings_of
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, zarr_store
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.splits_file import splits_content
 from lightfield.imaging import images
 from lightfield.validation.files import read_sets
 

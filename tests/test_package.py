@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from sphere import write_views
 
+from lightfield.configuration.exports import Exports
+from lightfield.configuration.scene_yaml import load_scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset.exports import Exports
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import load_scene
 from lightfield.export import transforms
+from lightfield.formats.lightfield import LightField
 from lightfield.report import package
 from lightfield.validation.integrity import Integrity
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sphere import write_views
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import rigs
 from lightfield.report import views
 

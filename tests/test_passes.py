@@ -16,13 +16,13 @@ from conftest import SCRIPTS
 from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.dataset import passes
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
-from lightfield.dataset.scene_yaml import Scene
 from lightfield.export.source import SourceDataset
+from lightfield.formats import passes
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard

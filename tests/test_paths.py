@@ -8,12 +8,12 @@ from lightfield.core import leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.paths import files_below, inside, place_in
-from lightfield.dataset import shard_files
-from lightfield.dataset.layout import read_sums
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.member_record import read_member
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats.layout import read_sums
+from lightfield.formats.lightfield import LightField
 from lightfield.validation.corpus_integrity import corpus_faults
+from lightfield.workflow import shard_files
+from lightfield.workflow.member_record import read_member
+from lightfield.workflow.view_store import ViewStore
 
 # Each leads to a file beside the folder "home", or to none.
 HOSTILE = ["../x", "a/../../x", "..", "/tmp/x", "//tmp/x", "", ".", "a\0b", "./../x"]

@@ -9,10 +9,11 @@ import bpy
 import numpy as np
 import pytest
 
-from lightfield.dataset import keys, names
-from lightfield.dataset.job_settings import BuildSettings
-from lightfield.dataset.keys import scene_fingerprint
-from lightfield.dataset.scene_source import SceneSource
+from lightfield.configuration import keys
+from lightfield.configuration.job_settings import BuildSettings
+from lightfield.configuration.keys import scene_fingerprint
+from lightfield.configuration.scene_source import SceneSource
+from lightfield.core import names
 from scenes.barbershop.plan import SIZES
 from scenes.library.variation import Draw
 

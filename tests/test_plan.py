@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned
 
+from lightfield.configuration.description import Cluster
 from lightfield.core.files import write_json
-from lightfield.dataset import shard_counts
-from lightfield.dataset.description import Cluster
-from lightfield.dataset.journal import Journal
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.rendering import probe as probing
+from lightfield.workflow import shard_counts
+from lightfield.workflow.journal import Journal
+from lightfield.workflow.loading import scene_datasets
 
 SILVR = ("garden", "lone_monk", "barbershop")
 

@@ -5,9 +5,9 @@ import OpenEXR
 import OpenImageIO as oiio
 import pytest
 
+from lightfield.configuration.scene_yaml import Reprojection
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import Reprojection
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.primaries import ACESCG, REC_709, conversion, from_rec_709, xyz_matrix

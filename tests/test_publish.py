@@ -13,14 +13,14 @@ import pytest
 import yaml
 from sphere import LENSES, write_views
 
+from lightfield.configuration.publication import DOCUMENTS
+from lightfield.configuration.scene_yaml import Credits
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.publication import DOCUMENTS
-from lightfield.dataset.scene_yaml import Credits
-from lightfield.dataset.view_store import VARIABLE
+from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.report.publish import publish
+from lightfield.workflow.view_store import VARIABLE
 
 NAME = "smoke_LFPlane"
 RIG = {"type": "plane", "cameras": [3, 2], "size": 0.4, "split": {"every": 3}}

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from lightfield.core.files import read_json, sha256
-from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.shard_files import read_record
+from lightfield.workflow.records import ShardRecord
+from lightfield.workflow.shard_files import read_record
 
 
 def test_a_file_with_its_key_and_bytes_is_finished_whichever_shard_made_it(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import OpenEXR
 import pytest
 
 from lightfield.core.files import sha256
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard as shards

@@ -14,8 +14,8 @@ from sphere import RADIUS, colour_of, look
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import FLOW, PASSES
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import FLOW, PASSES
 from lightfield.geometry import lenses, overview, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures

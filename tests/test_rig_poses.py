@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from lightfield.configuration import scene_yaml
 from lightfield.core.errors import UserError
-from lightfield.dataset import scene_yaml
-from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rigs import poses as rig_of_poses
+from lightfield.workflow.loading import scene_datasets
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 CORNER = [[0, 0, 0], [1, 0, 0], [1, 2, 0.5], [-3, 2, 0.5]]

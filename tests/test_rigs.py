@@ -12,9 +12,9 @@ import pytest
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from lightfield.configuration.scene_yaml import load_scene
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import load_scene
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rigs.sphere import icosphere, nested

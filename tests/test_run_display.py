@@ -5,8 +5,9 @@ import time
 
 import pytest
 
-from lightfield.core import progress, run_display
-from lightfield.core.run_display import RunDisplay, Task
+from lightfield.core import progress
+from lightfield.workflow import run_display
+from lightfield.workflow.run_display import RunDisplay, Task
 
 
 class Terminal(io.StringIO):

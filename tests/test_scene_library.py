@@ -5,8 +5,9 @@ import shutil
 import numpy as np
 import pytest
 
-from lightfield.dataset import keys, names
-from lightfield.dataset.scene_source import SceneSource
+from lightfield.configuration import keys
+from lightfield.configuration.scene_source import SceneSource
+from lightfield.core import names
 from scenes.library.architecture import cut
 from scenes.library.points import evenly, lattice, mirrored, noise, polar, smoothstep
 from scenes.library.scene import Model, Scene

@@ -11,7 +11,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from scene_fingerprint import fingerprints
 
-from lightfield.dataset import scene_yaml
+from lightfield.configuration import scene_yaml
 from scenes.barbershop.place import drawn as drawn_barbershop
 
 pytestmark = pytest.mark.slow

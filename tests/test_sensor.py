@@ -9,10 +9,10 @@ import pytest
 from pydantic import ValidationError
 from scipy.special import gammaincinv
 
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.scene_yaml import Scene
-from lightfield.dataset.sensors import SensorSettings
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.sensor import BLACK, WHITE, Parameters, light_of, merged, sense

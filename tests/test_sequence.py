@@ -8,10 +8,10 @@ import pytest
 import yaml
 from checkouts import checkout, planned, snakemake
 
+from lightfield.configuration import config_file, scene_yaml
 from lightfield.core.errors import UserError
-from lightfield.dataset import configuration, scene_yaml
-from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.imaging import images
+from lightfield.workflow.loading import load_datasets, scene_datasets
 
 SCENE = """
 scene: {builder: garden, parameters: {detail: 0.02}, frame: 5}
@@ -49,7 +49,7 @@ def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
     ]
     assert {dataset.rig_name for dataset in datasets} == {"LFStill", "LFSequence"}
     settings = {"scenes": ["moving"], "preset": "full", "presets": {"full": {}}}
-    chosen = load_datasets(configuration.load_config({**settings, "rigs": ["LFSequence"]}))
+    chosen = load_datasets(config_file.load_config({**settings, "rigs": ["LFSequence"]}))
     assert [dataset.rig_folder for dataset in chosen] == FRAMES
 
 

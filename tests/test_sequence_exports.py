@@ -19,10 +19,10 @@ from sphere import (
 )
 
 from lightfield import export
+from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
-from lightfield.dataset.exports import settings_of
-from lightfield.dataset.lightfield import LightField
 from lightfield.export.sequence import SourceSequence
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 

@@ -13,8 +13,8 @@ from oracles.readers.mp4 import read_mp4
 from test_sequence_exports import CAMERAS, FRAMES, source_of, write_moving_ball
 
 from lightfield import export
+from lightfield.configuration.exports import settings_of
 from lightfield.core.files import sha256
-from lightfield.dataset.exports import settings_of
 from lightfield.export import IN_FOLDERS
 from lightfield.export.sequence import SourceSequence
 from lightfield.imaging import images

@@ -7,9 +7,9 @@ import pytest
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
 from lightfield.export.points import lift
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.validation import validate as validation

@@ -11,19 +11,19 @@ from pydantic import TypeAdapter
 from test_exports import RADIUS, VIEWS, Colmap, ply, write_views
 
 from lightfield import export
+from lightfield.configuration import scene_yaml
+from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.settings import checked
-from lightfield.dataset import scene_yaml
-from lightfield.dataset.exports import settings_of
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import scene_datasets
-from lightfield.dataset.splits_file import splits_content
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import rigs
 from lightfield.validation import splits_check
 from lightfield.validation.files import read_sets
+from lightfield.workflow.loading import scene_datasets
 
 PERSPECTIVE = {"lens": "rectilinear", "fov": 70, "resolution": [32, 24]}
 PLANE = {"type": "plane", "cameras": [4, 3], "size": 1.2}

@@ -13,9 +13,9 @@ import pytest
 from checkouts import ROOT, snakemake
 
 import status
+from lightfield.configuration import keys
 from lightfield.core import files, progress
-from lightfield.dataset import keys
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 

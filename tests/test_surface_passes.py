@@ -9,8 +9,8 @@ from scipy.ndimage import binary_erosion
 from surface_views import KNOWN, LENSES, MATT, SLOPE, SURFACES
 
 from lightfield.core.files import read_json
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PASSES
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.passes import PASSES
 from lightfield.imaging import images
 from lightfield.validation.validate import validate
 

@@ -14,9 +14,9 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb

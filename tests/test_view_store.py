@@ -10,8 +10,8 @@ import pytest
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.view_store import VARIABLE, ViewStore
+from lightfield.workflow.records import ShardRecord
+from lightfield.workflow.view_store import VARIABLE, ViewStore
 
 KEY = "0" * 64
 # A job's own folder holds the dataset's views and a shard's record.

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from lightfield.configuration import keys
+from lightfield.configuration.family import Member
+from lightfield.configuration.job_settings import BatchSettings
 from lightfield.core.files import sha256
-from lightfield.dataset import keys
-from lightfield.dataset.family import Member
-from lightfield.dataset.job_settings import BatchSettings
 from lightfield.geometry.lenses import from_camera
 from lightfield.imaging import images
 

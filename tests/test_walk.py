@@ -14,8 +14,8 @@ from conftest import SMALL_WALK, error_listeners
 from PIL import Image
 from sphere import BALL, RADIUS, RED, look, look_at_ball, write_views
 
-from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import pictures
 from lightfield.report import dataset_page

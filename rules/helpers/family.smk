@@ -1,9 +1,9 @@
 # Functions for the rules of family.smk.
-from lightfield.dataset import keys
-from lightfield.dataset.corpus import CORPUS_FILES, CorpusSettings
-from lightfield.dataset.family import RECORD, outdated_members
-from lightfield.dataset.job_settings import BatchSettings, CountSettings
-from lightfield.dataset.names import SOFTBOXES
+from lightfield.configuration import keys
+from lightfield.configuration.corpus import CORPUS_FILES, CorpusSettings
+from lightfield.configuration.family import RECORD, outdated_members
+from lightfield.configuration.job_settings import BatchSettings, CountSettings
+from lightfield.core.names import SOFTBOXES
 
 # The CPU seconds of a member beside its views, and those of the checks.
 MEMBER_SECONDS = 0.5

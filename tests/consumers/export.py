@@ -15,12 +15,12 @@ sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 from sphere import LENSES, enlarged, look, look_at_ball, write_views  # noqa: E402
 
 from lightfield import export  # noqa: E402
+from lightfield.configuration.exports import settings_of  # noqa: E402
+from lightfield.configuration.scene_yaml import Credits  # noqa: E402
 from lightfield.core.files import sha256  # noqa: E402
-from lightfield.dataset.exports import settings_of  # noqa: E402
-from lightfield.dataset.lightfield import LightField  # noqa: E402
-from lightfield.dataset.scene_yaml import Credits  # noqa: E402
 from lightfield.export.sequence import SourceSequence  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
+from lightfield.formats.lightfield import LightField  # noqa: E402
 from lightfield.report.publish import publish  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}

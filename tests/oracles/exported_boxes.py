@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import ImageSet
-from lightfield.dataset.passes import PASSES
+from lightfield.formats.layout import ImageSet
+from lightfield.formats.passes import PASSES
 from lightfield.imaging import images
 from oracles.readers.contents import Box, Exported
 

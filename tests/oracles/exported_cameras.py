@@ -15,9 +15,9 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import ImageSet, Manifest
-from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.splits_file import SPLITS
+from lightfield.formats.layout import ImageSet, Manifest
+from lightfield.formats.lightfield import NAME, LightField, View
+from lightfield.formats.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.split_setting import PARTS

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.core.errors import UserError
-from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
-from lightfield.dataset.layout import ImageSet, rendered
+from lightfield.formats.layout import ImageSet, rendered
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation.cameras import camera_of

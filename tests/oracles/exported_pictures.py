@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import ImageSet
+from lightfield.formats.layout import ImageSet
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation.cameras import camera_of

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import ImageSet
-from lightfield.dataset.lightfield import View
-from lightfield.dataset.passes import PASSES
+from lightfield.formats.layout import ImageSet
+from lightfield.formats.lightfield import View
+from lightfield.formats.passes import PASSES
 from lightfield.geometry.flow import shorter
 from lightfield.imaging import images
 from lightfield.validation.cameras import camera_of

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import ImageSet
+from lightfield.formats.layout import ImageSet
 from oracles.readers import instant_ngp
 from oracles.readers.contents import FLOAT32, Floats, UnitCube, same
 

@@ -12,8 +12,8 @@ import yaml
 from checkouts import ROOT, checkout
 from test_own_folder import SCENE, snakemake
 
+from lightfield.configuration.config_file import load_config, read_config
 from lightfield.core.files import read_text
-from lightfield.dataset.configuration import load_config, read_config
 
 # As snakedeploy writes it.
 DEPLOYED = """

@@ -20,7 +20,7 @@ from faults import CUBOID, FAULTS, KINDS, flip, spoil
 from waiting import wait_until
 
 from lightfield.core.files import sha256
-from lightfield.dataset.loading import scene_datasets
+from lightfield.workflow.loading import scene_datasets
 
 BATCHES = range(len(FAULTS))
 OBSTACLES = {"a folder", "a link to nowhere", "unreadable"}

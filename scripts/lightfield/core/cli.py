@@ -11,8 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lightfield.core.disk_space import REMEDIES, write_problem
-from lightfield.core.errors import UserError
-from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import read_problem
 
 # Imports make many objects that are never garbage. To go through them takes a tenth of the time of

@@ -16,3 +16,10 @@ class UserError(Exception):
             for letter in message[:LONGEST]
         )
         super().__init__(line + ("…" if len(message) > LONGEST else ""))
+
+
+# What the user can do if memory ran out.
+LESS_MEMORY = "lower --cores, for fewer shards at once, or resolution"
+LESS_GPU_MEMORY = (
+    "lower resolution, shrink the scene's textures, end what else uses the GPU, or take device=cpu"
+)

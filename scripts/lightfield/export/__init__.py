@@ -1,8 +1,8 @@
 """Writes the files with which consumers open a dataset: one module for each format.
 
 Each module has ``export(source, settings, folder)``, which writes the views of a
-`source.SourceDataset` into ``folder``. Its settings are in `lightfield.dataset.exports`. `run`
-calls the module, and lists its files in the folder's export.json, which validation checks.
+`source.SourceDataset` into ``folder``. Its settings are in `lightfield.configuration.exports`.
+`run` calls the module, and lists its files in the folder's export.json, which validation checks.
 instant-ngp's files lie beside the views, and have a program of their own.
 """
 
@@ -12,16 +12,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration.exports import MANIFEST, Export, ExportSettings
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.dataset.exports import MANIFEST, Export, ExportSettings
-from lightfield.dataset.layout import Manifest
-from lightfield.dataset.lightfield import NAME
-from lightfield.dataset.names import MESH, SEQUENCE_EXPORTS
-from lightfield.dataset.view_store import ViewStore
+from lightfield.core.names import MESH, SEQUENCE_EXPORTS
 from lightfield.export import instant_ngp
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
+from lightfield.formats.layout import Manifest
+from lightfield.formats.lightfield import NAME
+from lightfield.workflow.view_store import ViewStore
 
 Source = SourceDataset | SourceSequence
 

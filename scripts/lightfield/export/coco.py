@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration.exports import Coco
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Coco
-from lightfield.dataset.lightfield import View
-from lightfield.dataset.passes import NAMES, PASSES
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import View
+from lightfield.formats.passes import NAMES, PASSES
 from lightfield.imaging import images
 
 Numbers = NDArray[np.uint32]

@@ -19,10 +19,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration.exports import Colmap
 from lightfield.core.files import atomic_path
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Colmap
-from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
 from lightfield.export.points import (
     Observations,
@@ -34,6 +33,7 @@ from lightfield.export.points import (
 )
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.lightfield import View
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular

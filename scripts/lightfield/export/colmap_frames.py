@@ -7,7 +7,7 @@ Source: readColmapSceneInfo in SpacetimeGaussians' dataset_readers.py.
 
 from pathlib import Path
 
-from lightfield.dataset.exports import ColmapFrames
+from lightfield.configuration.exports import ColmapFrames
 from lightfield.export import colmap
 from lightfield.export.sequence import SourceSequence
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.dataset.exports import FARTHEST
+from lightfield.configuration.exports import FARTHEST
 from lightfield.export.source import Floats
 
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import Dnerf
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Dnerf
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.sequence import SourceSequence

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration.exports import Hci
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_bytes, write_text
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Hci
-from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import cameras
 from lightfield.export.source import Floats, SourceDataset
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 FOCUS = 1e9  # metres

@@ -20,22 +20,21 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
-from lightfield.core.progress import Progress
-from lightfield.core.settings import checked, read_settings
-from lightfield.dataset.exports import (
+from lightfield.configuration.exports import (
     BOUNDS_PIXELS,
     BOUNDS_VIEWS,
     FARTHEST,
     ExportSettings,
     InstantNgp,
 )
-from lightfield.dataset.layout import Manifest
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.names import VIEWS
-from lightfield.dataset.view_store import ViewStore
+from lightfield.core.errors import UserError
+from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
+from lightfield.core.names import VIEWS
+from lightfield.core.progress import Progress
+from lightfield.core.settings import checked, read_settings
 from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
+from lightfield.formats.layout import Manifest
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -43,6 +42,7 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
+from lightfield.workflow.view_store import ViewStore
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The rotation from world to NeRF coordinates in SILVR's generate_NERF_transforms.py."""

@@ -19,15 +19,15 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import LichtFeld
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, write_json, write_text
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import LichtFeld
-from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Floats, SourceDataset, check_size
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear

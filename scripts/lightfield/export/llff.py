@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.files import write_bytes
-from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
 from lightfield.export.source import Floats, Surface, pixel_indices
+from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 # The bounds leave out this percentage of the nearest and of the farthest points.

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import Miv
 from lightfield.core.files import absolute_path, write_bytes, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
 from lightfield.export.disparity import Farther, depth_range, levels
 from lightfield.export.opendibr import projection

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lightfield.configuration.exports import MultipleView
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import MultipleView
 from lightfield.export.colmap import Model
 from lightfield.export.llff import depths, write_poses_bounds
 from lightfield.export.points import Observations, lift, write_ply

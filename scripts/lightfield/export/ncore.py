@@ -29,15 +29,15 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import NCore
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import NCore
-from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
 from lightfield.export.points import Points, lift
 from lightfield.export.source import SourceDataset
 from lightfield.export.zarr_store import ZarrStore
+from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant

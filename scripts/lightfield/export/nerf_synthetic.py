@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import NerfSynthetic
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import NerfSynthetic
 from lightfield.export import cameras
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits

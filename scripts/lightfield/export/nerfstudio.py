@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import Nerfstudio
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset

@@ -10,8 +10,8 @@ Source: neural_3D_dataset_NDC.py of 4DGaussians.
 from contextlib import ExitStack
 from pathlib import Path
 
+from lightfield.configuration.exports import Neural3dVideo
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import Neural3dVideo
 from lightfield.export.llff import depths, write_poses_bounds
 from lightfield.export.points import lift, write_ply
 from lightfield.export.sequence import SourceSequence

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import FARTHEST, OpenDibr
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
 from lightfield.export.disparity import Farther, depth_range, levels
 from lightfield.export.source import Floats, SourceDataset

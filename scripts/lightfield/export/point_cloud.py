@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lightfield.dataset.exports import PointCloud
+from lightfield.configuration.exports import PointCloud
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import SourceDataset
 

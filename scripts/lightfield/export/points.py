@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
-from lightfield.dataset.lightfield import View
 from lightfield.export.source import Floats, SourceDataset, Surface, pixel_indices
+from lightfield.formats.lightfield import View
 
 # This many candidates are lifted for each point. An even selection of them is kept.
 _CANDIDATES = 8

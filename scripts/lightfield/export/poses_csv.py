@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from lightfield.configuration.exports import PosesCsv
 from lightfield.core.files import write_csv
-from lightfield.dataset.exports import PosesCsv
 from lightfield.export.source import SourceDataset
 from lightfield.geometry.rigs.poses import CSV_HEADER
 

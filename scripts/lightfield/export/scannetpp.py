@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import ScanNetPP
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import ScanNetPP
 from lightfield.export.colmap import model
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration.exports import SceneFlow
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import SceneFlow
-from lightfield.dataset.lightfield import View
-from lightfield.dataset.passes import PASSES
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import Floats, SourceDataset
+from lightfield.formats.lightfield import View
+from lightfield.formats.passes import PASSES
 from lightfield.geometry.flow import scene_flow
 from lightfield.imaging import images
 

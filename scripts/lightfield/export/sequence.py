@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField, View
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 
 

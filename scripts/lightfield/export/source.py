@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy
-from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import (
     LARGEST_STEP,
     distance_from_z,

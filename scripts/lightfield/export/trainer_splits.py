@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.rigs.split_setting import PARTS
 
 # Most trainers' own examples test with every eighth view. Used for rigs without a split.

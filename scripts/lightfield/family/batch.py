@@ -20,9 +20,10 @@ from typing import Any
 
 import psutil
 
+from lightfield.configuration.family import Member
+from lightfield.configuration.job_settings import BatchSettings
 from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
-from lightfield.core.failures import signal_cause
 from lightfield.core.files import (
     append_json_line,
     read_json,
@@ -32,11 +33,10 @@ from lightfield.core.files import (
 )
 from lightfield.core.paths import place_in
 from lightfield.core.progress import Progress
-from lightfield.dataset.family import Member
-from lightfield.dataset.job_settings import BatchSettings
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.view_store import ViewStore
 from lightfield.family.member import MemberBuild
+from lightfield.workflow.failures import signal_cause
+from lightfield.workflow.shard_files import JOURNAL_SUFFIX
+from lightfield.workflow.view_store import ViewStore
 
 # These signals stop a run. They are no fault of the member at hand.
 STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)

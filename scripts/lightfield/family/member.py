@@ -12,21 +12,20 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration import scene_yaml
+from lightfield.configuration.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
+from lightfield.configuration.job_settings import BatchSettings
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.disk_space import obstacle
-from lightfield.core.errors import UserError
-from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import DAMAGE, listed, read_json, sha256, size_and_time, write_json
-from lightfield.dataset import scene_yaml
-from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
-from lightfield.dataset.job_settings import BatchSettings
-from lightfield.dataset.layout import SUMS, read_sums
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.loading import datasets_of
-from lightfield.dataset.scene_yaml import Scene
-from lightfield.dataset.splits_file import SPLITS, splits_content
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats.layout import SUMS, read_sums
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.splits_file import SPLITS, splits_content
 from lightfield.rendering import model_files
+from lightfield.workflow.dataset import Dataset
+from lightfield.workflow.loading import datasets_of
+from lightfield.workflow.view_store import ViewStore
 
 # Raise this number when the stages make something else of equal settings.
 VERSION = 1

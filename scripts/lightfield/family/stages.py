@@ -12,25 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from lightfield import export
-from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
-from lightfield.dataset import lightfield_file
-from lightfield.dataset.capture import LightfieldSettings
-from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.exports import Export, InstantNgp, export_settings_of
-from lightfield.dataset.family import SOURCES
-from lightfield.dataset.job_settings import (
+from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
+from lightfield.configuration.family import SOURCES
+from lightfield.configuration.job_settings import (
     BatchSettings,
     BuildSettings,
     FreePlacesSettings,
     ImportSettings,
 )
-from lightfield.dataset.layout import SUMS, write_sums
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.names import VIEWS
-from lightfield.dataset.scene_yaml import Scene
-from lightfield.dataset.splits_file import splits_content
+from lightfield.configuration.scene_yaml import Scene
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.core.names import VIEWS
 from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.formats.layout import SUMS, write_sums
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import (
     built_scene,
     camera_files,
@@ -43,6 +41,8 @@ from lightfield.reprojection.job import Job
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
 from lightfield.validation.validate import validate
+from lightfield.workflow import lightfield_file
+from lightfield.workflow.dataset import Dataset
 
 
 class Stages:

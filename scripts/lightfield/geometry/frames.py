@@ -1,6 +1,6 @@
 """The frames of lightfield.json: the name and the pose of each view.
 
-This is their only reader. `lightfield.dataset.lightfield` makes views of them, and
+This is their only reader. `lightfield.formats.lightfield` makes views of them, and
 `lightfield.geometry.rigs.poses` makes a rig of them.
 """
 

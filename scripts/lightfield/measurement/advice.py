@@ -23,7 +23,7 @@ import numpy as np
 from lightfield.measurement import metrics
 from lightfield.measurement.calibration import effort_for
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
-from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
+from lightfield.planning.sampling import DENOISED, TRACED, standard_error
 
 # Changes are rendered with this many samples a pixel, the unchanged scene also with half and twice.
 SAMPLES = 8

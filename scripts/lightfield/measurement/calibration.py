@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
-from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
-from lightfield.measurement.sampling import (
+from lightfield.measurement.trials import Trials, Window, nearest_view
+from lightfield.planning.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,
     PLAIN,
@@ -25,7 +25,7 @@ from lightfield.measurement.sampling import (
     cost_in_samples,
     standard_error,
 )
-from lightfield.measurement.trials import Trials, Window, nearest_view
+from lightfield.planning.unit_costs import DENOISING_SAMPLES
 
 PROBE_SEED = 1
 HELD_OUT_SEED = 2

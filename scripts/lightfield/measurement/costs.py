@@ -12,16 +12,16 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from lightfield.configuration.config_file import Energy
+from lightfield.configuration.setting_types import AtLeastOne
 from lightfield.core.paths import files_below
 from lightfield.core.settings import Settings
-from lightfield.dataset import journal
-from lightfield.dataset.configuration import Energy
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import FLOW, GROUP_PREFIX, PASSES
-from lightfield.dataset.setting_types import AtLeastOne
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.unit_costs import DENOISING_SAMPLES
-from lightfield.measurement.sampling import cost_in_samples, standard_error
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
+from lightfield.planning.sampling import cost_in_samples, standard_error
+from lightfield.planning.unit_costs import DENOISING_SAMPLES
+from lightfield.workflow import journal
+from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 
 # The stages that every dataset has, in the order of the work. Other stages come between.
 FIRST_STAGES = ("scene", "cameras", "render")

@@ -37,10 +37,10 @@ from lightfield.measurement.experiment import (
     over_views,
     samples_of_reference,
 )
-from lightfield.measurement.sampling import DENOISED, standard_error
-from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
 from lightfield.measurement.summaries import strata_table
 from lightfield.measurement.trials import Trial, Trials, both_see, nearest_view
+from lightfield.planning.sampling import DENOISED, standard_error
+from lightfield.planning.sampling import PLAIN as PLAIN_SAMPLING
 
 PLAIN = "plain"
 ADAPTIVE = "adaptive"

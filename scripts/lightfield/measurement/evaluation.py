@@ -18,8 +18,8 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path
-from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, SourceDataset, check_size
+from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular

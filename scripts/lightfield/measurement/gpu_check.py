@@ -13,8 +13,8 @@ from pydantic import Field
 from lightfield.core.settings import Settings
 from lightfield.measurement import metrics
 from lightfield.measurement.costs import FullSize
-from lightfield.measurement.sampling import standard_error
 from lightfield.measurement.trials import Trial, Trials
+from lightfield.planning.sampling import standard_error
 
 # The longer side of the view that both devices render, in pixels.
 SIZE = 128

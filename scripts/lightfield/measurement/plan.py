@@ -12,8 +12,8 @@ import numpy as np
 from lightfield.core import processors
 from lightfield.core.files import read_keys, reading
 from lightfield.measurement import metrics
-from lightfield.measurement.forecast import size_text, time_text
-from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
+from lightfield.planning.forecast import size_text, time_text
+from lightfield.planning.sampling import DENOISED, TRACED, standard_error
 
 COLUMNS = (
     "dataset",

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from lightfield.dataset.lightfield import View
-from lightfield.dataset.passes import PARTS_OF_LIGHT
+from lightfield.formats.lightfield import View
+from lightfield.formats.passes import PARTS_OF_LIGHT
 from lightfield.measurement.metrics import Mask
 from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
 

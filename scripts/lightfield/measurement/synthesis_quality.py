@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import absolute_path
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.export.source import SourceDataset
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens

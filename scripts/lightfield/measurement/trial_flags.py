@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import positive
-from lightfield.measurement.sampling import WINDOW_SIZE
+from lightfield.planning.sampling import WINDOW_SIZE
 
 
 def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:

@@ -19,16 +19,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.configuration import keys
 from lightfield.core import processors
 from lightfield.core.errors import UserError
-from lightfield.dataset import keys, passes
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats import passes
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.measurement.sampling import PLAIN, calibrated, without_target
+from lightfield.planning.sampling import PLAIN, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.

@@ -1,4 +1,4 @@
-"""Reads a .blend's render settings. `lightfield.dataset.blend` decides which of them to use."""
+"""Reads a .blend's render settings. `lightfield.formats.blend` decides which of them to use."""
 
 from collections.abc import Iterable
 from typing import Any

@@ -11,9 +11,9 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
-from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import animation
 from lightfield.rendering.quiet import quiet
+from lightfield.workflow.view_store import ViewStore
 
 
 def new_scene() -> None:

@@ -3,8 +3,8 @@
 import importlib
 from pathlib import Path
 
+from lightfield.configuration.job_settings import BuildSettings
 from lightfield.core.files import atomic_path
-from lightfield.dataset.job_settings import BuildSettings
 from lightfield.rendering import blend_file
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lightfield.configuration.job_settings import FreePlacesSettings
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.job_settings import FreePlacesSettings
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.lightfield import LightField
 from lightfield.rendering import blend_file, clearance, drawings, frames
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings

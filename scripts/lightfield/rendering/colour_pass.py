@@ -11,7 +11,7 @@ import bpy
 import mathutils
 import numpy as np
 
-from lightfield.dataset.passes import Pass
+from lightfield.formats.passes import Pass
 from lightfield.imaging.images import Attribute
 from lightfield.rendering import namesakes
 from lightfield.rendering.cycles import view_layer

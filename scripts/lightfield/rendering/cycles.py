@@ -6,12 +6,12 @@ from typing import Any
 
 import bpy
 
+from lightfield.configuration.scene_source import FILE
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
-from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
-from lightfield.dataset.passes import AOV_PREFIX, GROUP_PREFIX, Pass
-from lightfield.dataset.scene_source import FILE
+from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
+from lightfield.formats.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import (
     animation,

@@ -12,10 +12,10 @@ import bpy
 from lightfield.core.errors import UserError
 from lightfield.core.files import listed
 from lightfield.core.paths import files_below
-from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
+from lightfield.workflow.view_store import ViewStore
 
 # The kind of a file by the type of the data-block that reads it. Sounds, texts (scripts) and movie
 # clips affect no pixel.

@@ -11,8 +11,8 @@ from typing import Any
 
 import bpy
 
+from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
-from lightfield.dataset.scene_source import FILE
 from lightfield.rendering import animation
 from lightfield.rendering.ids import has_no_surface
 

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration import scene_yaml
+from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset import blend, scene_yaml
-from lightfield.dataset.dataset import Dataset
-from lightfield.dataset.light_groups import resolved
-from lightfield.dataset.loading import rendered_frames, scene_datasets
-from lightfield.dataset.scene_source import FILE
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats import blend
+from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera
 from lightfield.rendering import (
     blend_facts,
@@ -28,6 +26,9 @@ from lightfield.rendering import (
     simulations,
 )
 from lightfield.rendering.inventory import FEATURES, inventory
+from lightfield.workflow.dataset import Dataset
+from lightfield.workflow.loading import rendered_frames, scene_datasets
+from lightfield.workflow.view_store import ViewStore
 
 
 def write(path: Path, scene: str | None, output: Path) -> None:

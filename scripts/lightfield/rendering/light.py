@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.dataset.light_groups import WORLD
+from lightfield.formats.light_groups import WORLD
 from lightfield.rendering import animation
 from lightfield.rendering.inventory import contributing, rendered_materials
 from lightfield.rendering.render_graph import in_render

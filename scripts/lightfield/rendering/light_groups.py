@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.light_groups import WORLD
+from lightfield.formats.light_groups import WORLD
 from lightfield.rendering import shadow_catchers
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from lightfield.configuration.job_settings import ImportSettings
+from lightfield.configuration.keys import model_fingerprint
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, listed, write_json
+from lightfield.core.names import UP
 from lightfield.core.settings import FARTHEST
-from lightfield.dataset.job_settings import ImportSettings
-from lightfield.dataset.keys import model_fingerprint
-from lightfield.dataset.names import UP
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import blend_file, model_files, model_light
 from lightfield.rendering.model_references import Reference, printable, refuse_outside

@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from lightfield.dataset.names import SOFTBOXES
+from lightfield.core.names import SOFTBOXES
 from lightfield.rendering.inventory import contributing, rendered_materials
 
 # Of each lamp: its direction from the model as azimuth (0 is +X) and elevation in degrees, and the

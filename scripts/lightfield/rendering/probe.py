@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.leftovers import temporary_folder
-from lightfield.dataset import journal
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats.lightfield import LightField
 from lightfield.rendering import shard
+from lightfield.workflow import journal
 
 
 def measure(

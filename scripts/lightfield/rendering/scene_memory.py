@@ -12,9 +12,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
-from lightfield.dataset import journal
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.workflow import journal
 
 PROGRAM = Path(__file__).resolve().parents[2] / "render_shard.py"
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}

@@ -20,22 +20,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import psutil
 
+from lightfield.configuration import keys
 from lightfield.core import leftovers, processors
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
-from lightfield.dataset import keys, memory, passes
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.journal import Journal, is_suspect
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import Pass
-from lightfield.dataset.records import ShardRecord
+from lightfield.formats import passes
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import Pass
 from lightfield.geometry import depth
 from lightfield.geometry.flow import shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
+from lightfield.planning import memory
+from lightfield.workflow.journal import Journal, is_suspect
+from lightfield.workflow.records import ShardRecord
 
 if TYPE_CHECKING:
     from lightfield.rendering.colour_pass import Colour

@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.passes import AOV_PREFIX, INEXACT, Pass
+from lightfield.formats.passes import AOV_PREFIX, INEXACT, Pass
 from lightfield.rendering import shadow_catchers
 
 _PRINCIPLED = "ShaderNodeBsdfPrincipled"

@@ -11,7 +11,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from lightfield.dataset.passes import PARTS_OF_LIGHT, Pass
+from lightfield.formats.passes import PARTS_OF_LIGHT, Pass
 from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering.colour_pass import Colour
 from lightfield.rendering.geometry_pass import Geometry, cleared

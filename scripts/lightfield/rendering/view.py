@@ -10,11 +10,10 @@ import bpy
 import numpy as np
 
 from lightfield.core import disk_space
-from lightfield.core.errors import UserError
-from lightfield.core.failures import LESS_GPU_MEMORY, LESS_MEMORY
+from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, UserError
 from lightfield.core.leftovers import temporary_folder
-from lightfield.dataset.memory import passes_pixel_bytes
 from lightfield.imaging import images
+from lightfield.planning.memory import passes_pixel_bytes
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.moving_camera import place_camera
 from lightfield.rendering.quiet import quiet

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
+from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
-from lightfield.dataset.family import RECORD
-from lightfield.dataset.layout import SUMS
-from lightfield.dataset.member_record import MemberRecord, read_members
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats.layout import SUMS
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import corpus_looks, corpus_page, corpus_shards, corpus_store
 from lightfield.report.corpus_looks import Look
+from lightfield.workflow.member_record import MemberRecord, read_members
+from lightfield.workflow.view_store import ViewStore
 
 FORMAT = "plenoforge corpus"
 # Bins of a histogram.

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from lightfield.configuration.corpus import THUMBNAILS
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.corpus import THUMBNAILS
-from lightfield.dataset.layout import IMAGES
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.member_record import MemberRecord
+from lightfield.formats.layout import IMAGES
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging import images, pictures
+from lightfield.workflow.member_record import MemberRecord
 
 # Views of a dataset that are read, evenly spread over it.
 VIEWS = 4

@@ -12,8 +12,8 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from lightfield.dataset.corpus import PAGE
-from lightfield.dataset.layout import REPORT
+from lightfield.configuration.corpus import PAGE
+from lightfield.formats.layout import REPORT
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import page
 

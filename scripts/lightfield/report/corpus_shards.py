@@ -7,12 +7,12 @@ part. Equal members give equal bytes.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from lightfield.configuration.corpus import SHARDS, CorpusSettings
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.dataset.corpus import SHARDS, CorpusSettings
-from lightfield.dataset.member_record import MemberRecord
 from lightfield.geometry.rigs.split_setting import PARTS, Part
 from lightfield.report import shards
+from lightfield.workflow.member_record import MemberRecord
 
 
 def write(folder: Path, settings: CorpusSettings, members: Sequence[MemberRecord]) -> None:

@@ -5,15 +5,15 @@ Without a shared folder, members lie in the storage under their own paths.
 
 from pathlib import Path
 
+from lightfield.configuration.corpus import SHARDS, THUMBNAILS, CorpusSettings
+from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset.corpus import SHARDS, THUMBNAILS, CorpusSettings
-from lightfield.dataset.family import RECORD
-from lightfield.dataset.layout import SUMS, read_sums
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.member_record import read_member
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats.layout import SUMS, read_sums
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report.corpus_looks import chosen_views
+from lightfield.workflow.member_record import read_member
+from lightfield.workflow.view_store import ViewStore
 
 
 def bring(folder: Path, settings: CorpusSettings, store: ViewStore) -> None:

@@ -8,7 +8,7 @@ and for the provenance.
 from collections.abc import Mapping
 from typing import Any
 
-from lightfield.dataset.publication import Creator
+from lightfield.configuration.publication import Creator
 from lightfield.report.published import Published
 from lightfield.report.shards import INDEX
 

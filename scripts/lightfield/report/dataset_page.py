@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import absolute_path
-from lightfield.dataset import blend
-from lightfield.dataset.layout import IMAGES, REPORT, SUMS
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import FLOW, GROUP_PREFIX, is_group
-from lightfield.dataset.sensors import settings_in
-from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
+from lightfield.formats import blend
+from lightfield.formats.layout import IMAGES, REPORT, SUMS
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
+from lightfield.formats.sensors import settings_in
+from lightfield.formats.splits_file import SPLITS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view

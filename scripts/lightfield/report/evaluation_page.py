@@ -10,8 +10,8 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_csv
 from lightfield.core.progress import Progress
-from lightfield.dataset.lightfield import View
 from lightfield.export.source import Floats, SourceDataset
+from lightfield.formats.lightfield import View
 from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page

@@ -17,8 +17,8 @@ from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.layout import IMAGES
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.formats.layout import IMAGES
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures

@@ -8,8 +8,8 @@ from typing import Any
 import jinja2
 import yaml
 
-from lightfield.dataset.names import VIEWS
-from lightfield.dataset.passes import FLOW, PASSES
+from lightfield.core.names import VIEWS
+from lightfield.formats.passes import FLOW, PASSES
 from lightfield.report.page import TEMPLATES
 from lightfield.report.published import Published
 

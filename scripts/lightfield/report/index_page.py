@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from lightfield.configuration.corpus import CORPUS
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.core.paths import files_below
-from lightfield.dataset.corpus import CORPUS
-from lightfield.dataset.layout import REPORT
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.formats.layout import REPORT
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables
 
 THUMBNAIL = 480

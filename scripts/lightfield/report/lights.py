@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import of_group
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import of_group
 from lightfield.imaging import images, pictures
 from lightfield.report.packing import light_scale, pack_light, webp
 

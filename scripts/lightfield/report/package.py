@@ -14,17 +14,17 @@ from typing import Any
 
 import jinja2
 
+from lightfield.configuration.exports import MANIFEST
+from lightfield.configuration.scene_yaml import Credits
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256
+from lightfield.core.names import SEQUENCE_EXPORTS
 from lightfield.core.paths import files_below
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import MANIFEST
-from lightfield.dataset.layout import CARD, IMAGES, README, REPORT
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.names import SEQUENCE_EXPORTS
-from lightfield.dataset.passes import PASSES, group_pass
-from lightfield.dataset.scene_yaml import Credits
 from lightfield.export import transforms
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
 

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.colors import hsv_to_rgb
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.passes import FLOW, Pass, is_group
+from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import FLOW, Pass, is_group
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.tonemap import to_8_bit

@@ -5,16 +5,16 @@ Equal datasets and settings give equal bytes, because the date is the author's.
 
 from pathlib import Path
 
+from lightfield.configuration.publication import CARD, CROISSANT
+from lightfield.configuration.scene_yaml import Credits
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.core.paths import files_below
-from lightfield.dataset.layout import SUMS
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.publication import CARD, CROISSANT
-from lightfield.dataset.scene_yaml import Credits
-from lightfield.dataset.view_store import ViewStore
+from lightfield.formats.layout import SUMS
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import croissant, hugging_face, package, shards
 from lightfield.report.published import Published
+from lightfield.workflow.view_store import ViewStore
 
 
 def publish(folder: Path, name: str, scene: Credits, output: Path, most: float | None) -> Published:

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.publication import Creator, Publication
-from lightfield.dataset.scene_yaml import Credits
+from lightfield.configuration.publication import Creator, Publication
+from lightfield.configuration.scene_yaml import Credits
+from lightfield.formats.lightfield import LightField
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_csv
+from lightfield.core.names import VIEWS
 from lightfield.core.progress import Progress
-from lightfield.dataset.layout import (
+from lightfield.formats.layout import (
     SUMS,
     File,
     ImageSet,
@@ -27,8 +28,7 @@ from lightfield.dataset.layout import (
     source_view,
     view_files,
 )
-from lightfield.dataset.lightfield import NAME
-from lightfield.dataset.names import VIEWS
+from lightfield.formats.lightfield import NAME
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report.package import add_entry, tar_size
 

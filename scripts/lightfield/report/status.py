@@ -11,15 +11,16 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from lightfield.configuration import keys
+from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
 from lightfield.core.progress import duration
-from lightfield.dataset import journal, keys, shard_files
-from lightfield.dataset.family import RECORD
-from lightfield.dataset.layout import IMAGES
-from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.member_record import read_member
+from lightfield.formats.layout import IMAGES
+from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.imaging import images
+from lightfield.workflow import journal, shard_files
+from lightfield.workflow.member_record import read_member
 
 # The rate is measured over this many seconds.
 WINDOW = 600.0

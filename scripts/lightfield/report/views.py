@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
 from lightfield.export.points import evenly
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view

@@ -7,12 +7,12 @@ from typing import Any
 
 from pydantic import InstanceOf, TypeAdapter
 
+from lightfield.configuration.reprojections import MOST_SAMPLES, ReprojectionSettings
 from lightfield.core.cli import check_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import checked, read_settings
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.reprojections import MOST_SAMPLES, ReprojectionSettings
+from lightfield.formats.lightfield import LightField
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.dataset.reprojections import ReprojectionSettings
+from lightfield.configuration.reprojections import ReprojectionSettings
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.reprojection import lens_map

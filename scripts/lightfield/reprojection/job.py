@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.reprojections import LIGHT_GROUPS, ReprojectionSettings
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.dataset import light_groups, lightfield, passes, shard_files
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import Pass
-from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.reprojections import LIGHT_GROUPS, ReprojectionSettings
-from lightfield.dataset.sensors import sensor_files
+from lightfield.formats import light_groups, lightfield, passes
+from lightfield.formats.lightfield import LightField
+from lightfield.formats.passes import Pass
+from lightfield.formats.sensors import sensor_files
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
@@ -28,6 +27,8 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.sensor import parameters_of
+from lightfield.workflow import shard_files
+from lightfield.workflow.records import ShardRecord
 
 # The version of the files, which every key has. Raise it if equal settings give other files.
 VERSION = 4

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.dataset.passes import Pass, is_group
+from lightfield.formats.passes import Pass, is_group
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.halves import widen
 from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image, write_exr

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.dataset.sensors import (
+from lightfield.formats.sensors import (
     CHANNELS,
     COLOURS,
     MOST_COLOUR,

@@ -10,9 +10,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
 from lightfield.core.yaml_files import read_yaml
-from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video

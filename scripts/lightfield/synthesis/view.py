@@ -15,8 +15,8 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import View
 from lightfield.export.source import SourceDataset, pixel_indices
+from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import z_from_distance
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular

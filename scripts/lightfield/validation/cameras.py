@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from lightfield.dataset.layout import ImageSet
+from lightfield.formats.layout import ImageSet
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
 

@@ -7,11 +7,11 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from lightfield.configuration.corpus import CORPUS, SHARDS, THUMBNAILS
+from lightfield.configuration.family import RECORD
 from lightfield.core.files import broken, read_json, reading, set_aside
 from lightfield.core.paths import check_inside
-from lightfield.dataset.corpus import CORPUS, SHARDS, THUMBNAILS
-from lightfield.dataset.family import RECORD
-from lightfield.dataset.layout import SUMS, read_sums
+from lightfield.formats.layout import SUMS, read_sums
 from lightfield.validation.integrity import Fault, Integrity, file_problem
 
 

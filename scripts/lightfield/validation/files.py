@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightfield.configuration.dataset_paths import REPORT_FILES
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json, set_aside, sha256
 from lightfield.core.paths import (
@@ -21,8 +22,7 @@ from lightfield.core.paths import (
     link_above,
     stray_places,
 )
-from lightfield.dataset.dataset_paths import REPORT_FILES
-from lightfield.dataset.layout import (
+from lightfield.formats.layout import (
     CARD,
     DEPTH_PICTURE,
     IMAGES,
@@ -41,8 +41,8 @@ from lightfield.dataset.layout import (
     source_view,
     view_files,
 )
-from lightfield.dataset.lightfield import NAME, View
-from lightfield.dataset.sensors import (
+from lightfield.formats.lightfield import NAME, View
+from lightfield.formats.sensors import (
     BRACKET_FILES,
 )
 from lightfield.geometry import rotations

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from lightfield.core.progress import Progress
-from lightfield.dataset.layout import File, ImageSet
-from lightfield.dataset.lightfield import NAME
+from lightfield.formats.layout import File, ImageSet
+from lightfield.formats.lightfield import NAME
 from lightfield.validation import consistency
 from lightfield.validation.cameras import camera_of, grain_of
 from lightfield.validation.consistency import Answer, Patches

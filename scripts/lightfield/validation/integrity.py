@@ -16,6 +16,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration.exports import MANIFEST
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
     absolute_path,
@@ -26,12 +27,11 @@ from lightfield.core.files import (
     sha256,
 )
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
-from lightfield.dataset import ledger, shard_files
-from lightfield.dataset.exports import MANIFEST
-from lightfield.dataset.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
-from lightfield.dataset.splits_file import SPLITS
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.splits_file import SPLITS
+from lightfield.workflow import ledger, shard_files
+from lightfield.workflow.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
 # The folder of a sequence's frame.
 _FRAME = re.compile(r"f\d{5,7}")

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.dataset import passes
-from lightfield.dataset.lightfield import LightField
+from lightfield.formats import passes
+from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 
 # The sum may differ from the colour by this part of it. Rounding to halves takes up to 2⁻¹⁰: half

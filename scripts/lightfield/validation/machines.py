@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from lightfield.dataset.lightfield import MACHINE, LightField
+from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.validation.result import Check
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
-from lightfield.dataset.layout import IMAGES, File, ImageSet, rendered, source_view
-from lightfield.dataset.passes import MANIFEST, NAMES, Pass
+from lightfield.formats.layout import IMAGES, File, ImageSet, rendered, source_view
+from lightfield.formats.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images

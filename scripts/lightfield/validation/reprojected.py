@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.dataset.layout import ImageSet
+from lightfield.formats.layout import ImageSet
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging.images import Image
 from lightfield.imaging.tonemap import encode_srgb

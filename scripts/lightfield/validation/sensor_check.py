@@ -5,8 +5,8 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.dataset.layout import ImageSet, rendered, source_view
-from lightfield.dataset.sensors import parameter_file
+from lightfield.formats.layout import ImageSet, rendered, source_view
+from lightfield.formats.sensors import parameter_file
 from lightfield.imaging.sensor import Parameters
 from lightfield.reprojection.sensor import parameters_of
 from lightfield.validation.result import Check

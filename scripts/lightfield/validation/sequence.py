@@ -7,11 +7,11 @@ frames themselves are datasets, which `validate` checks.
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
+from lightfield.configuration.exports import MANIFEST
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
-from lightfield.dataset.exports import MANIFEST
-from lightfield.dataset.layout import Manifest
-from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.formats.layout import Manifest
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation.files import (

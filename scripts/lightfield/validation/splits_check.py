@@ -9,9 +9,9 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json
 from lightfield.core.paths import inside, place_in
-from lightfield.dataset.layout import ImageSet, rendered, source_view
-from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.splits_file import splits_content
+from lightfield.formats.layout import ImageSet, rendered, source_view
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.splits_file import splits_content
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.result import Check
 

@@ -19,18 +19,17 @@ from typing import Any
 
 import OpenImageIO as oiio
 
-from lightfield.core.errors import UserError
-from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset import layout
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.layout import File, ImageSet, Manifest
-from lightfield.dataset.shard_files import read_record
+from lightfield.formats import layout
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.layout import File, ImageSet, Manifest
 from lightfield.validation import files, geometry, machines, pixels, splits_check
 from lightfield.validation.consistency import Answer
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
+from lightfield.workflow.shard_files import read_record
 
 
 def validate(

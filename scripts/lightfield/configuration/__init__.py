@@ -1,0 +1,1 @@
+"""The typed configuration: config.yaml, scene YAMLs, and the settings that follow from them."""

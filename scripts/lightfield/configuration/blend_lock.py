@@ -1,0 +1,66 @@
+"""The SHA-256 that a .blend must have: in its scene YAML, or in the lock file beside that."""
+
+from pathlib import Path
+
+from lightfield.configuration.scene_source import SceneSource
+from lightfield.configuration.scene_yaml import load_scene, scene_path
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, sha256, write_json
+
+
+def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
+    """Return the SHA-256 that a scene's .blend must have, or None if none is recorded yet.
+
+    The second value is the file that records it: the scene YAML or its lock file.
+    """
+    if source.sha256:
+        return source.sha256, scene_path(scene)
+    lock = scene_path(scene).with_suffix(".lock.json")
+    try:
+        return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+    except (LookupError, TypeError):
+        raise UserError(f"{lock}: sha256: is missing; remove the file to record it again") from None
+
+
+def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
+    """Check that a .blend has the recorded SHA-256. Raises `UserError` if not.
+
+    Returns None. If none is recorded yet, returns the lock file that should record it.
+    """
+    expected, origin = blend_sha256(scene, load_scene(scene).scene)
+    if expected in (None, digest):
+        return origin if expected is None else None
+    remedy = (
+        "write the new one there"
+        if origin.suffix == ".yaml"
+        else "snakemake with --config accept_blend=true takes it as it is now"
+    )
+    raise UserError(
+        f"{blend}: its sha256 is {digest}, but {origin} says {expected}; if it was edited on "
+        f"purpose, {remedy}"
+    )
+
+
+def accept_blend(scene: str) -> None:
+    """Record the present SHA-256 of a scene's .blend.
+
+    Raises `UserError` if the scene YAML itself has another SHA-256.
+    """
+    source = load_scene(scene).scene
+    if source.blend is None or not Path(source.blend).is_file():
+        return
+    digest = sha256(Path(source.blend))
+    expected, origin = blend_sha256(scene, source)
+    if source.sha256 and digest != expected:
+        raise UserError(
+            f"{origin}: scene.sha256: is {expected}, but {source.blend} has {digest}; accept_blend "
+            "writes no scene YAML: write it there"
+        )
+    if digest != expected:
+        record_blend(Path(source.blend), digest, origin)
+
+
+def record_blend(blend: Path, digest: str, lock: Path) -> None:
+    """Record the SHA-256 that a .blend must have."""
+    write_json(lock, {"blend": blend.name, "sha256": digest})
+    print(f"note: {blend}: its sha256 {digest} is now recorded in {lock}")

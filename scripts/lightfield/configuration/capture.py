@@ -1,0 +1,248 @@
+"""The description of a lightfield.json: a scene, its rendering, and the cameras that see it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, PlainSerializer
+
+from lightfield.configuration import blend_lock, scene_source
+from lightfield.configuration.keys import scene_fingerprint
+from lightfield.configuration.scene_source import FILE, SceneSource
+from lightfield.configuration.setting_types import AtLeastOne
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, reading
+from lightfield.core.settings import Settings
+from lightfield.formats import blend
+from lightfield.formats.inventory import read_inventory
+from lightfield.formats.lightfield import OMNIDIRECTIONAL
+from lightfield.geometry import rigs
+from lightfield.geometry.rigs import BlendCamera, Poses, Rig
+
+# The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
+SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
+# The same for a model.
+MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
+# The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
+CAPTURED_KEYS = SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *scene_source.MODEL_KEYS}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capture:
+    """A scene as the cameras of a rig see it.
+
+    ``scene_name`` is the scene YAML's name. ``render`` is the block of lightfield.json.
+    ``external_files`` are path and SHA-256 of each file that a .blend reads. `resolved` fills them
+    in. ``model_fingerprint`` is the identity of a model. `of_model` fills it in.
+    """
+
+    scene_name: str
+    source: SceneSource
+    render: dict[str, Any]
+    rig: Rig
+    external_files: Sequence[tuple[str, str | None]] = ()
+    model_fingerprint: str | None = None
+
+    def of_model(self, record: Path) -> Self:
+        """Return the capture with the identity of its model, from the ``record`` of its import."""
+        content = read_keys(record, "import_model.py", "fingerprint")
+        return replace(self, model_fingerprint=str(content["fingerprint"]))
+
+    def resolved(self, inventory: Path) -> Self:
+        """Return the capture with the values of a user's .blend, which its ``inventory`` lists.
+
+        Raises `UserError` if the .blend lacks something that the scene YAML needs.
+        """
+        if not self.source.blend:
+            return self
+        content = read_inventory(inventory, "blend", "external_files")
+        with reading(inventory, "inventory"):
+            facts = content["blend"]
+            external_files = [(file["path"], file["sha256"]) for file in content["external_files"]]
+            frame: float = facts["frame"] if self.source.frame == FILE else self.frame
+            render = dict(self.render)
+            rig = self.rig
+            if render.get("samples") == FILE:
+                most = render.pop("most_samples", facts["samples"])
+                render["samples"] = min(facts["samples"], most)
+            if blend.is_shutter_reset(facts, render):
+                # Earlier versions rendered these views otherwise: they need another key.
+                render["shutter"] = "centred"
+            if render.get("depth_of_field"):
+                blend.camera_of(facts)
+            if isinstance(rig, BlendCamera):
+                blend.camera_of(facts)
+                rig = rig.placed(inventory, frame)
+            if rig.camera.lens == FILE:
+                camera = blend.lens_of(facts, rig.camera.resolution)
+                rig = rig.model_copy(update={"camera": camera})
+            return replace(
+                self,
+                source=self.source.model_copy(
+                    update={
+                        "frame": frame,
+                        "followed_camera": blend.followed_camera(
+                            facts, self.source.followed_camera
+                        ),
+                    }
+                ),
+                render=render,
+                rig=rig,
+                external_files=external_files,
+            )
+
+    @property
+    def frame(self) -> float:
+        """The rendered frame. That of a .blend is known once the capture is `resolved`."""
+        assert not isinstance(self.source.frame, str)
+        return self.source.frame
+
+    @property
+    def depth(self) -> str | None:
+        """The meaning of the rendered views' channel Z: ``z``, ``distance``, or None for no depth.
+
+        Lenses that see beyond 180 degrees have no usable Z-depth. Views without a centre have no
+        depth at all.
+        """
+        if self.rig.is_omnidirectional:
+            return None
+        match self.render["depth"]:
+            case "none":
+                return None
+            case "auto":
+                return self.rig.camera.make().usual_depth
+            case meaning:
+                return str(meaning)
+
+    @property
+    def fingerprint(self) -> str:
+        """The identity of the scene: see `scene_fingerprint` and `model_fingerprint`."""
+        if self.source.model:
+            if self.model_fingerprint is None:
+                raise UserError(
+                    f"{self.source.model}: is not imported; run scripts/import_model.py first"
+                )
+            return self.model_fingerprint
+        return scene_fingerprint(self.source, self.external_files)
+
+    def origin(self, render: dict[str, Any]) -> dict[str, Any]:
+        """Return the keys of lightfield.json that say what is rendered, and how.
+
+        ``render`` is its block `render`.
+        """
+        origin: dict[str, Any] = {"depth": self.depth}
+        if self.rig.stereo and self.rig.is_omnidirectional:
+            origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
+        origin["frame"] = self.frame
+        origin["scene"] = {
+            "name": self.scene_name,
+            **self.source.model_dump(
+                include=MODEL_SOURCE_KEYS if self.source.model else SOURCE_KEYS,
+                exclude_none=True,
+                # A .blend's own frame may have a fraction, which a scene YAML's has not.
+                warnings=False,
+            ),
+            "fingerprint": self.fingerprint,
+        }
+        origin["render"] = render
+        return origin
+
+    @property
+    def builder_fingerprint(self) -> str | None:
+        """A value that changes when the builder does. A user's .blend or model needs none."""
+        return None if self.source.blend or self.source.model else self.fingerprint
+
+    @property
+    def imported(self) -> str | None:
+        """The folder of a light field that somebody else has rendered. None for other datasets."""
+        if isinstance(self.rig, Poses) and self.source.dataset:
+            return str(Path(self.rig.file).parent)
+        return None
+
+
+def _source_as_written(source: SceneSource) -> dict[str, Any]:
+    """Return the keys of a scene YAML's `scene` on which a lightfield.json depends."""
+    if source.dataset:
+        return {"dataset": source.dataset}
+    return source.model_dump(
+        mode="json", include=CAPTURED_KEYS, exclude_unset=True, exclude_none=True
+    )
+
+
+def _without_locked_sha256(capture: Capture) -> SceneSource:
+    """Return the source without a SHA-256 from the lock file, because a job may write that file."""
+    source = capture.source
+    if source.blend is None:
+        return source
+    unlocked = source.model_copy(update={"sha256": None})
+    locked_sha256, _ = blend_lock.blend_sha256(capture.scene_name, unlocked)
+    return unlocked if source.sha256 == locked_sha256 else source
+
+
+class LightfieldSettings(Settings):
+    """The settings of scripts/make_lightfield.py."""
+
+    scene: str = Field(description="Name of a file in configs/scenes/.")
+    source: Annotated[SceneSource, PlainSerializer(_source_as_written)] = Field(
+        description="The block `scene` of the scene YAML."
+    )
+    render: dict[str, Any] = Field(
+        description="The block `render` of the scene YAML, within the limits of the preset."
+    )
+    rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)] = Field(
+        description="The rig's block in the scene YAML."
+    )
+    flow: bool = Field(
+        False, description="Whether to choose a neighbour of each view, for its optical flow."
+    )
+    panorama_width: AtLeastOne | None = Field(
+        None,
+        description="Width of a panorama from the rig's centre. With this key, the panorama is the "
+        "only view.",
+        json_schema_extra={"unit": "pixels"},
+    )
+    fingerprint: str | None = Field(
+        None, description="Hash of the builder's code. If it changes, the scene is captured again."
+    )
+    poses_sha256: str | None = Field(
+        None,
+        description="SHA-256 of the rig's file of poses. If it changes, the file is read again.",
+    )
+
+    @classmethod
+    def of_capture(cls, capture: Capture, panorama_width: int | None = None, **keys: Any) -> Self:
+        """Return the settings for a capture, or for its panorama. ``keys`` are the other keys."""
+        rig = capture.rig
+        # The centre of a .blend's camera is unknown until the .blend has been read.
+        if panorama_width and not isinstance(rig, BlendCamera):
+            rig = panorama_rig(rig, panorama_width)
+        return cls.of(
+            scene=capture.scene_name,
+            source=_source_as_written(_without_locked_sha256(capture)),
+            render=capture.render,
+            rig=rig,
+            panorama_width=panorama_width,
+            **keys,
+        )
+
+    @property
+    def capture(self) -> Capture:
+        """The capture that these settings describe, with the recorded SHA-256 of a .blend."""
+        source = self.source
+        if source.blend:
+            sha256, _ = blend_lock.blend_sha256(self.scene, source)
+            source = source.model_copy(update={"sha256": sha256})
+        return Capture(scene_name=self.scene, source=source, render=self.render, rig=self.rig)
+
+
+def panorama_rig(rig: Rig, width: int) -> Rig:
+    """Return a rig of one full equirectangular view, level, at the centre of ``rig``."""
+    return rigs.from_settings(
+        {
+            "type": "lattice",
+            "cameras": [1, 1, 1],
+            "center": rig.center,
+            "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
+        }
+    )

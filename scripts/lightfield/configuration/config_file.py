@@ -1,0 +1,228 @@
+"""The top-level configuration, config.yaml: which scenes to build, at which quality, and where."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, model_validator
+
+from lightfield.configuration.setting_types import (
+    AtLeastOne,
+    Auto,
+    DenoisePrefilter,
+    Folder,
+    unique_names,
+)
+from lightfield.core.errors import UserError
+from lightfield.core.names import ROOT
+from lightfield.core.settings import Name, Settings, checked, pattern
+from lightfield.core.yaml_files import read_yaml
+
+# Folders of the project, of a user's inputs, and of programs such as Snakemake.
+RESERVED = {
+    ".ci",
+    ".snakemake",
+    ".venv",
+    "benchmarks",
+    "captions",
+    "configs",
+    "docs",
+    "envs",
+    "profiles",
+    "rules",
+    "scripts",
+    "tests",
+}
+# Names that a scene's folder cannot have, because other folders beside it have them.
+SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
+
+
+def _listed(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+def _switch(value: Any) -> Any:
+    """Return the truth value of `--config key=true`, which Snakemake leaves as text."""
+    if value == "true":
+        return True
+    if value == "false":
+        return False
+    return value
+
+
+# A single word on the command line is a list of one name.
+Names = Annotated[
+    list[Name],
+    BeforeValidator(_listed),
+    AfterValidator(unique_names),
+]
+
+
+class Preset(Settings):
+    """A preset limits the values of scene YAMLs. A key that is left out limits nothing."""
+
+    resolution: AtLeastOne | None = Field(
+        None,
+        description="Largest length of an image's longer side. Larger images are made smaller.",
+        json_schema_extra={"unit": "pixels"},
+    )
+    samples: AtLeastOne | None = Field(
+        None,
+        description="Largest number of paths for each pixel.",
+        json_schema_extra={"unit": "paths"},
+    )
+    views: AtLeastOne | None = Field(
+        None,
+        description="Largest number of views of a rig. Rigs with more are thinned.",
+        json_schema_extra={"unit": "views"},
+    )
+    denoise: bool | None = Field(
+        None, description="Whether to denoise the views even if the scene YAML does not."
+    )
+    denoise_prefilter: DenoisePrefilter | None = Field(
+        None, description="Prefilter of the denoiser, unless the scene YAML names one."
+    )
+
+
+class Energy(Settings):
+    """The power from which report/costs.json computes energy."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("price_per_kwh", "currency"),
+        "leave it out, and multiply energy_kwh in report/costs.json by your price",
+    )
+
+    watts: float = Field(
+        65,
+        ge=0,
+        le=1e6,
+        description="Power of the machine when all its cores work.",
+        json_schema_extra={"unit": "W"},
+    )
+    cores: Auto | AtLeastOne = Field(
+        "auto",
+        description="Number of cores of that machine. auto: as many as the machine that computes "
+        "the costs has.",
+        json_schema_extra={"unit": "cores"},
+    )
+
+
+_SHARDS_ARE_AUTOMATIC = (
+    "leave it out, or set views_per_shard to the number of views that one render job makes"
+)
+
+
+class Configuration(Settings):
+    """Which scenes to build, at which quality, and into which folders."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = {
+        "most_shards": _SHARDS_ARE_AUTOMATIC,
+        "shard_minutes": _SHARDS_ARE_AUTOMATIC,
+    }
+
+    scenes: Names = Field(
+        description="Scenes to build: names of files in configs/scenes/, without .yaml. A single "
+        "name needs no list."
+    )
+    rigs: Literal["all"] | Names = Field(
+        "all", description="Rigs to build, by their names in the scene YAMLs. all: every rig."
+    )
+    preset: str = Field(description="Name of the preset to apply: one of those in presets.")
+    presets: dict[
+        Annotated[
+            str,
+            Field(
+                pattern=pattern(
+                    "^[a-z][a-z0-9]*$", "a name of small letters and digits with a letter first"
+                ),
+                max_length=30,
+            ),
+        ],
+        Preset,
+    ] = Field(
+        min_length=1,
+        description="Presets by their names. Each sets upper limits for values of the scene YAMLs.",
+    )
+    results: Folder = Field("results", description="Folder in which the datasets are built.")
+    work: Folder = Field(
+        "work",
+        description="Folder for intermediate files: scenes, lens maps, records and timings.",
+    )
+    device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = Field(
+        "auto",
+        description="Device on which Cycles renders. auto: a GPU if there is one, else the CPU.",
+    )
+    views_per_shard: Auto | AtLeastOne = Field(
+        "auto",
+        description="How many views one render job makes. auto: chosen from the expected time of a "
+        "view, and on a cluster also from the number of simultaneous jobs (--jobs). A dataset that "
+        "was begun with auto keeps its jobs.",
+        json_schema_extra={"unit": "views"},
+    )
+    accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
+        False,
+        description="Accept each .blend file as it is now, even if its SHA-256 has changed. This "
+        "rewrites the lock file beside the scene YAML.",
+    )
+    package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
+        None,
+        description="Largest size of a package's parts. Without this key, a package is one file.",
+        json_schema_extra={"unit": "GB"},
+    )
+    energy: Energy = Field(
+        Energy(),
+        description="Power and price of electricity, from which the energy and costs of a dataset "
+        "are computed.",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.preset not in self.presets:
+            names = ", ".join(self.presets)
+            raise ValueError(f"preset: is {self.preset!r}; must be one of {names}")
+        for name in self.scenes:
+            if "." in name or name in SCENE_NEIGHBOURS:
+                used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
+                raise ValueError(
+                    f"scenes: {name} cannot be the name of a scene; must have no dots, and not be "
+                    f"one of {used_names}"
+                )
+        for key in ("results", "work"):
+            _check_folder(key, getattr(self, key))
+        results = Path(self.results).resolve()
+        work = Path(self.work).resolve()
+        if results == work or results in work.parents or work in results.parents:
+            raise ValueError(
+                f"work: is {self.work!r}, and results is {self.results!r}; "
+                "must be two folders, neither in the other"
+            )
+        return self
+
+
+def _check_folder(key: str, folder: str) -> None:
+    """Refuse a folder of the project, of the user's inputs, or of Git."""
+    path = Path(os.path.normpath(Path(folder).absolute()))
+    parents = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
+    reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
+    is_inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
+    if path in parents or path.resolve() in parents or is_inside:
+        raise ValueError(f"{key}: is {folder!r}; must be a folder that is used for nothing else")
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"{key}: is {folder!r}, which is a file; must be a folder")
+
+
+_CONFIGURATION = TypeAdapter(Configuration)
+
+
+def load_config(content: Any) -> Configuration:
+    """Return the top-level configuration. Raises `UserError`."""
+    return checked(_CONFIGURATION, content, "config.yaml")
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
+    content = read_yaml(path, path.name)
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: must be a mapping of keys to values")
+    return content

@@ -1,0 +1,277 @@
+"""The settings files of the smaller jobs.
+
+The plan writes each model as JSON to work/<scene>/<rig>/settings/<stage>.json. A program reads the
+file with --settings. The settings of light fields are in `lightfield.configuration.capture`.
+Reprojections and exports have modules of their own.
+"""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, PlainSerializer, model_validator
+
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.family import Draw, Member
+from lightfield.configuration.keys import import_version
+from lightfield.configuration.scene_source import (
+    FILE,
+    MODEL_KEYS,
+    ModelOptions,
+    ModelPath,
+    Parameters,
+    SceneSource,
+    SharedFolder,
+    check_model,
+)
+from lightfield.configuration.scene_yaml import Credits, load_scene
+from lightfield.configuration.setting_types import AtLeastOne
+from lightfield.core.names import builders
+from lightfield.core.settings import Settings, read_settings
+from lightfield.geometry.rigs import AnyRig, Random, as_written
+from lightfield.geometry.rigs.rig import Frame
+
+
+def _known_builder(name: str) -> str:
+    if name not in builders():
+        raise ValueError(f"must be one of {', '.join(builders())}")
+    return name
+
+
+def _places_as_written(rig: Random) -> dict[str, Any]:
+    """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
+    return {key: value for key, value in as_written(rig).items() if key not in CAMERA_KEYS}
+
+
+# The keys of a rig that say what a camera sees and what its view is for.
+CAMERA_KEYS = ("camera", "split")
+
+
+class BuildSettings(Settings):
+    """The settings of scripts/build_scene.py."""
+
+    builder: Annotated[str, AfterValidator(_known_builder)] = Field(
+        description="Name of the builder, which is a folder in scripts/scenes/."
+    )
+    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
+    fingerprint: str | None = Field(
+        None, description="Hash of the builder's code. If it changes, the scene is built again."
+    )
+
+
+class ImportSettings(ModelOptions):
+    """The settings of scripts/import_model.py."""
+
+    model: ModelPath = Field(description="Path of the model file.")
+    frame: Frame = Field(
+        1, description="Frame of the animation at which the size of the model is measured."
+    )
+    allow_missing: bool = Field(
+        False, description="Import the model even if files that it names are missing."
+    )
+    shared_folder: SharedFolder | None = Field(
+        None, description="Folder with files that the model may name, beside its own folder."
+    )
+    version: int | None = Field(
+        None, description="Version of the importer. If it changes, the model is imported again."
+    )
+    bpy: str | None = Field(
+        None, description="Version of Blender. If it changes, the job runs again."
+    )
+
+    @classmethod
+    def of_source(cls, source: SceneSource) -> Self:
+        """Return the settings that import the model of a scene's ``source``."""
+        keys = {"model", "frame", "allow_missing", "shared_folder", *MODEL_KEYS}
+        return cls(
+            **source.model_dump(include=keys, exclude_none=True),
+            version=import_version(source.light),
+            bpy=version("bpy"),
+        )
+
+    @model_validator(mode="after")
+    def _up_is_unknown(self) -> Self:
+        check_model(self.model, self.up)
+        return self
+
+
+class FreePlacesSettings(Settings):
+    """The settings of scripts/free_places.py."""
+
+    rig: Annotated[Random, PlainSerializer(_places_as_written)] = Field(
+        description="The rig's block in the scene YAML, without camera and split."
+    )
+    frame: Frame | Literal["file"] = Field(
+        1, description=f"Frame to load. {FILE}: the .blend's own."
+    )
+    scene_name: str | None = Field(None, description="As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None, description="As in the scene YAML."
+    )
+
+
+class MeshSettings(Settings):
+    """The settings of scripts/surface.py."""
+
+    formats: list[Literal["glb", "ply"]] = Field(
+        ["glb", "ply"], min_length=1, description="As in the scene YAML."
+    )
+    frame: Frame | Literal["file"] = Field(
+        1, description=f"Frame to load. {FILE}: the .blend's own."
+    )
+    scene_name: str | None = Field(None, description="As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None, description="As in the scene YAML."
+    )
+    numbered: bool = Field(
+        False,
+        description="Whether objects.json lists the numbers that objects have in the passes object "
+        "and instance.",
+    )
+
+
+class FiguresSettings(Settings):
+    """The settings of scripts/report_figures.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+
+
+class Measurement(Settings):
+    """A file that a measurement wrote, and that the page shows."""
+
+    file: str = Field(description="Path of the file.")
+    modified_ns: int | None = Field(
+        None,
+        description="When the file was modified, in nanoseconds. If it changes, the page is made "
+        "again.",
+    )
+
+
+class PageSettings(Settings):
+    """The settings of scripts/report_html.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+    yaml: str = Field(description="Text of the scene YAML.")
+    command: str = Field(description="Command that builds the dataset again.")
+    panorama: bool = Field(
+        False,
+        description="Whether the overview is a panorama. false: it is the view in the rig's "
+        "middle.",
+    )
+    measurements: list[Measurement] = Field(
+        [], description="Files of measurements that the page shows."
+    )
+
+
+class ValidationSettings(Settings):
+    """The settings of scripts/validate.py. Paths are those of the working folder."""
+
+    reprojections: list[str] = Field(
+        [], description="Names of the folders in the dataset that hold reprojections."
+    )
+    exports: list[str] | None = Field(
+        None,
+        description="Paths of the export.json or transforms.json of each export that the dataset "
+        "must have. Without this key, any exports are allowed.",
+    )
+    records: list[str] = Field(
+        [],
+        description="Paths of records, which hold the sizes and checksums with which images were "
+        "written.",
+    )
+
+
+class SequenceValidationSettings(Settings):
+    """The settings of scripts/validate_sequence.py. Paths are those of the working folder."""
+
+    frames: list[str] | None = Field(
+        None,
+        description="Names of the folders of the sequence's frames, in the rig's folder. Without "
+        "this key, all of them.",
+    )
+    exports: list[str] | None = Field(
+        None,
+        description="Paths of the export.json of each export that the sequence must have. Without "
+        "this key, any exports are allowed.",
+    )
+
+
+class PackSettings(Settings):
+    """The settings of scripts/package.py and scripts/publish.py."""
+
+    datasets: list[str] = Field(
+        [],
+        description="Names of the datasets in the folder. If they change, the folder is packed "
+        "again.",
+    )
+    gigabytes: float | None = Field(
+        None,
+        gt=0,
+        description="Largest size of a package's part, or of a shard. Without this key, a package "
+        "is one file, and shards have at most 1 GB.",
+        json_schema_extra={"unit": "GB"},
+    )
+    scene: Credits = Field(
+        Credits(), description="What the card says about the scene, and what publishing needs."
+    )
+
+    @classmethod
+    def given(cls, path: Path | None, scene_name: str, gigabytes: float | None) -> Self:
+        """Return the settings of the file ``path``. Without one, those that the flags give."""
+        if path:
+            return read_settings(cls, path)
+        return cls.of(scene=load_scene(scene_name), gigabytes=gigabytes)
+
+    @property
+    def most_bytes(self) -> float | None:
+        """The largest size of a part, or of a shard, in bytes. None without ``gigabytes``."""
+        return self.gigabytes and self.gigabytes * 1e9
+
+
+class SynthesisSettings(Settings):
+    """The settings of scripts/synthesis_quality.py."""
+
+    truth: list[str] = Field(
+        [],
+        description="Folders of the datasets with which synthesised views are compared. Without "
+        "this key, they are compared with the dataset's own test views.",
+    )
+    views: AtLeastOne = Field(
+        12,
+        description="How many views of each of these datasets are compared.",
+        json_schema_extra={"unit": "views"},
+    )
+
+
+class BatchSettings(Settings):
+    """The settings of scripts/build_members.py."""
+
+    family: str = Field(description="Name of the family's scene YAML.")
+    scene: dict[str, Any] = Field(
+        description="Content of the family's scene YAML, without the block `family`."
+    )
+    values: dict[str, Draw] = Field({}, description="As in the block `family`.")
+    members: list[Member] = Field(min_length=1, description="Members to build.")
+    preset: str = Field(
+        "full", description="Name of the preset, which becomes part of the folder's name."
+    )
+    limits: Preset = Field(Preset(), description="Limits of the preset.")
+    results: str = Field("results", description="Folder in which the datasets are built.")
+    work: str = Field("work", description="Folder for intermediate files.")
+    fingerprint: str | None = Field(
+        None,
+        description="Hash of the builder's code, or version of the importer of models. If it "
+        "changes, the members are built again.",
+    )
+    bpy: str | None = Field(
+        None, description="Version of Blender. If it changes, the job runs again."
+    )
+
+
+class CountSettings(Settings):
+    """The settings of scripts/count_members.py."""
+
+    family: str = Field(description="Name of the family's scene YAML.")
+    records: list[str] = Field(
+        min_length=1, description="Paths of the records of the family's batches."
+    )

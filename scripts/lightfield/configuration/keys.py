@@ -1,0 +1,178 @@
+"""The keys that identify a view's pixels: the scene's fingerprint, the render key, and the seed.
+
+Two views with equal keys have equal pixels. So a finished view is recognised by its key, and never
+rendered twice. A view of other settings has another key.
+
+Two things are not in the key. Pruning changes no byte (see `lightfield.rendering.pruning`). The
+machine changes last digits (see `lightfield.core.machine`), but a build may be resumed on another.
+So each view names the machine that rendered it, and validation reports differences.
+"""
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from lightfield.configuration.scene_source import SceneSource
+from lightfield.core.errors import UserError
+from lightfield.core.names import BUILDERS, SOFTBOXES
+from lightfield.core.paths import files_below
+from lightfield.formats import published
+from lightfield.formats.lightfield import MACHINE, LightField, View
+
+# Raise these when rendering, or the computation of flow, writes other files for equal settings.
+RENDER_VERSION = 4
+FLOW_VERSION = 1
+# The same for the passes of surfaces. Only their views have it in their keys.
+SURFACES_VERSION = 2
+# The same for denoised views of which only a part is rendered.
+PART_VERSION = 1
+# The same for the views of a user's .blend.
+BLEND_VERSION = 1
+# The same for those of them with a pass of numbers, which once replaced what shaders read.
+NUMBERS_VERSION = 1
+# The same for mattes of a user's .blend.
+MATTES_VERSION = 1
+# The same for transparent views of a scene that may have shadow catchers.
+CATCHERS_VERSION = 1
+# Raise this when the import of a model makes another scene of it.
+MODEL_VERSION = 2
+# The same for models in softboxes.
+SOFTBOXES_VERSION = 1
+# Raise this when the import refuses other models. They are imported again, but scenes that stay the
+# same keep their views.
+IMPORT_VERSION = 1
+
+
+# Cached, because a look-up in a package's files takes a millisecond.
+version = cache(metadata.version)
+
+
+def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | None]] = ()) -> str:
+    """Return the identity of a scene YAML's ``scene`` block: 64 hexadecimal digits.
+
+    - A .blend: its SHA-256, and the path and SHA-256 of each of the ``external`` files that it
+      reads. None stands for a missing file. Raises `UserError` if its own SHA-256 is unknown.
+    - Somebody else's views: their lightfield.json.
+    - A builder: its source code, that of the builders' library and of builders whose pieces it
+      uses, the parameters, and bpy's version.
+      The built .blend does not count: it holds memory addresses, which differ between builds.
+    """
+    if source.blend:
+        if source.sha256 is None:
+            raise UserError(f"{source.blend}: its sha256 is not known; check_blend.py records it")
+        return _digest([source.sha256, external]) if external else source.sha256
+    if source.dataset:
+        return _digest(published.fingerprint(source.dataset))
+    assert source.builder
+    files = []
+    for folder in _builder_folders(source.builder):
+        for file in _sources(folder):
+            files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
+    return _digest([files, source.parameters.model_dump(exclude_none=True), version("bpy")])
+
+
+def _sources(folder: str) -> list[Path]:
+    """Return the files of source code in a folder of builders."""
+    return [file for file in files_below(BUILDERS / folder) if file.suffix == ".py"]
+
+
+def _builder_folders(builder: str) -> list[str]:
+    """Return the folders with a builder's source: the library, its own, and those that it uses."""
+    folders = ["library", builder]
+    for folder in folders:
+        for file in _sources(folder):
+            imported = re.findall(r"^from scenes\.(\w+)", file.read_text(), re.MULTILINE)
+            folders += [name for name in dict.fromkeys(imported) if name not in folders]
+    return folders
+
+
+def model_version(light: str) -> int:
+    """Return the version of the import of models in a ``light``."""
+    return MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
+
+
+def import_version(light: str) -> int:
+    """Return what changes whenever models in a ``light`` must be imported again."""
+    return model_version(light) + IMPORT_VERSION
+
+
+def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
+    """Return the identity of an imported model: 64 hexadecimal digits.
+
+    ``options`` say how it was imported, and its ``light``. ``files`` are path and SHA-256 of each
+    file that it was read from. None stands for a missing file.
+    """
+    return _digest([model_version(options["light"]), version("bpy"), dict(options), files])
+
+
+def render_key(lightfield: LightField, view: View) -> str:
+    """Return the key of one of the views of a light field: 64 hexadecimal digits."""
+    pose = view.matrix.tolist()
+    content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
+    key = [RENDER_VERSION, version("bpy"), content, view.name, pose]
+    if any(view_pass.unless for view_pass in lightfield.passes):
+        key.append(SURFACES_VERSION)
+    if renders_part(lightfield) and lightfield.render["denoise"]:
+        key.append(["part", PART_VERSION])
+    if _is_of_blend(lightfield):
+        key.append(["blend", BLEND_VERSION])
+        if any(view_pass.kind == "id" for view_pass in lightfield.passes):
+            key.append(["numbers", NUMBERS_VERSION])
+        if any(view_pass.kind == "matte" for view_pass in lightfield.passes):
+            key.append(["mattes", MATTES_VERSION])
+    if lightfield.transparent and _may_have_shadow_catchers(lightfield):
+        key.append(["catchers", CATCHERS_VERSION])
+    return _digest(key)
+
+
+def _is_of_blend(lightfield: LightField) -> bool:
+    """Return whether the scene is a user's .blend: neither built nor a model."""
+    scene = lightfield.content.get("scene", {})
+    return "fingerprint" in scene and not scene.keys() & {"builder", "unit"}
+
+
+def _may_have_shadow_catchers(lightfield: LightField) -> bool:
+    """Return whether the scene is a user's .blend, or a model on a ground."""
+    return _is_of_blend(lightfield) or lightfield.content.get("scene", {}).get("ground", False)
+
+
+def renders_part(lightfield: LightField) -> bool:
+    """Return whether views are rendered only where they can show something: a model.
+
+    Without denoising, this changes no byte.
+    """
+    return (
+        "unit" in lightfield.content.get("scene", {})
+        and lightfield.transparent
+        and not lightfield.passes
+        and lightfield.content["camera"]["type"] == "PERSP"
+    )
+
+
+def names_key(lightfield: LightField) -> str:
+    """Return the key of the numbers of a light field's objects and materials."""
+    return _digest([RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
+
+
+def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:
+    """Return the key of the flow between two views, whose SHA-256 checksums are ``sums``."""
+    poses = [view.matrix.tolist(), other.matrix.tolist()]
+    return _digest([FLOW_VERSION, lightfield.lens.to_lightfield(), poses, list(sums)])
+
+
+def view_seed(seed: int, name: str) -> int:
+    """Return the Cycles seed, 0 to 2^31 − 1, of the view ``name`` under the scene's ``seed``."""
+    return int(_digest([seed, name])[:8], 16) & 0x7FFFFFFF
+
+
+def _digest(content: Any) -> str:
+    return _hash(json.dumps(content, sort_keys=True, allow_nan=False).encode())
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

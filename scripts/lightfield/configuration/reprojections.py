@@ -1,0 +1,178 @@
+"""The settings of a reprojection, in a scene YAML and in the programs' settings files.
+
+A scene YAML's entry of `reprojections` becomes `ReprojectionSettings`. The plan writes them to a
+settings file, which scripts/reproject.py and scripts/lens_map.py read with --settings.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+from typing_extensions import TypeAliasType
+
+from lightfield.configuration.setting_types import Primaries
+from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.formats.sensors import SensorSettings
+from lightfield.geometry.lenses import CameraSettings, Lens
+from lightfield.geometry.lenses.cube_map import CubeMap
+
+MOST_SAMPLES = 64
+"""Samples along each side of a pixel."""
+
+LIGHT_GROUPS = "light_groups"
+"""Among the passes of a reprojection: those of all light groups."""
+
+LENS_MAP_KEYS = {"camera", "cube_map", "rotation", "filter", "samples"}
+"""The settings on which a lens map depends."""
+
+# A group's factor, or its factors of red, green and blue.
+_Strength = Annotated[float, Field(ge=0, le=1e6)]
+_Colour = TypeAliasType("_Colour", Annotated[tuple[_Strength, _Strength, _Strength], as_list(3)])
+Light = Literal["each"] | dict[str, _Strength | _Colour]
+"""The strengths of light groups by name. each: every group alone."""
+
+Stops = Annotated[float, Field(ge=-100, le=100)]
+
+
+class ReprojectionOptions(Settings):
+    """The options that a scene YAML shares with the programs' settings files."""
+
+    camera: CameraSettings | None = Field(
+        None,
+        description="Lens and image of the result. Without this key, they are those of the views, "
+        "and nothing is resampled.",
+    )
+    cube_map: bool = Field(
+        False, description="Make six views of 90° from each view, as the faces of a cube."
+    )
+    rotation: Vector = Field(
+        (0.0, 0.0, 0.0),
+        description="Rotation of the camera: pan to the left, pitch downward, and roll clockwise.",
+        json_schema_extra={"unit": "degrees"},
+    )
+    filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
+        "adaptive",
+        description="Filter that resamples colour. adaptive averages over the whole area of each "
+        "pixel, so it also suits smaller images.",
+    )
+    samples: int = Field(
+        1,
+        ge=1,
+        le=MOST_SAMPLES,
+        description="Samples along each side of a pixel: n gives n × n samples.",
+        json_schema_extra={"unit": "samples"},
+    )
+    bits: Literal[8, 16] = Field(
+        8, description="Bits per channel of a PNG.", json_schema_extra={"unit": "bits"}
+    )
+    reinhard: float = Field(
+        1.0,
+        ge=1e-9,
+        le=1e9,
+        description="Reinhard tone mapping: the value that becomes white. 1: no tone mapping.",
+        json_schema_extra={"unit": "light"},
+    )
+
+    @model_validator(mode="after")
+    def _camera_fits(self) -> Self:
+        if self.camera is None:
+            return self
+        if self.camera.lens == "file":
+            raise ValueError("camera.lens: file is only for a rig of type blend_camera")
+        if self.cube_map and (problem := face_problem(self.camera)):
+            raise ValueError(f"camera{problem}")
+        return self
+
+    def lens(self, source: Lens) -> Lens:
+        """Return the lens of the new images. ``source`` is the lens of the views."""
+        if self.camera is None:
+            return source
+        if self.cube_map:
+            size = self.camera.resolution[0]
+            return CubeMap(width=6 * size, height=size).face
+        return self.camera.make()
+
+
+class ReprojectionSettings(ReprojectionOptions):
+    """The settings of scripts/reproject.py. scripts/lens_map.py needs only `LENS_MAP_KEYS`."""
+
+    formats: list[Literal["exr", "png"]] = Field(
+        [], description="Formats of the images to write. EXR also holds depth."
+    )
+    exposure: Stops = Field(
+        0.0, description="Exposure of the images.", json_schema_extra={"unit": "stops"}
+    )
+    depth_png: float | None = Field(
+        None,
+        gt=0,
+        description="Steps per metre of 16-bit depth maps. They end at 65535 steps. Without this "
+        "key, no such maps are written.",
+        json_schema_extra={"unit": "steps/m"},
+    )
+    mask: bool = Field(
+        False, description="Also write masks of the pixels that the source views do not see."
+    )
+    passes: list[str] = Field([], description="Names of passes that are also reprojected.")
+    relight: Light | None = Field(
+        None,
+        description="Light of the images: strengths of light groups, as in relight of the scene "
+        "YAML.",
+    )
+    primaries: Primaries | None = Field(
+        None,
+        description="Colour space of EXR images, which the files name in their attribute "
+        "chromaticities.",
+    )
+    sensor: SensorSettings | None = Field(
+        None, description="Sensor that makes the PNG images, instead of exposure and reinhard."
+    )
+
+    @model_validator(mode="after")
+    def _sensor_writes_png(self) -> Self:
+        if self.sensor and self.formats != ["png"]:
+            raise ValueError("formats: must be [png] with sensor, which writes no other")
+        return self
+
+    @property
+    def lens_map_settings(self) -> dict[str, Any]:
+        """The content of a lens map's settings file."""
+        return self.as_json(LENS_MAP_KEYS)
+
+    @property
+    def development(self) -> dict[str, Any]:
+        """The settings that turn light into pixels."""
+        settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
+        if self.sensor:
+            settings = {"sensor": self.sensor.as_json()}
+        if self.primaries:
+            settings["primaries"] = self.primaries
+        # 8 is left out, so that the keys of earlier versions stay valid.
+        if self.bits != 8:
+            settings["bits"] = self.bits
+        if self.relight is not None:
+            settings["relight"] = self.as_json({"relight"})["relight"]
+        return settings
+
+    @property
+    def published(self) -> dict[str, Any]:
+        """The settings in lightfield.json and the images' headers, beside the lens.
+
+        ``rotation`` is pan, pitch and roll in degrees. `lightfield.imaging.tonemap` defines
+        ``exposure`` and ``reinhard``, with which a reader can turn a PNG back into light. For a
+        sensor, the file of each view's parameters does that.
+        """
+        return {
+            "rotation": list(self.rotation),
+            "filter": self.filter,
+            "samples": self.samples,
+            **self.development,
+        }
+
+
+def face_problem(camera: CameraSettings) -> str | None:
+    """Return why a camera cannot be a cube map's face, as text after its key. None if it can."""
+    if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
+        return ": must be rectilinear with fov 90 with cube_map"
+    if camera.resolution[0] != camera.resolution[1]:
+        size = list(camera.resolution)
+        return f".resolution: is {size}; must be square with cube_map"
+    return None

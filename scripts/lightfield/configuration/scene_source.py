@@ -1,0 +1,209 @@
+"""The block `scene` of a scene YAML: the builder, .blend, model or views that a scene is from."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from lightfield.configuration.setting_types import QUOTED
+from lightfield.core.names import LIGHTS, MODELS, SOFTBOXES, UP, builders
+from lightfield.core.settings import AS_WRITTEN, Address, Settings, pattern
+from lightfield.geometry.rigs.rig import Frame
+
+
+class Parameters(Settings):
+    """The parameters of a builder."""
+
+    seed: int = Field(
+        0,
+        ge=0,
+        le=2**63 - 1,
+        description="Seed of everything random. Another seed gives other positions and shapes of "
+        "objects.",
+    )
+    detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
+        1.0,
+        description="Level of detail of plants and meshes. 1 is full detail, and less is faster.",
+    )
+    place: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = Field(
+        None,
+        description="Number of a variant of the scene, with another layout, materials and light. "
+        "Without this key, the scene has the builder's own layout. The builder `room` has no "
+        "other.",
+    )
+
+
+_MODEL_SUFFIXES = "|".join(suffix[1:] for suffix in (*MODELS, *map(str.upper, MODELS)))
+
+
+class ModelOptions(Settings):
+    """How a model file becomes a scene."""
+
+    unit: Literal["box", "metres"] = Field(
+        "box",
+        description="Size of a model. box: its largest side becomes 1 m, and its middle moves to "
+        "the origin. metres: it keeps its size and position.",
+    )
+    up: Literal["auto", "y", "z"] = Field(
+        "auto",
+        description="Axis that points up in an OBJ, PLY or STL model. auto: y for OBJ, z for PLY "
+        "and STL. glTF and USD files define it themselves.",
+    )
+    ground: bool = Field(
+        False,
+        description="Put a floor under the model, which receives its shadow.",
+    )
+    light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
+        SOFTBOXES,
+        description="Light of a model. softboxes: three lamps and a grey world. Any other name: "
+        "the environment of this name that comes with Blender.",
+    )
+
+    @field_validator("light")
+    @classmethod
+    def _exists(cls, light: str) -> str:
+        if light not in LIGHTS:
+            raise ValueError(f"must be one of {', '.join(LIGHTS)}")
+        return light
+
+
+def check_model(model: str, up: str) -> None:
+    """Raise a ValueError if ``up`` is given for a model that says itself which axis points up."""
+    if up != "auto" and Path(model).suffix.lower() not in UP:
+        raise ValueError(
+            "up: is only for OBJ, PLY and STL; glTF and USD files define it themselves"
+        )
+
+
+ModelPath = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            rf"^{QUOTED}\.({_MODEL_SUFFIXES})$",
+            f"a path that ends in {', '.join(MODELS)}, without {{ }} * ? [ ] and line breaks",
+        )
+    ),
+]
+SharedFolder = Annotated[
+    str,
+    Field(
+        pattern=pattern(rf"^{QUOTED}$", "a path of a folder, without { } * ? [ ] and line breaks")
+    ),
+]
+# The word in a scene YAML that stands for the .blend's own value.
+FILE = "file"
+# Keys of `SceneSource` that only a .blend takes.
+BLEND_KEYS = (
+    *("scene_name", "view_layers", "followed_camera", "allow_missing", "sha256", "url", "page"),
+)
+# Keys of `SceneSource` that only a model takes.
+MODEL_KEYS = tuple(ModelOptions.model_fields)
+
+
+class Origin(Settings):
+    """Where a scene is from: a builder, a .blend, a model file, or views that exist already."""
+
+    builder: str | None = Field(
+        None,
+        pattern=pattern(
+            "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
+        ),
+        description="Name of the builder, which is a folder in scripts/scenes/.",
+    )
+    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
+    blend: str | None = Field(
+        None,
+        pattern=pattern(
+            rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
+        ),
+        description="Path of your own .blend file, relative to the folder in which Snakemake runs.",
+    )
+    model: ModelPath | None = Field(
+        None,
+        description="Path of a model file (glTF, USD, OBJ, PLY or STL), relative to the folder in "
+        "which Snakemake runs.",
+    )
+    dataset: str | None = Field(
+        None,
+        description="Folder of existing views, which replace rendering: a light field in SILVR's "
+        "layout (lightfield.json and exr/), or a folder of several.",
+    )
+    scene_name: str | None = Field(
+        None,
+        description="Name of the scene in the .blend to render. Without this key, it is the scene "
+        "that was active when the .blend was saved.",
+    )
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None,
+        min_length=1,
+        description="View layers of that scene, which are rendered together into one picture. all: "
+        "every layer that is enabled for rendering. Without this key, only the first of these.",
+    )
+    frame: Frame | Literal["file"] = Field(
+        1,
+        description="Frame of the animation to render. file: the frame at which the .blend was "
+        "saved. The size of a model is measured at this frame.",
+    )
+    followed_camera: Literal["file", "view"] | None = Field(
+        None,
+        description="Camera that objects of the .blend follow, as billboards do. file, which is "
+        "the default: the .blend's camera, so all views show the same scene. view: each view's "
+        "own, as if Blender rendered the .blend with that camera.",
+    )
+    allow_missing: bool | None = Field(
+        None,
+        description="Render even if files of the .blend or model are missing or cannot be read: "
+        "textures, fonts, libraries, volumes or caches. Missing textures are magenta.",
+    )
+    shared_folder: SharedFolder | None = Field(
+        None,
+        description="Folder with files that several models share, such as textures, relative to "
+        "the folder in which Snakemake runs. A model may name files there, and in its own folder. "
+        "Subfolders count.",
+    )
+    sha256: str | None = Field(
+        None,
+        pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
+        description="SHA-256 that the .blend file must have, as sha256sum prints it. Without this "
+        "key, it is the one recorded at first use.",
+    )
+    url: Address | None = Field(
+        None, description="Address from which the .blend file is downloaded if it is missing."
+    )
+    page: Address | None = Field(
+        None, description="Web page from which you can download the .blend file by hand."
+    )
+
+
+class SceneSource(ModelOptions, Origin):
+    """Where a scene comes from. A model has more keys, in the next table."""
+
+    @model_validator(mode="after")
+    def _one_of_four(self) -> Self:
+        if [self.builder, self.blend, self.model, self.dataset].count(None) != 3:
+            raise ValueError("must have one of builder, blend, model and dataset")
+        if self.builder is not None:
+            names = builders()
+            if self.builder not in names:
+                raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
+            for name in BLEND_KEYS:
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name}: is only for blend, not for builder")
+            if self.frame == FILE:
+                raise ValueError("frame: file is only for blend, not for builder")
+        elif self.dataset is not None and len(self.model_fields_set) > 1:
+            (name, *_) = self.model_fields_set - {"dataset"}
+            raise ValueError(f"{name}: does not go with dataset")
+        elif self.model is not None:
+            for name in (*BLEND_KEYS, "parameters"):
+                if name in self.model_fields_set and name != "allow_missing":
+                    raise ValueError(f"{name}: does not go with model")
+            if self.frame == FILE:
+                raise ValueError("frame: file is only for blend, not for model")
+            check_model(self.model, self.up)
+        elif self.blend is not None and "parameters" in self.model_fields_set:
+            raise ValueError("parameters: is only for builder, not for blend")
+        for name in (*MODEL_KEYS, "shared_folder"):
+            if self.model is None and name in self.model_fields_set:
+                raise ValueError(f"{name}: is only for model")
+        return self

@@ -1,1 +1,0 @@
-"""What a dataset is: its configuration, its keys, its records."""

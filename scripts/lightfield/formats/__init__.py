@@ -1,0 +1,1 @@
+"""The files of a dataset that others read: lightfield.json, passes, splits, inventories, layout."""

@@ -1,0 +1,222 @@
+"""Where a dataset's files lie: its views, passes, reprojections and exports, and its checksums.
+
+A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections. Each reprojection is
+a folder with its own lightfield.json and images.
+"""
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from lightfield.core.files import sha256, write_text
+from lightfield.core.paths import inside, place_in
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.passes import FLOW, NAMES, Pass
+from lightfield.formats.sensors import SensorSettings, parameter_file, settings_in
+
+IMAGES = "exr"
+"""The folder of a dataset's own views."""
+
+SUMS = "sha256sums.txt"
+"""The file with a dataset's checksums. Only a valid dataset has it."""
+
+OUTPUTS = ("validation.json", SUMS)
+"""The files in a dataset that its validation writes."""
+
+REPORT = "report"
+"""The folder in a dataset that is not published with it."""
+
+README = "README.md"
+CARD = "card.json"
+"""README and CARD are the files that a package adds to a dataset."""
+
+DEPTH_PICTURE = "{view}_depth.png"
+"""The picture that scripts/reproject.py puts beside a view with --depth-png."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """How to find the files of one kind of export, so that they are published and checked.
+
+    - ``lists``: a glob pattern for the export's lists, which lie beside a lightfield.json.
+    - ``pictures``: reads a list, and returns the paths of its images, relative to the list. They
+      have the size of the views. Raises `UserError` for a file that is no such list.
+    - ``beside``: names with ``{view}`` of images that may lie beside the views and beside those
+      pictures. They have the same size.
+    - ``files``: returns the SHA-256 of every file of the export, if its list has them.
+    """
+
+    lists: str
+    pictures: Callable[[Path], Sequence[str]]
+    beside: tuple[str, ...] = ()
+    files: Callable[[Path], Mapping[str, str]] = lambda _: {}
+
+
+@dataclass(frozen=True, eq=False)
+class ImageSet:
+    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
+
+    ``source`` are the dataset's own views, from which those of a reprojection were made.
+    """
+
+    name: str
+    lightfield: LightField
+    source: "ImageSet | None" = None
+
+    @property
+    def folder(self) -> str:
+        """The folder of its images, relative to the dataset."""
+        return self.name or IMAGES
+
+    @property
+    def prefix(self) -> str:
+        """The prefix of its files' paths and of its checks' names."""
+        return f"{self.name}/" if self.name else ""
+
+    @cached_property
+    def sensor(self) -> SensorSettings | None:
+        """The settings of the sensor that developed the views. None if there is none."""
+        return settings_in(self.lightfield.content)
+
+    @cached_property
+    def views(self) -> list[str]:
+        return [view.name for view in self.lightfield.views]
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """The positions of its views by their names."""
+        return {name: number for number, name in enumerate(self.views)}
+
+
+@dataclass(frozen=True)
+class File:
+    """An image file: its ``path`` relative to the dataset, its set, and its view.
+
+    Masks, depth maps and pictures for trainers are not views: their ``view`` is −1. They only need
+    to be readable and of their set's size. ``of_pass`` is the pass of the view that the file holds.
+    """
+
+    path: str
+    set: int
+    view: int = -1
+    of_pass: Pass | None = None
+
+    @property
+    def is_view(self) -> bool:
+        """Whether it is a view's picture, not a pass or a picture beside it."""
+        return self.view >= 0 and self.of_pass is None
+
+
+def read_set(dataset: Path, name: str, source: ImageSet | None = None) -> ImageSet:
+    """Read the lightfield.json of a dataset (``name`` "") or a reprojection. Raises `UserError`."""
+    lightfield = LightField.read(dataset / name / NAME)
+    settings_in(lightfield.content)
+    return ImageSet(name, lightfield, source)
+
+
+def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
+    """Return the set of the rendered views, or None if its lightfield.json could not be read."""
+    return sets[0] if sets and not sets[0].name else None
+
+
+def source_view(source: ImageSet | None, name: str) -> int | None:
+    """Return the number of the view from which the reprojected view ``name`` was made.
+
+    Return None if there is no such view.
+    """
+    numbers = source.numbers if source else {}
+    # The names of a light and of a cube map's face follow the view's name.
+    while name not in numbers and "_" in name:
+        name = name.rpartition("_")[0]
+    return numbers.get(name)
+
+
+def view_files(dataset: Path, image_set: ImageSet, number: int) -> tuple[list[File], list[str]]:
+    """Return the files of a set's views that exist, and the paths of those that are missing.
+
+    ``number`` is the set's place among the sets. A reprojection is EXR, PNG or both: if one view
+    has a format, all views must have it.
+    """
+    present = file_names(dataset / image_set.folder)
+    files = []
+    missing = []
+    for suffix in _formats(image_set, present):
+        for view, name in enumerate(image_set.views):
+            path = f"{image_set.folder}/{name}{suffix}"
+            if name + suffix in present:
+                files.append(File(path, number, view))
+            else:
+                missing.append(path)
+    return files, missing
+
+
+def _formats(image_set: ImageSet, present: Set[str]) -> list[str]:
+    """Return the suffixes of a set's views: those that any view has. EXR if no view is there."""
+    allowed = (".exr", ".png") if image_set.name else (".exr",)
+    formats = []
+    for suffix in allowed:
+        if any(view + suffix in present for view in image_set.views):
+            formats.append(suffix)
+    return formats or [".exr"]
+
+
+def file_names(folder: Path) -> set[str]:
+    """Return the names of the files in a folder."""
+    return {path.name for path in folder.glob("*") if path.is_file()}
+
+
+def pass_files(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[str]]:
+    """Return the existing files of passes and flow, and the paths of those that are missing."""
+    files = expected_pass_files(sets)
+    present = [file for file in files if (dataset / file.path).is_file()]
+    missing = {file.path for file in files} - {file.path for file in present}
+    return present, sorted(missing)
+
+
+def expected_pass_files(sets: Sequence[ImageSet]) -> list[File]:
+    """Return the files of passes and flow that the sets must have."""
+    files = []
+    for number, image_set in enumerate(sets):
+        folder = Path(image_set.name)
+        for index, view in enumerate(image_set.lightfield.views):
+            for view_pass in image_set.lightfield.passes:
+                path = view_pass.path(folder, view.name).as_posix()
+                files.append(File(path, number, index, view_pass))
+            if view.flow:
+                path = FLOW.path(folder, view.flow).as_posix()
+                files.append(File(path, number, index, FLOW))
+    return files
+
+
+def json_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the JSON files beside images: names of ids, and sensors' parameters."""
+    rendered_set = rendered(sets)
+    passes = rendered_set.lightfield.passes if rendered_set else []
+    paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    for image_set in sets:
+        if image_set.sensor:
+            paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]
+    return paths
+
+
+def read_sums(path: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file that a sha256sums.txt names.
+
+    Raises `UserError` for a name that leads out of the folder of the list.
+    """
+    sums = {}
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        digest, separator, name = line.partition("  ")
+        if separator:
+            inside(path.parent, name, f"{path}: line {number}")
+            sums[name] = digest
+    return sums
+
+
+def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
+    """Write ``checksums`` as sha256sum does, and the sum of ``result`` if the dataset holds it."""
+    sums = dict(checksums)
+    if place := place_in(dataset, result):
+        sums[place.as_posix()] = sha256(result)
+    write_text(path, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))

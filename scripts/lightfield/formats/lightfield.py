@@ -1,0 +1,330 @@
+"""lightfield.json: the lens of a dataset, and the pose of each of its views.
+
+SILVR's keys are ``camera``, ``lf_type``, ``resolution``, ``sensor_size`` and ``frames``. Files that
+SILVR's tools wrote have these alone, and are read, too. Ours are:
+
+- ``depth``: what channel Z of the views means.
+- ``frame``: the frame of the scene that was rendered.
+- ``scene`` and ``render``: what was rendered, and how.
+- ``machine``: what of the machine changes last digits.
+- ``passes``: the passes that a reprojection has, of those in ``render``.
+- ``split`` of a frame: what the view is for.
+- ``flow`` of a frame: the view to which its flow leads.
+- ``exposure`` of a frame: the camera-to-world matrices at the ``start`` and the ``end`` of the
+  exposure of a moving camera. ``world_matrix`` is that in its middle.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.formats import passes
+from lightfield.formats.passes import PASSES, Pass
+from lightfield.geometry import lenses, rotations
+from lightfield.geometry.exposure import pose_at
+from lightfield.geometry.flow import neighbours
+from lightfield.geometry.frames import Frame, read_frames
+from lightfield.geometry.lenses import Lens
+
+if TYPE_CHECKING:
+    from lightfield.geometry import rigs
+
+Floats = NDArray[np.float64]
+
+NAME = "lightfield.json"
+# Metres between the eyes of a pair. Views of a file with this key have no centre.
+OMNIDIRECTIONAL = "omnidirectional_stereo"
+# The poses of a moving camera, of a frame.
+EXPOSURE = "exposure"
+# What of the machine changes bytes, where the file was made. Each view names its own machine.
+MACHINE = "machine"
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A view, which SILVR calls a frame. Here frames are those of an animated scene.
+
+    ``matrix`` (4, 4) is camera-to-world, in metres. The camera looks along −Z, and +Y is up.
+    ``position`` (3,) in metres and ``rotation`` (3,) give the same pose. The rotation is Blender's:
+    XYZ Euler angles in radians. ``others`` are the frame's other keys.
+    """
+
+    name: str
+    matrix: Floats
+    position: Floats
+    rotation: Floats
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def placed(cls, name: str, matrix: Floats, others: Mapping[str, Any] | None = None) -> "View":
+        """Return the view with a camera-to-world matrix (4, 4)."""
+        rotation = rotations.matrix_to_euler(matrix[:3, :3])
+        return cls(name, matrix, matrix[:3, 3], rotation, others or {})
+
+    @classmethod
+    def from_frame(cls, frame: Frame) -> "View":
+        """Return the view of a frame. Where a form of the pose is missing, the other gives it."""
+        matrix = frame.matrix
+        if matrix is None:
+            assert frame.position is not None
+            assert frame.rotation is not None
+            matrix = np.eye(4)
+            matrix[:3, :3] = rotations.euler_to_matrix(frame.rotation)
+            matrix[:3, 3] = frame.position
+        if frame.position is None or frame.rotation is None:
+            return cls.placed(frame.name, matrix, frame.others)
+        return cls(frame.name, matrix, frame.position, frame.rotation, frame.others)
+
+    @property
+    def split(self) -> str | None:
+        """What the view is for: ``train``, ``validation`` or ``test``. None without a split."""
+        return self.others.get("split")
+
+    @property
+    def exposure(self) -> tuple[Floats, Floats] | None:
+        """The camera-to-world matrices (4, 4) at the start and the end of the exposure.
+
+        None if the camera stands still.
+        """
+        poses = self.others.get(EXPOSURE)
+        return (np.array(poses["start"]), np.array(poses["end"])) if poses else None
+
+    @property
+    def flow(self) -> str | None:
+        """The name of the view's flow, <view>_to_<other view>; None without flow."""
+        return f"{self.name}_to_{self.others['flow']}" if "flow" in self.others else None
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "position": self.position.tolist(),
+            "rotation": self.rotation.tolist(),
+            "world_matrix": self.matrix.tolist(),
+            **self.others,
+        }
+
+
+@dataclass(eq=False)
+class LightField:
+    """A lightfield.json. ``content`` holds its keys without ``frames``, which are the ``views``.
+
+    All views share ``lens``. ``depth`` is what channel Z of the views means: "z", along the optical
+    axis, "distance", or None for no depth. SILVR's files lack this key. Then it is "z" if the lens
+    can have that. Raises `UserError`, one line with ``path`` and the key, for an unknown lens, a
+    depth that the lens cannot have, and unknown passes.
+    """
+
+    content: Mapping[str, Any]
+    views: Sequence[View]
+    path: Path = Path(NAME)
+    lens: Lens = field(init=False)
+    depth: str | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        try:
+            self.lens = lenses.from_lightfield(self.content)
+        except UserError as error:
+            raise UserError(f"{self.path}: {error}") from None
+        usual = self.lens.usual_depth
+        self.depth = self.content.get("depth", usual)
+        if self.depth not in (None, "distance", usual):
+            raise UserError(
+                f"{self.path}: depth: is {self.depth!r}; with this lens it must be "
+                f"{'z, ' if usual == 'z' else ''}distance or null"
+            )
+        try:
+            self.passes  # noqa: B018
+        except (LookupError, TypeError):
+            raise UserError(f"{self.path}: passes: must be of {', '.join(PASSES)}") from None
+
+    @classmethod
+    def from_rig(cls, rig: "rigs.Rig | Mapping[str, Any]", lens: Lens, **keys: Any) -> "LightField":
+        """Return the light field that a rig sees through a lens. ``keys`` are added to the file.
+
+        Raises `UserError` if a cube map's lens is not a 90° rectilinear one.
+        """
+        # Imported here, because most programs read a file and need no rig's settings.
+        from lightfield.geometry import rigs
+
+        rig = rigs.from_settings(rig)
+        intrinsics = lens.to_lightfield()
+        if rig.cube_map:
+            diagonal = np.diagonal(intrinsics["camera"].get("projection_matrix", np.zeros((4, 4))))
+            if not np.allclose(diagonal[:2], 1.0, rtol=0, atol=1e-6):
+                raise UserError("cube_map: its camera must be rectilinear with fov: 90 and square")
+        content = {
+            "camera": intrinsics["camera"],
+            "lf_type": rig.lf_type,
+            "resolution": intrinsics["resolution"],
+            "sensor_size": intrinsics["sensor_size"],
+            **keys,
+        }
+        views = [
+            View(
+                pose.name,
+                np.round(pose.matrix(), 12) + 0.0,  # without noise such as 6e-17 or −0
+                np.array(pose.position),
+                np.array(pose.rotation),
+                {"split": pose.split} if pose.split else {},
+            )
+            for pose in rig.poses()
+        ]
+        return cls(content, views)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "LightField":
+        """Read a file. Raises `UserError`, one line that names the file and the wrong key.
+
+        `lightfield.geometry.frames` says which poses are read. If a frame gives its pose in both
+        forms, they are not compared: validation does that.
+        """
+        path = Path(path)
+        content = read_json(path)
+        if not isinstance(content, dict):
+            raise UserError(f"{path}: must be a mapping, not a {type(content).__name__}")
+        return cls.from_json(content, path)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any], path: Path = Path(NAME)) -> "LightField":
+        """Return the light field of a file's ``content``. Raises the errors of `read`."""
+        others = dict(content)
+        frames = others.pop("frames", None)
+        lightfield = cls(others, (), path)
+        try:
+            views = [View.from_frame(frame) for frame in read_frames(frames)]
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        return replace(lightfield, views=views)
+
+    def write(self, path: Path | str) -> None:
+        """Write the file, atomically."""
+        write_json(path, self.to_json())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the file's content."""
+        return {**self.content, "frames": [view.to_json() for view in self.views]}
+
+    def changed(
+        self, lens: Lens | None = None, views: Sequence[View] | None = None, **keys: Any
+    ) -> "LightField":
+        """Return a copy with another lens, with other views, or with other values of ``keys``."""
+        intrinsics = lens.to_lightfield() if lens else {}
+        return replace(
+            self,
+            content={**self.content, **intrinsics, **keys},
+            views=self.views if views is None else views,
+        )
+
+    def with_flow(self) -> "LightField":
+        """Return a copy in which the flow of each view leads to a neighbour."""
+        targets = [self.views[number].name for number in neighbours(self.matrices)]
+        return self.changed(
+            views=[
+                replace(view, others={**view.others, "flow": target})
+                for view, target in zip(self.views, targets, strict=True)
+            ]
+        )
+
+    def with_exposure(self) -> "LightField":
+        """Return a copy whose views have the poses at the start and the end of their exposures."""
+        motion = self.render["camera_motion"]
+        views = []
+        for view in self.views:
+            matrices = {}
+            for name, time in (("start", -0.5), ("end", 0.5)):
+                pose = pose_at(view.matrix, motion["travel"], motion["turn"], time)
+                matrices[name] = (np.round(pose, 12) + 0.0).tolist()
+            views.append(replace(view, others={**view.others, EXPOSURE: matrices}))
+        return self.changed(views=views)
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the file lies in."""
+        return self.path.parent
+
+    @cached_property
+    def matrices(self) -> Floats:
+        """The views' camera-to-world matrices, (n, 4, 4)."""
+        return np.array([view.matrix for view in self.views]).reshape(-1, 4, 4)
+
+    @property
+    def frame(self) -> float:
+        """The frame of the scene that was rendered.
+
+        Only a .blend's own frame may have a fraction: `frame: file` of a file saved between two.
+        """
+        frame: float = self._key("frame", (int, float), "a number")
+        return frame
+
+    @property
+    def scene(self) -> Mapping[str, Any]:
+        """What was rendered: ``name``, ``fingerprint`` and how the scene was built."""
+        scene: Mapping[str, Any] = self._key("scene")
+        return scene
+
+    @property
+    def render(self) -> Mapping[str, Any]:
+        """How it was rendered: the scene YAML's ``render`` block."""
+        render: Mapping[str, Any] = self._key("render")
+        return render
+
+    @property
+    def passes(self) -> list[Pass]:
+        """What the views have beside colour and depth. A reprojection may have fewer passes."""
+        return passes.selected(self.content if "passes" in self.content else self._render)
+
+    @property
+    def light_groups(self) -> list[str]:
+        """The names of the light groups that the views have a pass of each."""
+        passes_of_groups = [each for each in self.passes if passes.is_group(each)]
+        return [each.name.removeprefix(passes.GROUP_PREFIX) for each in passes_of_groups]
+
+    @property
+    def is_relit(self) -> bool:
+        """Whether the views show the scene under another light than they were rendered in."""
+        return "relight" in self.content.get("reprojection", {})
+
+    @property
+    def follows_views(self) -> bool:
+        """Whether objects of the scene follow each view's camera: each view shows another scene."""
+        scene = self.content.get("scene")
+        return isinstance(scene, Mapping) and scene.get("followed_camera") == "view"
+
+    @property
+    def transparent(self) -> bool:
+        """Whether the views' channel A is how much of a pixel the scene covers."""
+        return bool(self._render.get("transparent"))
+
+    def require_rig(self, rig: "rigs.Rig") -> None:
+        """Raise `UserError` if the file and a rig differ in the number of views."""
+        if rig.view_count != len(self.views):
+            raise UserError(
+                f"{self.path}: frames: are {len(self.views)}, but its rig has {rig.view_count}"
+            )
+
+    def require_centre(self) -> None:
+        """Raise `UserError` if the rays of a view do not start from one point."""
+        if OMNIDIRECTIONAL in self.content:
+            raise UserError(
+                f"{self.path}: {OMNIDIRECTIONAL}: its views have no centre; no other lens sees "
+                "what they see, and no other program reads their poses"
+            )
+
+    @property
+    def _render(self) -> Mapping[str, Any]:
+        return self.render if "render" in self.content else {}
+
+    def _key(self, key: str, kind: Any = Mapping, kind_name: str = "a mapping") -> Any:
+        """Return the value of a key. Raises `UserError` if it is missing or of another kind."""
+        if key not in self.content:
+            raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")
+        if not isinstance(self.content[key], kind):
+            raise UserError(f"{self.path}: {key}: must be {kind_name}")
+        return self.content[key]

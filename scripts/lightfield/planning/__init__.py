@@ -1,0 +1,1 @@
+"""Time, memory and disk space of a build, estimated before it runs."""

@@ -1,0 +1,1 @@
+"""What the rules use: datasets, their shards, records of finished work, the terminal's display."""

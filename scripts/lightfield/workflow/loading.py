@@ -1,0 +1,341 @@
+"""Resolves the datasets of a configuration and its scene YAMLs, within a preset's limits."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from lightfield.configuration import blend_lock, scene_yaml
+from lightfield.configuration.config_file import Configuration, Preset
+from lightfield.configuration.description import Cluster
+from lightfield.configuration.exports import Exports
+from lightfield.configuration.family import Family
+from lightfield.configuration.render_settings import CHOSEN, Render, TargetError
+from lightfield.configuration.scene_source import FILE
+from lightfield.core.errors import UserError
+from lightfield.core.names import VIEWS
+from lightfield.formats import published
+from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.overview import sees_all_round
+from lightfield.geometry.rigs import Poses, Rig
+from lightfield.workflow.dataset import Dataset
+
+# A rig whose split is one of these tests what is trained on another rig.
+TESTED_WITH = ("validation", "test")
+
+
+def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> list[Dataset]:
+    """Read the scene YAMLs that a configuration chooses, and resolve their datasets.
+
+    ``cluster`` is the cluster that renders them, if any. Raises `UserError` for a scene that is
+    missing, wrong, or without the chosen rigs. Also raises it for two scenes with equal folders.
+    A family of scenes has no datasets here: `chosen_families` has them.
+    """
+    datasets: list[Dataset] = []
+    limits = settings.presets[settings.preset]
+    scenes = []
+    for scene in settings.scenes:
+        _check_scene_folder(scene, settings)
+        if scene_yaml.family_of(scene) is None:
+            scenes.append(scene)
+            datasets += scene_datasets(scene, settings.preset, limits, settings, cluster)
+    if settings.rigs == "all":
+        return datasets
+    _check_chosen_rigs(settings.rigs, scenes, datasets)
+    return [dataset for dataset in datasets if dataset.rig_name in settings.rigs]
+
+
+def chosen_families(settings: Configuration) -> dict[str, Family]:
+    """Return the families of scenes that a configuration chooses, by their names.
+
+    Raises `UserError` for a wrong scene YAML, and for a choice of rigs, which families lack.
+    """
+    families = {}
+    for scene in settings.scenes:
+        if family := scene_yaml.family_of(scene):
+            if settings.rigs != "all":
+                raise UserError(
+                    f"config.yaml: rigs: must be all with {scene}, which is a family: all members "
+                    "have the same rigs"
+                )
+            families[scene] = family
+    return families
+
+
+def family_folder(scene: str, settings: Configuration) -> str:
+    """Return the folder of a family under its preset: chairs, or chairs_tiny."""
+    return scene if settings.preset == "full" else f"{scene}_{settings.preset}"
+
+
+def _check_scene_folder(scene: str, settings: Configuration) -> None:
+    """Raise `UserError` if another scene under another preset would have the same folder.
+
+    The scene garden_tiny has the folder of the scene garden under the preset tiny.
+    """
+    is_full = settings.preset == "full"
+    folder = scene if is_full else f"{scene}_{settings.preset}"
+    base, _, preset = folder.rpartition("_")
+    other_scene = base if is_full else folder
+    has_preset_suffix = preset in settings.presets.keys() - {"full"}
+    if has_preset_suffix and scene_yaml.scene_path(other_scene).is_file():
+        raise UserError(
+            f"config.yaml: scenes: {folder} would be the folder of both {base} with "
+            f"preset={preset} and {folder}; give one of these scene YAMLs another name"
+        )
+
+
+def _check_chosen_rigs(chosen_rigs: list[str], scenes: list[str], datasets: list[Dataset]) -> None:
+    """Raise `UserError` for a chosen rig without a scene, or a scene without a chosen rig."""
+    existing_rigs = {dataset.rig_name for dataset in datasets}
+    for rig in chosen_rigs:
+        if rig not in existing_rigs:
+            raise UserError(
+                f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(scenes)}"
+                f"; must be all or some of {', '.join(sorted(existing_rigs))}"
+            )
+    for scene in scenes:
+        # A sequence has a dataset for each frame.
+        rigs = dict.fromkeys(
+            dataset.rig_name for dataset in datasets if dataset.scene_name == scene
+        )
+        if not rigs.keys() & set(chosen_rigs):
+            raise UserError(
+                f"config.yaml: rigs: none of {', '.join(chosen_rigs)} is in {scene}; "
+                f"it has {', '.join(rigs)}; all takes them all"
+            )
+
+
+def scene_datasets(
+    scene: str,
+    preset: str = "full",
+    limits: Preset | None = None,
+    settings: Configuration | None = None,
+    cluster: Cluster | None = None,
+) -> list[Dataset]:
+    """Resolve every dataset of one scene YAML under the ``limits`` of a preset.
+
+    Uses the folders and the length of shards of ``settings``. ``cluster`` renders the datasets.
+    """
+    written = scene_yaml.load_scene(scene)
+    places = _folders_and_shards(settings) | {"cluster": cluster}
+    return datasets_of(scene, written, preset, limits or Preset(), places)
+
+
+def datasets_of(
+    scene: str,
+    written: scene_yaml.Scene,
+    preset: str,
+    limits: Preset,
+    places: Mapping[str, Any],
+) -> list[Dataset]:
+    """Resolve every dataset of a scene as it is ``written``, under the ``limits`` of a preset.
+
+    ``places`` are fields of `Description`: folders, shards, the cluster, and the member.
+    """
+    source = written.scene
+    if source.blend:
+        checksum, _ = blend_lock.blend_sha256(scene, source)
+        source = source.model_copy(update={"sha256": checksum})
+    datasets = []
+    for name, rig in written.rigs.items():
+        reprojections = _reprojections_of(name, written, limits)
+        for folder, frame in _frames(name, rig, source.frame):
+            dataset = Dataset(
+                scene_name=scene,
+                preset=preset,
+                rig_name=name,
+                rig_folder=folder,
+                source=source.model_copy(update={"frame": frame}),
+                render=_limited_render(written.render, rig, limits),
+                rig=_rig_of(scene, name, written, preset, limits),
+                reprojections=reprojections,
+                flow=written.flow,
+                mesh=_mesh_of(name, written),
+                exports=_exports_of(rig, written, reprojections),
+                has_panorama=_has_panorama(rig, written),
+                limits=limits,
+                **_split_partners(rig, written, folder.removeprefix(name)),
+                **places,
+            )
+            datasets.append(dataset)
+    return datasets
+
+
+def rig_dataset(scene: str, rig: str | None) -> Dataset:
+    """Return the dataset of a scene's rig, or of its first. Raises `UserError` for another rig."""
+    datasets = scene_datasets(scene)
+    dataset = next((d for d in datasets if rig in (None, d.rig_folder)), None)
+    if dataset is None:
+        rig_names = ", ".join(d.rig_folder for d in datasets)
+        raise UserError(f"--rig: is {rig!r}; must be one of {rig_names}")
+    return dataset
+
+
+def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limits: Preset) -> Rig:
+    """Return a rig under a preset's ``limits``. Raises `UserError` if too few views remain."""
+    file = f"{scene_yaml.OWN_SCENES}/{scene}.yaml"
+    try:
+        rig = _limited_rig(written.rigs[name], limits, written.render is not None)
+    except UserError as error:
+        raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more") from None
+    if written.flow and rig.is_at_one_place():
+        raise UserError(
+            f"{file}: flow: {scene_yaml.FLOW_PLACES}, but the preset "
+            f"{preset} leaves one of rigs.{name}; let the preset have more views"
+        )
+    return rig
+
+
+def _reprojections_of(
+    name: str, written: scene_yaml.Scene, limits: Preset
+) -> dict[str, scene_yaml.Reprojection]:
+    """Return the reprojections of a rig's views."""
+    reprojections = {}
+    for key, reprojection in written.developments.items():
+        if name in (reprojection.rigs or written.rigs):
+            camera = reprojection.camera and _limited(reprojection.camera, limits)
+            light = written.light_of(reprojection)
+            update = {"camera": camera, "relight": light}
+            reprojections[key] = reprojection.model_copy(update=update)
+    return reprojections
+
+
+def _exports_of(
+    rig: Rig, written: scene_yaml.Scene, reprojections: dict[str, scene_yaml.Reprojection]
+) -> Exports:
+    """Return the exports of a rig's views and ``reprojections``.
+
+    A rig that tests another rig's training has no training exports of its own. The other rig's
+    exports include its views.
+    """
+    is_tested_elsewhere = rig.split in TESTED_WITH
+    exports = {}
+    for key, export in written.exports.selected.items():
+        sources = [source for source in export.sources if source in (VIEWS, *reprojections)]
+        belongs_elsewhere = is_tested_elsewhere and export.is_for_training
+        exports[key] = None if belongs_elsewhere else export.model_copy(update={"sources": sources})
+    return written.exports.model_copy(update=exports)
+
+
+def _mesh_of(name: str, written: scene_yaml.Scene) -> scene_yaml.MeshFiles | None:
+    """Return which meshes a rig's dataset holds, if any."""
+    mesh = written.mesh
+    return mesh if mesh and name in (mesh.rigs or written.rigs) else None
+
+
+def _has_panorama(rig: Rig, written: scene_yaml.Scene) -> bool:
+    panorama = written.report.panorama
+    return sees_all_round(rig) if panorama == "auto" else panorama
+
+
+def _split_partners(rig: Rig, written: scene_yaml.Scene, frame_folder: str) -> dict[str, Any]:
+    """Return `Description.tested_by` of a rig that trains, or `trained_by` of one that tests."""
+    split_of_rig = {name: other_rig.split for name, other_rig in written.rigs.items()}
+    if rig.split == "train":
+        testing = [name for name, split in split_of_rig.items() if split in TESTED_WITH]
+        return {"tested_by": tuple(f"{name}{frame_folder}" for name in testing)}
+    if rig.split in TESTED_WITH:
+        training = next((name for name, split in split_of_rig.items() if split == "train"), None)
+        return {"trained_by": f"{training}{frame_folder}"}
+    return {}
+
+
+def _folders_and_shards(settings: Configuration | None) -> dict[str, Any]:
+    """Return the folders and the length of shards that a configuration chooses."""
+    if settings is None:
+        return {}
+    return {
+        "results_root": settings.results,
+        "work_root": settings.work,
+        "views_per_shard": settings.views_per_shard,
+    }
+
+
+def rendered_frames(datasets: Iterable[Dataset]) -> list[int | Literal["file"]]:
+    """Return the frames of a scene that its ``datasets`` render. FILE is the .blend's own."""
+    frames = {dataset.source.frame for dataset in datasets}
+    return sorted(frames, key=lambda frame: (frame == FILE, frame))
+
+
+def _frames(name: str, rig: Rig, frame: int | str) -> Iterator[tuple[str, int | str]]:
+    """Yield the folder and the frame number of each dataset of a rig."""
+    if rig.sequence is None:
+        yield name, frame
+        return
+    for folder, number in rig.sequence.folders.items():
+        yield f"{name}/{folder}", number
+
+
+def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
+    """Return a rig within ``limits``. A file of poses gets an absolute path.
+
+    Views that exist already keep their resolution.
+    """
+    if isinstance(rig, Poses):
+        rig = rig.model_copy(update={"file": str(Path(rig.file).resolve())})
+    if limits.views:
+        rig = rig.thinned(limits.views)
+    if is_rendered:
+        rig = rig.model_copy(update={"camera": _limited(rig.camera, limits)})
+    return rig
+
+
+def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str, Any]:
+    """Return the ``render`` block under a preset's ``limits``.
+
+    With a ``target_error``, the calibration will choose samples, threshold and denoising. The
+    preset limits its choice by ``most_samples`` and ``denoise``. For views that exist already, only
+    the meaning of their depth and alpha is known.
+    """
+    if render is None:
+        assert isinstance(rig, Poses)
+        return published.render(rig)
+    content = render.model_dump(exclude_none=True)
+    if render.samples is None:
+        # The calibration chooses these.
+        for key in CHOSEN:
+            content.pop(key, None)
+    if isinstance(render.samples, int):
+        content["samples"] = min(render.samples, limits.samples or render.samples)
+    elif limits.samples:
+        content["most_samples"] = limits.samples
+    # The light groups would no longer add up to the colour.
+    if limits.denoise is not None and render.light_groups is None:
+        content["denoise"] = limits.denoise
+    if limits.denoise_prefilter and content.get("denoise"):
+        content.setdefault("denoise_prefilter", limits.denoise_prefilter)
+    if isinstance(render.target_error, TargetError):
+        content["target_error"] = render.target_error.value
+        if render.target_error.denoise == "never":
+            content["denoise"] = False
+    return content
+
+
+def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
+    """Return the camera with an image whose longer side has at most ``limits.resolution`` pixels.
+
+    An even side stays even, because video and some trainers need this.
+    """
+    longer = max(camera.resolution)
+    most = limits.resolution or longer
+    if most >= longer:
+        return camera
+    scale = (most if longer % 2 else max(1, most // 2 * 2)) / longer
+    steps = [2 - side % 2 for side in camera.resolution]
+    sizes = [
+        max(1, step * round(side * scale / step))
+        for side, step in zip(camera.resolution, steps, strict=True)
+    ]
+    update: dict[str, Any] = {"resolution": tuple(sizes)}
+    if camera.principal_point:
+        update["principal_point"] = tuple(
+            (at - side / 2) * scale + size / 2
+            for at, side, size in zip(camera.principal_point, camera.resolution, sizes, strict=True)
+        )
+    lens = camera.make()
+    size = camera.sensor_size
+    square = isinstance(lens, Rectilinear) and lens.has_square_pixels
+    if square and isinstance(size, tuple):
+        # Pixels stay square if a side was rounded.
+        update["sensor_size"] = size[0]
+    return camera.model_copy(update=update)
