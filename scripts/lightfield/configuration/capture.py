@@ -21,11 +21,11 @@ from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
-SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
+_SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
 # The same for a model.
-MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
+_MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
 # The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
-CAPTURED_KEYS = SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *scene_source.MODEL_KEYS}
+_CAPTURED_KEYS = _SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *scene_source.MODEL_KEYS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +138,7 @@ class Capture:
         origin["scene"] = {
             "name": self.scene_name,
             **self.source.model_dump(
-                include=MODEL_SOURCE_KEYS if self.source.model else SOURCE_KEYS,
+                include=_MODEL_SOURCE_KEYS if self.source.model else _SOURCE_KEYS,
                 exclude_none=True,
                 # A .blend's own frame may have a fraction, which a scene YAML's has not.
                 warnings=False,
@@ -166,7 +166,7 @@ def _source_as_written(source: SceneSource) -> dict[str, Any]:
     if source.dataset:
         return {"dataset": source.dataset}
     return source.model_dump(
-        mode="json", include=CAPTURED_KEYS, exclude_unset=True, exclude_none=True
+        mode="json", include=_CAPTURED_KEYS, exclude_unset=True, exclude_none=True
     )
 
 

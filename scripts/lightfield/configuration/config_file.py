@@ -20,7 +20,7 @@ from lightfield.core.settings import Name, Settings, checked, pattern
 from lightfield.core.yaml_files import read_yaml
 
 # Folders of the project, of a user's inputs, and of programs such as Snakemake.
-RESERVED = {
+_RESERVED = {
     ".ci",
     ".snakemake",
     ".venv",
@@ -35,7 +35,7 @@ RESERVED = {
     "tests",
 }
 # Names that a scene's folder cannot have, because other folders beside it have them.
-SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
+_SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 
 
 def _listed(value: Any) -> Any:
@@ -182,8 +182,8 @@ class Configuration(Settings):
             names = ", ".join(self.presets)
             raise ValueError(f"preset: is {self.preset!r}; must be one of {names}")
         for name in self.scenes:
-            if "." in name or name in SCENE_NEIGHBOURS:
-                used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
+            if "." in name or name in _SCENE_NEIGHBOURS:
+                used_names = ", ".join(sorted(_SCENE_NEIGHBOURS))
                 raise ValueError(
                     f"scenes: {name} cannot be the name of a scene; must have no dots, and not be "
                     f"one of {used_names}"
@@ -204,7 +204,7 @@ def _check_folder(key: str, folder: str) -> None:
     """Refuse a folder of the project, of the user's inputs, or of Git."""
     path = Path(os.path.normpath(Path(folder).absolute()))
     parents = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
-    reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
+    reserved = {home / name for home in (Path.cwd(), ROOT) for name in _RESERVED}
     is_inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
     if path in parents or path.resolve() in parents or is_inside:
         raise ValueError(f"{key}: is {folder!r}; must be a folder that is used for nothing else")

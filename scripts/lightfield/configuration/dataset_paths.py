@@ -18,8 +18,8 @@ from lightfield.geometry.rigs.split_setting import PARTS
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
 # The pictures that are plots, and therefore also .svg files.
 PLOTS = ("rig", "depth", "noise")
-PICTURE_FILES = (*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS))
-REPORT_FILES = (*PICTURE_FILES, "costs.json", "index.html")
+_PICTURE_FILES = (*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS))
+REPORT_FILES = (*_PICTURE_FILES, "costs.json", "index.html")
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ class DatasetPaths(Description):
 
     @property
     def pictures(self) -> list[str]:
-        return [f"{self.folder}/report/{name}" for name in PICTURE_FILES]
+        return [f"{self.folder}/report/{name}" for name in _PICTURE_FILES]
 
     @property
     def panorama(self) -> str | list[str]:

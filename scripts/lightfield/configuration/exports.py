@@ -31,7 +31,7 @@ BOUNDS_VIEWS = 64
 BOUNDS_PIXELS = 64
 """The views that measure a scene's extent have this many pixels along the longer side."""
 
-TO_RECTILINEAR = "reproject to rectilinear"
+_TO_RECTILINEAR = "reproject to rectilinear"
 
 
 class Export(Settings):
@@ -97,7 +97,7 @@ class Developed(Export):
     )
 
 
-PointCount = Annotated[int, Field(ge=1)]
+_PointCount = Annotated[int, Field(ge=1)]
 NO_DEPTH = "holds no depth; give it format: exr"
 
 
@@ -173,7 +173,7 @@ class Colmap(Developed):
     is_for_training: ClassVar[bool] = True
 
     format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000,
         description="Largest number of points, which are computed from depth. An image in which "
         "none of them lies gets one more.",
@@ -187,11 +187,11 @@ class Colmap(Developed):
                 return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
-                return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
+                return f"is a part of a panorama; COLMAP takes whole ones; {_TO_RECTILINEAR}"
             if self.depth:
                 return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
         elif not isinstance(lens, Rectilinear):
-            return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
+            return f"has a lens that COLMAP lacks; {_TO_RECTILINEAR}, or equidistant below 180°"
         return NO_DEPTH if self.depth and not has_depth else None
 
 
@@ -200,7 +200,7 @@ class Nerfstudio(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
+    points: _PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
     # This changes no file.
     splatfacto: bool = Field(
@@ -209,16 +209,16 @@ class Nerfstudio(Developed):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if self.splatfacto and not isinstance(lens, Rectilinear):
-            return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
+            return f"would be taken for a pinhole by splatfacto; {_TO_RECTILINEAR}"
         if isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
                 return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
-                return f"is a part of a panorama; nerfstudio takes whole ones; {TO_RECTILINEAR}"
+                return f"is a part of a panorama; nerfstudio takes whole ones; {_TO_RECTILINEAR}"
         elif not isinstance(lens, Rectilinear):
-            return f"has a lens that nerfstudio lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+            return f"has a lens that nerfstudio lacks; {_TO_RECTILINEAR}, equidistant or a panorama"
         return NO_DEPTH if self.depth and not has_depth else None
 
 
@@ -243,7 +243,7 @@ class OpenDibr(Developed):
             if lens.center != (lens.width / 2, lens.height / 2):
                 return "has its axis off centre, which OpenDIBR's fisheye cannot have"
         elif not isinstance(lens, Rectilinear | Equirectangular):
-            return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+            return f"has a lens that OpenDIBR lacks; {_TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "h265" and shutil.which("ffmpeg") is None:
             return "becomes H.265, for which ffmpeg must be installed; or give format: png"
         refusal = _odd_size_refusal(lens) if self.format == "h265" else None
@@ -279,7 +279,7 @@ class ScanNetPP(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000,
         description="Largest number of points, which are computed from depth. An image in which "
         "none of them lies gets one more.",
@@ -297,7 +297,7 @@ class NCore(Developed):
     is_for_training: ClassVar[bool] = True
     has_row_times: ClassVar[bool] = True
 
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000, description="Largest number of points, which are computed from depth."
     )
 
@@ -315,7 +315,7 @@ class LichtFeld(Developed):
     format: Literal["png", "exr"] = Field(
         "png", description="Format of the images. exr keeps linear light, for HDR training."
     )
-    points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
+    points: _PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
     normals: bool = Field(
         False, description="Also write normals. The source must have the pass normal."
@@ -333,11 +333,11 @@ class LichtFeld(Developed):
                 return "has a fourth coefficient, which LichtFeld drops; reproject to equidistant"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
-                return f"is a part of a panorama; LichtFeld takes whole ones; {TO_RECTILINEAR}"
+                return f"is a part of a panorama; LichtFeld takes whole ones; {_TO_RECTILINEAR}"
             if self.depth:
                 return "is a panorama, which has no depth along an axis; leave out depth: true"
         elif not isinstance(lens, Rectilinear):
-            return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+            return f"has a lens that LichtFeld lacks; {_TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "exr" and not has_depth:
             return "is not in EXR; give it format: exr"
         return NO_DEPTH if self.depth and not has_depth else None
@@ -349,7 +349,7 @@ class Dnerf(Developed):
     is_for_training: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
     )
 
@@ -363,7 +363,7 @@ class Neural3dVideo(Developed):
     is_for_training: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
     )
     rate: float = Field(
@@ -387,7 +387,7 @@ class ColmapFrames(Colmap):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if not isinstance(lens, Rectilinear):
-            return f"is not a pinhole, the only camera of SpacetimeGaussians; {TO_RECTILINEAR}"
+            return f"is not a pinhole, the only camera of SpacetimeGaussians; {_TO_RECTILINEAR}"
         return super().refusal(lens, has_depth)
 
 
@@ -396,7 +396,7 @@ class MultipleView(Developed):
 
     is_of_sequence: ClassVar[bool] = True
 
-    points: PointCount = Field(
+    points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
     )
 
@@ -507,7 +507,7 @@ def _odd_size_refusal(lens: Lens) -> str | None:
 def _centred_pinhole(lens: Lens) -> str | None:
     """Return why a lens is not a pinhole with a centred axis and square pixels. None if it is."""
     if not isinstance(lens, Rectilinear):
-        return f"is not a pinhole camera, the only one that this layout has; {TO_RECTILINEAR}"
+        return f"is not a pinhole camera, the only one that this layout has; {_TO_RECTILINEAR}"
     if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
         return "has its axis off centre or oblong pixels, which this layout cannot describe"
     return None

@@ -26,7 +26,7 @@ from lightfield.core.settings import Settings, as_list, pattern
 from lightfield.formats.splits_file import SPLITS
 
 # Planning more members would take minutes.
-MOST_MEMBERS = 100_000
+_MOST_MEMBERS = 100_000
 # The record of a member, in its folder.
 RECORD = "member.json"
 FORMAT = "plenoforge member"
@@ -134,8 +134,8 @@ class Family(Settings):
                 raise ValueError(f"values: {key!r} is not a key with dots, as scene.frame is")
             if key == key_of_member:
                 raise ValueError(f"values: {key} cannot be drawn, because each member has its own")
-        if self.seeds and len(self._seeds) > MOST_MEMBERS:
-            raise ValueError(f"seeds: is {self.seeds!r}; must be at most {MOST_MEMBERS} seeds")
+        if self.seeds and len(self._seeds) > _MOST_MEMBERS:
+            raise ValueError(f"seeds: is {self.seeds!r}; must be at most {_MOST_MEMBERS} seeds")
         if self.seeds and not self._seeds:
             raise ValueError(f"seeds: is {self.seeds!r}; must have the smaller seed first")
         return self
@@ -154,10 +154,10 @@ class Family(Settings):
         paths = _models(self.models)
         if not paths:
             raise UserError(f"family.models: is {self.models!r}; there is no such model file")
-        if len(paths) > MOST_MEMBERS:
+        if len(paths) > _MOST_MEMBERS:
             raise UserError(
                 f"family.models: {self.models!r} has {len(paths)} files; "
-                f"must be at most {MOST_MEMBERS}"
+                f"must be at most {_MOST_MEMBERS}"
             )
         return [Member.of(name=name, model=path) for name, path in paths.items()]
 

@@ -40,11 +40,11 @@ def _known_builder(name: str) -> str:
 
 def _places_as_written(rig: Random) -> dict[str, Any]:
     """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
-    return {key: value for key, value in as_written(rig).items() if key not in CAMERA_KEYS}
+    return {key: value for key, value in as_written(rig).items() if key not in _CAMERA_KEYS}
 
 
 # The keys of a rig that say what a camera sees and what its view is for.
-CAMERA_KEYS = ("camera", "split")
+_CAMERA_KEYS = ("camera", "split")
 
 
 class BuildSettings(Settings):

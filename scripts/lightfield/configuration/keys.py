@@ -25,27 +25,27 @@ from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, LightField, View
 
 # Raise these when rendering, or the computation of flow, writes other files for equal settings.
-RENDER_VERSION = 4
+_RENDER_VERSION = 4
 FLOW_VERSION = 1
 # The same for the passes of surfaces. Only their views have it in their keys.
-SURFACES_VERSION = 2
+_SURFACES_VERSION = 2
 # The same for denoised views of which only a part is rendered.
-PART_VERSION = 1
+_PART_VERSION = 1
 # The same for the views of a user's .blend.
-BLEND_VERSION = 1
+_BLEND_VERSION = 1
 # The same for those of them with a pass of numbers, which once replaced what shaders read.
-NUMBERS_VERSION = 1
+_NUMBERS_VERSION = 1
 # The same for mattes of a user's .blend.
-MATTES_VERSION = 1
+_MATTES_VERSION = 1
 # The same for transparent views of a scene that may have shadow catchers.
-CATCHERS_VERSION = 1
+_CATCHERS_VERSION = 1
 # Raise this when the import of a model makes another scene of it.
-MODEL_VERSION = 2
+_MODEL_VERSION = 2
 # The same for models in softboxes.
 SOFTBOXES_VERSION = 1
 # Raise this when the import refuses other models. They are imported again, but scenes that stay the
 # same keep their views.
-IMPORT_VERSION = 1
+_IMPORT_VERSION = 1
 
 
 # Cached, because a look-up in a package's files takes a millisecond.
@@ -91,14 +91,14 @@ def _builder_folders(builder: str) -> list[str]:
     return folders
 
 
-def model_version(light: str) -> int:
+def _model_version(light: str) -> int:
     """Return the version of the import of models in a ``light``."""
-    return MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
+    return _MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
 
 
 def import_version(light: str) -> int:
     """Return what changes whenever models in a ``light`` must be imported again."""
-    return model_version(light) + IMPORT_VERSION
+    return _model_version(light) + _IMPORT_VERSION
 
 
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
@@ -107,26 +107,26 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
     ``options`` say how it was imported, and its ``light``. ``files`` are path and SHA-256 of each
     file that it was read from. None stands for a missing file.
     """
-    return _digest([model_version(options["light"]), version("bpy"), dict(options), files])
+    return _digest([_model_version(options["light"]), version("bpy"), dict(options), files])
 
 
 def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.matrix.tolist()
     content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
-    key = [RENDER_VERSION, version("bpy"), content, view.name, pose]
+    key = [_RENDER_VERSION, version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
-        key.append(SURFACES_VERSION)
+        key.append(_SURFACES_VERSION)
     if renders_part(lightfield) and lightfield.render["denoise"]:
-        key.append(["part", PART_VERSION])
+        key.append(["part", _PART_VERSION])
     if _is_of_blend(lightfield):
-        key.append(["blend", BLEND_VERSION])
+        key.append(["blend", _BLEND_VERSION])
         if any(view_pass.kind == "id" for view_pass in lightfield.passes):
-            key.append(["numbers", NUMBERS_VERSION])
+            key.append(["numbers", _NUMBERS_VERSION])
         if any(view_pass.kind == "matte" for view_pass in lightfield.passes):
-            key.append(["mattes", MATTES_VERSION])
+            key.append(["mattes", _MATTES_VERSION])
     if lightfield.transparent and _may_have_shadow_catchers(lightfield):
-        key.append(["catchers", CATCHERS_VERSION])
+        key.append(["catchers", _CATCHERS_VERSION])
     return _digest(key)
 
 
@@ -156,7 +156,7 @@ def renders_part(lightfield: LightField) -> bool:
 
 def names_key(lightfield: LightField) -> str:
     """Return the key of the numbers of a light field's objects and materials."""
-    return _digest([RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
+    return _digest([_RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
 
 
 def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:

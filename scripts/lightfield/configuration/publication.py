@@ -72,7 +72,7 @@ class Creator(Settings):
 
 
 # The licence may be that of the scene.
-REQUIRED = (
+_REQUIRED = (
     "creators",
     "url",
     "publisher",
@@ -158,4 +158,4 @@ class Publication(Settings):
     @property
     def missing_keys(self) -> list[str]:
         """The keys that publishing requires and that have no value."""
-        return [name for name in REQUIRED if getattr(self, name) is None]
+        return [name for name in _REQUIRED if getattr(self, name) is None]

@@ -10,10 +10,10 @@ from lightfield.core.settings import AS_WRITTEN, Settings, Vector
 from lightfield.formats import light_groups
 from lightfield.formats.passes import PASSES, in_order
 
-PassNames = Annotated[
+_PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]], AfterValidator(in_order)
 ]
-Emitters = Annotated[list[str], AfterValidator(unique_names)]
+_Emitters = Annotated[list[str], AfterValidator(unique_names)]
 # The keys of `Render` that a calibration chooses for a target error.
 CHOSEN = ("samples", "adaptive_threshold", "denoise")
 
@@ -186,10 +186,10 @@ class Render(Settings):
         description="Make the background transparent: the world behind the scene is left out, and "
         "alpha holds the coverage.",
     )
-    passes: PassNames | None = Field(
+    passes: _PassNames | None = Field(
         None, description="Passes to write beside colour and depth, each into a folder of its own."
     )
-    light_groups: Literal["each"] | Emitters | dict[str, Emitters] | None = Field(
+    light_groups: Literal["each"] | _Emitters | dict[str, _Emitters] | None = Field(
         None,
         description="Light sources (lamps, glowing objects, the world) whose light is written as "
         "passes of their own. each: all of them. A list: those with these names. A mapping: groups "

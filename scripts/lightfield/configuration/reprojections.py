@@ -21,7 +21,7 @@ MOST_SAMPLES = 64
 LIGHT_GROUPS = "light_groups"
 """Among the passes of a reprojection: those of all light groups."""
 
-LENS_MAP_KEYS = {"camera", "cube_map", "rotation", "filter", "samples"}
+_LENS_MAP_KEYS = {"camera", "cube_map", "rotation", "filter", "samples"}
 """The settings on which a lens map depends."""
 
 # A group's factor, or its factors of red, green and blue.
@@ -93,7 +93,7 @@ class ReprojectionOptions(Settings):
 
 
 class ReprojectionSettings(ReprojectionOptions):
-    """The settings of scripts/reproject.py. scripts/lens_map.py needs only `LENS_MAP_KEYS`."""
+    """The settings of scripts/reproject.py. scripts/lens_map.py needs only `_LENS_MAP_KEYS`."""
 
     formats: list[Literal["exr", "png"]] = Field(
         [], description="Formats of the images to write. EXR also holds depth."
@@ -135,7 +135,7 @@ class ReprojectionSettings(ReprojectionOptions):
     @property
     def lens_map_settings(self) -> dict[str, Any]:
         """The content of a lens map's settings file."""
-        return self.as_json(LENS_MAP_KEYS)
+        return self.as_json(_LENS_MAP_KEYS)
 
     @property
     def development(self) -> dict[str, Any]:

@@ -93,7 +93,7 @@ SharedFolder = Annotated[
 # The word in a scene YAML that stands for the .blend's own value.
 FILE = "file"
 # Keys of `SceneSource` that only a .blend takes.
-BLEND_KEYS = (
+_BLEND_KEYS = (
     *("scene_name", "view_layers", "followed_camera", "allow_missing", "sha256", "url", "page"),
 )
 # Keys of `SceneSource` that only a model takes.
@@ -186,7 +186,7 @@ class SceneSource(ModelOptions, Origin):
             names = builders()
             if self.builder not in names:
                 raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
-            for name in BLEND_KEYS:
+            for name in _BLEND_KEYS:
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name}: is only for blend, not for builder")
             if self.frame == FILE:
@@ -195,7 +195,7 @@ class SceneSource(ModelOptions, Origin):
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: does not go with dataset")
         elif self.model is not None:
-            for name in (*BLEND_KEYS, "parameters"):
+            for name in (*_BLEND_KEYS, "parameters"):
                 if name in self.model_fields_set and name != "allow_missing":
                     raise ValueError(f"{name}: does not go with model")
             if self.frame == FILE:

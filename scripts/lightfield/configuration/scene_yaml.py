@@ -46,9 +46,9 @@ SCENES = ROOT / "configs" / "scenes"
 OWN_SCENES = Path("configs", "scenes")
 FLOW_PLACES = "needs views from two or more places"
 # Names that a rig's folder cannot have, because other folders beside it have them.
-RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
+_RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
 # The same for a reprojection's folder.
-REPROJECTION_NEIGHBOURS = {
+_REPROJECTION_NEIGHBOURS = {
     "exr",
     "exports",
     MESH,
@@ -59,10 +59,10 @@ REPROJECTION_NEIGHBOURS = {
     *PASSES,
 }
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
-OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
+_OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
 # For keys of a camera in lightfield.json: Blender's least and largest value, the unit of messages,
 # and the name in messages.
-BLENDER_LIMITS = {
+_BLENDER_LIMITS = {
     "focal_length": (1.0, 1e6, 1.0, "focal length in mm"),
     "fisheye_fov": (0.1745, 31.4159, math.pi / 180, "fov in degrees"),
     "fisheye_lens": (0.01, 100.0, 1.0, "focal length in mm"),
@@ -71,7 +71,7 @@ BLENDER_LIMITS = {
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
 # A reprojection may have all passes of light groups, too.
-ReprojectedPassNames = Annotated[
+_ReprojectedPassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": [*PASSES, LIGHT_GROUPS]})]],
     AfterValidator(lambda names: in_order(names, LIGHT_GROUPS)),
 ]
@@ -94,7 +94,7 @@ class Reprojection(ReprojectionOptions):
         "png_ev-2 and png_ev0.",
         json_schema_extra={"unit": "stops"},
     )
-    passes: ReprojectedPassNames | None = Field(
+    passes: _ReprojectedPassNames | None = Field(
         None,
         description="Passes of render.passes that are also reprojected, as EXR. light_groups: the "
         "passes of all light groups.",
@@ -151,7 +151,7 @@ class Reprojection(ReprojectionOptions):
 
 
 # The keys of a reprojection that say how its views are resampled.
-OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
+_OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
 
 
 class SensorReprojection(Reprojection):
@@ -341,7 +341,7 @@ class Scene(Credits):
             if not self.scene.dataset and not getattr(self, key):
                 raise ValueError(f"is missing the key {key}")
         for name, rig in self.rigs.items():
-            _check_name(f"rigs.{name}", name, RIG_NEIGHBOURS)
+            _check_name(f"rigs.{name}", name, _RIG_NEIGHBOURS)
             self._check_rig(f"rigs.{name}", name, rig)
         if self.render and self.scene.blend is None:
             if self.render.samples == FILE:
@@ -354,7 +354,7 @@ class Scene(Credits):
             self._check_mesh(self.mesh)
         for name, reprojection in self.reprojections.items():
             block = "relight" if name in self.relight else "reprojections"
-            neighbours = REPROJECTION_NEIGHBOURS
+            neighbours = _REPROJECTION_NEIGHBOURS
             if name.startswith(GROUP_PREFIX) or (block == "relight" and name == light_groups.EACH):
                 neighbours = {name}
             _check_name(f"{block}.{name}", name, neighbours)
@@ -400,7 +400,7 @@ class Scene(Credits):
         """Return the reprojections that ``sensor`` adds for a source, by their folders' names."""
         assert self.sensor
         original = self.reprojections.get(source) or Reprojection()
-        optics = original.model_dump(include={*OPTICS}, exclude_unset=True)
+        optics = original.model_dump(include={*_OPTICS}, exclude_unset=True)
         return {
             name: SensorReprojection.of(
                 **optics,
@@ -634,7 +634,7 @@ class Scene(Credits):
 def _check_blender_limits(key: str, lens: Lens) -> None:
     """Refuse a value outside Blender's limits, which Blender would clamp."""
     camera = lens.to_lightfield()["camera"]
-    for name, (least, most, unit, title) in BLENDER_LIMITS.items():
+    for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:
             bound = f"at least {least / unit:.4g}" if value < least else f"at most {most / unit:g}"
@@ -650,7 +650,7 @@ def _check_cube_map(key: str, rig: Rig) -> None:
 
 
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:
-    if name in neighbours or OTHER_NEIGHBOURS.fullmatch(name):
+    if name in neighbours or _OTHER_NEIGHBOURS.fullmatch(name):
         raise ValueError(f"{key}: the name {name} is taken; choose another")
 
 

@@ -11,12 +11,12 @@ from lightfield.core.errors import UserError
 
 # The bytes of a run are estimates. Refuse a run that needs more than SURELY times the free space.
 # Warn about a run that needs more than NEARLY times the free space.
-SURELY = 2.0
-NEARLY = 0.9
+_SURELY = 2.0
+_NEARLY = 0.9
 # A disk with less free space than this, or with fewer free inodes, counts as full: a job's log
 # alone may use them up.
-LEAST_BYTES = 1e6
-LEAST_FILES = 16
+_LEAST_BYTES = 1e6
+_LEAST_FILES = 16
 
 # False on macOS.
 _BY_EFFECTIVE_USER = os.access in os.supports_effective_ids
@@ -52,23 +52,23 @@ def gigabytes(size: float) -> str:
     return f"{size / 1e9:,.2f} GB" if size < 1e10 else f"{size / 1e9:,.0f} GB"
 
 
-def nearest_folder(path: Path) -> Path:
+def _nearest_folder(path: Path) -> Path:
     """Return the path if it exists, or else the nearest parent that does."""
     return next(part for part in (path, *path.absolute().parents) if part.exists())
 
 
 def obstacle(path: Path) -> str | None:
     """Return why no file can be written below a path, and what to do. Return None if one can."""
-    folder = nearest_folder(path)
+    folder = _nearest_folder(path)
     folder = folder if folder.is_dir() else folder.parent
     disk = os.statvfs(folder)
     if disk.f_flag & os.ST_RDONLY:
         return f"the disk of {folder} is read-only: {REMEDIES[errno.EROFS]}"
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=_BY_EFFECTIVE_USER):
         return f"you may not write in {folder}: {REMEDIES[errno.EACCES]}"
-    if disk.f_bavail * disk.f_frsize < LEAST_BYTES:
+    if disk.f_bavail * disk.f_frsize < _LEAST_BYTES:
         return f"the disk of {folder} is full: {REMEDIES[errno.ENOSPC]}"
-    if disk.f_files and disk.f_favail < LEAST_FILES:
+    if disk.f_files and disk.f_favail < _LEAST_FILES:
         return (
             f"the disk of {folder} takes no more files (its inodes are used up): remove some files"
         )
@@ -80,7 +80,7 @@ def write_problem(path: Path, error: OSError) -> str:
     # Some libraries raise errors without a number, so ask the disk first.
     if cause := obstacle(path):
         return cause
-    free = gigabytes(shutil.disk_usage(nearest_folder(path)).free)
+    free = gigabytes(shutil.disk_usage(_nearest_folder(path)).free)
     remedy = REMEDIES.get(error.errno or 0, "look for a quota, or a limit of files' sizes")
     return f"{error.strerror or error}; {free} are free on its disk: {remedy}"
 
@@ -99,7 +99,7 @@ def check(needs: Iterable[Need]) -> Iterator[str]:
     """
     needs_of_disk: dict[int, list[Need]] = {}
     for need in needs:
-        device = nearest_folder(need.folder).stat().st_dev
+        device = _nearest_folder(need.folder).stat().st_dev
         needs_of_disk.setdefault(device, []).append(need)
         if cause := obstacle(need.folder):
             raise UserError(f"{need.folder}: cannot be written: {cause}")
@@ -114,7 +114,7 @@ def _space_warning(needs: list[Need]) -> str | None:
     All ``needs`` are on one disk.
     """
     folder = needs[0].folder
-    existing_folder = nearest_folder(folder)
+    existing_folder = _nearest_folder(folder)
     size = sum(need.size for need in needs)
     files = sum(need.files for need in needs)
     disk = os.statvfs(existing_folder)
@@ -128,8 +128,8 @@ def _space_warning(needs: list[Need]) -> str | None:
         f"{folder}: {gigabytes(free)} are free on its disk, and this run writes some "
         f"{gigabytes(size)}"
     )
-    if size > SURELY * free:
+    if size > _SURELY * free:
         raise UserError(f"{text}: free some space, choose another disk, or build less")
-    if size > NEARLY * free:
+    if size > _NEARLY * free:
         return f"{text}: if the disk fills up, the run stops; free some space and start it again"
     return None

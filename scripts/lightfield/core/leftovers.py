@@ -21,7 +21,7 @@ BLENDERS = "blender_*"
 # The names that `atomic_path` gives to unfinished files.
 _UNFINISHED = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
 # Seconds. Nobody writes one file for so long.
-FILE_AGE = 3600.0
+_FILE_AGE = 3600.0
 # Seconds. No Blender has an empty folder for so long.
 BLENDER_AGE = 24 * 3600.0
 # Seconds. A new folder is locked long before.
@@ -66,7 +66,7 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
     return removed
 
 
-def remove_unfinished(folder: Path, age: float = FILE_AGE, excluded: str = "") -> list[Path]:
+def remove_unfinished(folder: Path, age: float = _FILE_AGE, excluded: str = "") -> list[Path]:
     """Remove unfinished files below a folder that are older than ``age`` seconds. Return them.
 
     Skips the folder's subfolder ``excluded``.

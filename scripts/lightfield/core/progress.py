@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 # Seconds between two lines.
-INTERVAL = 5.0
+_INTERVAL = 5.0
 
 _BEGIN = re.compile(r".*: (\d+) \w+ to do(?:, (\d+) already done)?")
 _NOW = re.compile(r".*: (\d+) of (\d+) \w+, ([\d.e+-]+) s each")
@@ -50,7 +50,7 @@ class Progress:
     """Counts finished pieces of work and prints a line from time to time, the first at once.
 
     It prints complete lines without carriage returns, so that several shards can share one log.
-    A line comes every `INTERVAL`, and down to once a minute the longer the work takes.
+    A line comes every `_INTERVAL`, and down to once a minute the longer the work takes.
     ``already`` pieces were finished before, and ``total`` are to do.
     """
 
@@ -76,7 +76,7 @@ class Progress:
         elapsed = now - self.started
         if self.first is None:
             self.first = (self.count, elapsed)
-        if now - self.printed < max(INTERVAL, min(elapsed / 20, 60)) and self.count < self.total:
+        if now - self.printed < max(_INTERVAL, min(elapsed / 20, 60)) and self.count < self.total:
             return
         self.printed = now
         # The first piece often takes longer, because it prepares the others.

@@ -89,9 +89,11 @@ AS_WRITTEN = WrapValidator(_unchanged)
 
 # Metres, or degrees. Blender computes in 32 bits, which are coarser than a metre beyond this.
 FARTHEST = 1e7
-Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
+_Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
 # Named, so that the JSON schema has it once.
-Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
+Vector = TypeAliasType(
+    "Vector", Annotated[tuple[_Coordinate, _Coordinate, _Coordinate], as_list(3)]
+)
 # What messages and the reference say instead of a regular expression.
 MEANINGS: dict[str, str] = {}
 

@@ -12,9 +12,9 @@ import yaml
 from lightfield.core.errors import UserError
 
 # Bytes. A scene YAML has some thousand.
-LARGEST_YAML = 2**16
+_LARGEST_YAML = 2**16
 # A YAML's nodes, with each alias counted as the nodes that it repeats.
-MOST_NODES = 20_000
+_MOST_NODES = 20_000
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
@@ -91,13 +91,13 @@ def read_settings_text(path: Path, file: str) -> str:
     """Return a YAML file's text. Raises `UserError` if it is not text, or too large."""
     try:
         with path.open("rb") as stream:
-            content = stream.read(LARGEST_YAML + 1)
-        if len(content) <= LARGEST_YAML:
+            content = stream.read(_LARGEST_YAML + 1)
+        if len(content) <= _LARGEST_YAML:
             return content.decode()
     except (OSError, ValueError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
     raise UserError(
-        f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
+        f"{file}: is larger than {_LARGEST_YAML // 1000} kB, so it is not a settings file"
     )
 
 
@@ -106,7 +106,7 @@ def parse_yaml(text: str, file: str) -> Any:
     try:
         loader = _UniqueKeyLoader(text)
         node = loader.get_single_node()
-        if _size(node, {}) > MOST_NODES:
+        if _size(node, {}) > _MOST_NODES:
             raise UserError(
                 f"{file}: its aliases (*name) repeat too much, so it is not a settings file"
             )

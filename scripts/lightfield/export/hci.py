@@ -6,7 +6,7 @@
 - ``gt_disp_lowres_Cam….pfm``: disparity, for each view.
 
 The middle view's maps also exist without a number. A disparity is the number of pixels that a point
-moves between neighbours, d = b f (1 / Z − 1 / F). Parallel cameras have F = ∞, written as `FOCUS`.
+moves between neighbours, d = b f (1 / Z − 1 / F). Parallel cameras have F = ∞, written as `_FOCUS`.
 Source: Honauer et al. 2016, and the benchmark's parameters.
 """
 
@@ -24,7 +24,7 @@ from lightfield.export.source import Floats, SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
-FOCUS = 1e9  # metres
+_FOCUS = 1e9  # metres
 
 
 def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
@@ -42,9 +42,9 @@ def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
             disparity = np.nan_to_num(baseline * cameras.focal_pixels(lens)[0] / depth)
         maps = {"depth": np.where(np.isfinite(depth), depth, 0), "disp": disparity}
         for name, values in maps.items():
-            write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
+            _write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
             if number == middle:
-                write_pfm(folder / f"gt_{name}_lowres.pfm", values)
+                _write_pfm(folder / f"gt_{name}_lowres.pfm", values)
         disparities += [float(np.min(disparity)), float(np.max(disparity))]
         progress.done()
     write_text(
@@ -108,7 +108,7 @@ def parameters(
             "num_cams_x": size[0],
             "num_cams_y": size[1],
             "baseline_mm": 1000 * baseline,
-            "focus_distance_m": FOCUS,
+            "focus_distance_m": _FOCUS,
             **{f"center_cam_{key}": value for key, value in center},
             "offset": 0.0,
         },
@@ -127,7 +127,7 @@ def parameters(
     return "\n".join(texts)
 
 
-def write_pfm(path: Path, values: Floats | NDArray[np.float32]) -> None:
+def _write_pfm(path: Path, values: Floats | NDArray[np.float32]) -> None:
     """Write a (height, width) map as a portable float map: float32, the lowest row first."""
     height, width = values.shape
     head = f"Pf\n{width} {height}\n-1.0\n".encode()

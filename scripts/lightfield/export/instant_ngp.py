@@ -70,7 +70,7 @@ def _pictures(path: Path) -> list[str]:
 MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
-def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
+def _settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
     """Return the settings from --settings, or from the flags."""
     if arguments.settings:
         return read_settings(ExportSettings[InstantNgp], arguments.settings)
@@ -97,7 +97,7 @@ def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
 
 def export(arguments: argparse.Namespace) -> None:
     """Write a dataset's transforms.json, and the files that it names."""
-    write(settings_from(arguments), arguments)
+    write(_settings_from(arguments), arguments)
 
 
 def write(settings: ExportSettings[InstantNgp], arguments: argparse.Namespace) -> None:
@@ -149,7 +149,7 @@ class _Writer:
         except UserError as error:
             raise UserError(f"{lightfield.path}: {error}") from None
         self.rays = self.lens.pixel_rays()
-        self.blind = blind_pixels(self.lens)
+        self.blind = _blind_pixels(self.lens)
         self.image_dir: Path = arguments.image_dir or lightfield.folder
         # The images written so far.
         self.pictures: list[Path] = []
@@ -177,7 +177,7 @@ class _Writer:
         if self.options.scale is not None:
             return self.options.scale, placed(cameras, self.options.scale, self.options.middle)
         if self.options.bounds == "rig":
-            return fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
+            return _fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
             raise UserError(f"{self.image_dir}: no view sees anything at a finite depth")
@@ -338,7 +338,7 @@ def lens_keys(lens: Lens) -> dict[str, Any]:
     return {"fl_x": focal, "fl_y": focal, **keys, **coefficients}
 
 
-def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
+def _blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     """Return which pixels (height, width) have no ray, in the lens or in the loader.
 
     They must be hidden, because the loader trains them with the ray of the optical axis. In a
@@ -372,7 +372,7 @@ def fitted(low: Floats, high: Floats) -> tuple[float, list[float]]:
     return scale, (0.5 - scale * TURN @ ((low + high) / 2)).tolist()
 
 
-def fitted_to_rig(cameras: Floats, axes: Floats) -> tuple[float, list[float]]:
+def _fitted_to_rig(cameras: Floats, axes: Floats) -> tuple[float, list[float]]:
     """Return the scale and offset that put the rig in the cube's middle, `RIG_PART` wide.
 
     ``axes`` (n, 3) are the directions in which the ``cameras`` (n, 3) look. A rig that looks

@@ -26,7 +26,7 @@ from lightfield.geometry.mesh import Box, Floats, Mesh, Placed, Surface, box_aro
 
 GLB = "scene.glb"
 PLY = "scene.ply"
-OBJECTS = "objects.json"
+_OBJECTS = "objects.json"
 
 # Numbers in objects.json end at this many digits after the point, which is a nanometre.
 _DIGITS = 9
@@ -61,7 +61,7 @@ def export(surface: Surface, formats: Sequence[str], frame: int, folder: Path) -
     lines = ",\n".join(json.dumps(each, allow_nan=False) for each in objects)
     left_out = json.dumps(surface.left_out)
     write_text(
-        folder / OBJECTS,
+        folder / _OBJECTS,
         f'{{"frame": {frame},\n"left_out": {left_out},\n"objects": [\n{lines}\n]}}\n',
     )
 

@@ -24,11 +24,11 @@ from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.rotations import matrix_to_euler
 
-COLOUR_BITS = 10
-DEPTH_BITS = 16
+_COLOUR_BITS = 10
+_DEPTH_BITS = 16
 
 # Columns: forward, left and up of OMAF's camera in our camera's axes (looks along −z, y up).
-FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
+_FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 
 
 def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
@@ -44,10 +44,10 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
         depth = source.depth(view, meaning)
         farther.count(depth)
         limits = depth_range(depth)
-        texture = yuv.of_colour(source.encoded(view), COLOUR_BITS)
-        write_bytes(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
-        geometry = yuv.of_levels(levels(depth, limits, DEPTH_BITS, 1), DEPTH_BITS)
-        write_bytes(folder / f"{view.name}_depth_{size}_yuv420p{DEPTH_BITS}le.yuv", geometry)
+        texture = yuv.of_colour(source.encoded(view), _COLOUR_BITS)
+        write_bytes(folder / f"{view.name}_texture_{size}_yuv420p{_COLOUR_BITS}le.yuv", texture)
+        geometry = yuv.of_levels(levels(depth, limits, _DEPTH_BITS, 1), _DEPTH_BITS)
+        write_bytes(folder / f"{view.name}_depth_{size}_yuv420p{_DEPTH_BITS}le.yuv", geometry)
         camera_entries.append(
             {
                 "Name": view.name,
@@ -56,8 +56,8 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
                 "Depth_range": list(limits),
                 "Resolution": [lens.width, lens.height],
                 **projection(lens),
-                "BitDepthColor": COLOUR_BITS,
-                "BitDepthDepth": DEPTH_BITS,
+                "BitDepthColor": _COLOUR_BITS,
+                "BitDepthDepth": _DEPTH_BITS,
                 "ColorSpace": "YUV420",
                 "DepthColorSpace": "YUV420",
                 "HasInvalidDepth": True,
@@ -80,5 +80,5 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
 
 def rotation(matrix: Floats) -> list[float]:
     """Return yaw, pitch and roll in degrees of a camera-to-world matrix (4, 4)."""
-    roll, pitch, yaw = np.degrees(matrix_to_euler(matrix[:3, :3] @ FROM_OMAF)).tolist()
+    roll, pitch, yaw = np.degrees(matrix_to_euler(matrix[:3, :3] @ _FROM_OMAF)).tolist()
     return [yaw, pitch, roll]

@@ -46,10 +46,10 @@ from lightfield.imaging import images
 
 SEQUENCE = "views"
 CAMERA = "camera"
-LIDAR = "points"
+_LIDAR = "points"
 WORLD = "world"
 # NCore's readers open the component of this name.
-DEFAULT = "default"
+_DEFAULT = "default"
 
 # Microseconds between the views.
 STEP = 1_000_000
@@ -129,11 +129,11 @@ def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
     store = ZarrStore(folder / name, sequence | {"component_group_name": ""})
     components = {
         "cameras": CAMERA,
-        "cuboids": DEFAULT,
-        "intrinsics": DEFAULT,
-        "lidars": LIDAR,
-        "masks": DEFAULT,
-        "poses": DEFAULT,
+        "cuboids": _DEFAULT,
+        "intrinsics": _DEFAULT,
+        "lidars": _LIDAR,
+        "masks": _DEFAULT,
+        "poses": _DEFAULT,
     }
     for component, instance in components.items():
         store.group(component)
@@ -202,7 +202,7 @@ def _write_poses(store: ZarrStore, frames: Sequence[_Frame]) -> None:
         "dtype": "float64",
     }
     lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
-    store.group("poses/default/static_poses", {str((LIDAR, WORLD)): lidar})
+    store.group("poses/default/static_poses", {str((_LIDAR, WORLD)): lidar})
     store.group("poses/default/dynamic_poses", {str((CAMERA, WORLD)): poses})
 
 
@@ -222,7 +222,7 @@ def _write_points(store: ZarrStore, points: Points) -> None:
     with np.errstate(invalid="ignore"):
         directions = points.positions / distances[:, None]
     directions[distances == 0] = [1, 0, 0]
-    frames = f"lidars/{LIDAR}/frames"
+    frames = f"lidars/{_LIDAR}/frames"
     store.group(frames, {"frames_timestamps_us": [[0, 0]]})
     frame = f"{frames}/0"
     store.group(frame)

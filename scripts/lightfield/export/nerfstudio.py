@@ -33,7 +33,7 @@ from lightfield.imaging import images
 
 POINT_CLOUD = "points.ply"
 # In metres.
-DEPTH_UNIT = 0.001
+_DEPTH_UNIT = 0.001
 
 
 def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
@@ -42,7 +42,7 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
     meaning = conventional_depth(source.lens)
     masked = any(not source.valid(view).all() for view in views)
     frames = []
-    depth_maps = DepthMaps(DEPTH_UNIT)
+    depth_maps = DepthMaps(_DEPTH_UNIT)
     progress = Progress(len(views), "nerfstudio", "views")
     for view in views:
         name = f"{view.name}.png"

@@ -26,16 +26,16 @@ from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging import images
 
 # Rows: the axes of OpenGL's world in ours.
-TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+_TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 # Bits of colour and of depth.
-BITS = {"png": (8, 16), "h265": (10, 12)}
+_BITS = {"png": (8, 16), "h265": (10, 12)}
 
 
 def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
     meaning = conventional_depth(lens)
-    colour_bits, depth_bits = BITS[settings.format]
+    colour_bits, depth_bits = _BITS[settings.format]
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views
     camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
@@ -76,9 +76,9 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
 
 def pose(matrix: Floats) -> dict[str, list[float]]:
     """Return the keys of a camera-to-world matrix (4, 4): metres, and XYZ Euler degrees."""
-    angles = matrix_to_euler(TO_OPENGL @ matrix[:3, :3])
+    angles = matrix_to_euler(_TO_OPENGL @ matrix[:3, :3])
     return {
-        "Position": (TO_OPENGL @ matrix[:3, 3]).tolist(),
+        "Position": (_TO_OPENGL @ matrix[:3, 3]).tolist(),
         "Rotation": np.degrees(angles).tolist(),
     }
 

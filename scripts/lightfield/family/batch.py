@@ -39,9 +39,9 @@ from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 from lightfield.workflow.view_store import ViewStore
 
 # These signals stop a run. They are no fault of the member at hand.
-STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+_STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 # A member at which so many runs died has failed.
-MOST_DEATHS = 3
+_MOST_DEATHS = 3
 
 
 def run(settings: BatchSettings, record: Path, device: str, threads: int) -> None:
@@ -59,7 +59,7 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
         if name in builds:
             builds[name].fail(
                 builds[name].last_stage(),
-                f"{MOST_DEATHS} runs died at it: most likely memory ran out, or Blender crashed",
+                f"{_MOST_DEATHS} runs died at it: most likely memory ran out, or Blender crashed",
             )
             failed.append(name)
         _note(journal, {"failed": name})
@@ -67,7 +67,7 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
     _note(journal, started)
     while signal_number := _work(settings, journal, failed, last, device, threads):
         name = member_at_hand(read_json_lines(journal))
-        if name is None or signal_number in STOPS:
+        if name is None or signal_number in _STOPS:
             raise UserError(f"killed by {signal.Signals(signal_number).name}")
         builds[name].fail(builds[name].last_stage(), signal_cause(signal_number))
         _note(journal, {"failed": name})
@@ -193,14 +193,14 @@ def member_at_hand(lines: Sequence[Mapping[str, Any]]) -> str | None:
 
 
 def deadly_member(lines: Sequence[Mapping[str, Any]]) -> str | None:
-    """Return the member at which the last `MOST_DEATHS` runs of a journal died, if any."""
+    """Return the member at which the last `_MOST_DEATHS` runs of a journal died, if any."""
     runs: list[list[Mapping[str, Any]]] = []
     for line in lines:
         if "started" in line:
             runs.append([])
         elif runs:
             runs[-1].append(line)
-    at_hand = [member_at_hand(run) for run in runs[-MOST_DEATHS:]]
-    if len(at_hand) < MOST_DEATHS or len(set(at_hand)) > 1:
+    at_hand = [member_at_hand(run) for run in runs[-_MOST_DEATHS:]]
+    if len(at_hand) < _MOST_DEATHS or len(set(at_hand)) > 1:
         return None
     return at_hand[0]

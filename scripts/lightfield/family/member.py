@@ -30,7 +30,7 @@ from lightfield.workflow.view_store import ViewStore
 # Raise this number when the stages make something else of equal settings.
 VERSION = 1
 # What a member is made of does not depend on these keys of a scene YAML.
-DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
+_DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
 
 
 class MemberBuild:
@@ -72,7 +72,7 @@ class MemberBuild:
         """
         content = [
             VERSION,
-            {k: v for k, v in self.content.items() if k not in DESCRIPTIVE_KEYS},
+            {k: v for k, v in self.content.items() if k not in _DESCRIPTIVE_KEYS},
             self.settings.limits.as_json(),
             self.settings.fingerprint,
             version("bpy"),

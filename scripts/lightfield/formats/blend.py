@@ -12,7 +12,7 @@ from lightfield.geometry.lenses.rectilinear import RectilinearSettings
 
 Settings = Mapping[str, Any]
 
-ENGINES = {
+_ENGINES = {
     "BLENDER_EEVEE": "EEVEE",
     "BLENDER_EEVEE_NEXT": "EEVEE",
     "BLENDER_WORKBENCH": "Workbench",
@@ -151,7 +151,7 @@ def _scene(blend: Settings, frames: Sequence[float], render: Settings) -> Iterat
         name = "view layer" if len(layers) == 1 else "view layers"
         yield f"{name} {' and '.join(layers)} of {blend['view_layers']}{together}"
     if blend["engine"] != "CYCLES":
-        made_for = ENGINES.get(blend["engine"], blend["engine"])
+        made_for = _ENGINES.get(blend["engine"], blend["engine"])
         yield f"made for {made_for}, rendered with Cycles"
     if isinstance(render.get("samples"), int):
         yield _samples(render["samples"], blend["samples"])

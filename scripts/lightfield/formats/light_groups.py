@@ -20,7 +20,7 @@ WORLD = "World"
 REST = "rest"
 """The group of all emitters that the scene YAML does not name."""
 
-MOST_GROUPS = 255
+_MOST_GROUPS = 255
 """Cycles counts a path's light group in 8 bits, of which one value means none."""
 
 LONGEST_NAME = 40
@@ -29,16 +29,16 @@ NAME_PATTERN = rf"^[A-Za-z0-9][A-Za-z0-9_-]{{0,{LONGEST_NAME - 1}}}$"
 
 _KEY = "render.light_groups"
 
-Setting = str | Sequence[str] | Mapping[str, Sequence[str]]
+_Setting = str | Sequence[str] | Mapping[str, Sequence[str]]
 
 
-def group_name(emitter: str) -> str:
+def _group_name(emitter: str) -> str:
     """Return the name of the group of one emitter: its name with only letters, digits, _ and -."""
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", emitter).strip("_-")[:LONGEST_NAME]
     return name or "emitter"
 
 
-def names_in(setting: Setting | None) -> list[str] | None:
+def names_in(setting: _Setting | None) -> list[str] | None:
     """Return the names of the groups that a scene YAML names. None with `EACH`, or without groups.
 
     A scene may have the group `REST` besides.
@@ -50,7 +50,7 @@ def names_in(setting: Setting | None) -> list[str] | None:
     return [*_named_apart(setting)]
 
 
-def resolved(setting: Setting, emitters: Sequence[str]) -> dict[str, list[str]]:
+def resolved(setting: _Setting, emitters: Sequence[str]) -> dict[str, list[str]]:
     """Return the emitters of each group of a scene that has these ``emitters``.
 
     Raises `UserError` for an emitter that the scene lacks, and for too many groups.
@@ -71,9 +71,9 @@ def resolved(setting: Setting, emitters: Sequence[str]) -> dict[str, list[str]]:
     others = [emitter for emitter in emitters if emitter not in named]
     if others:
         groups[REST] = others
-    if len(groups) > MOST_GROUPS:
+    if len(groups) > _MOST_GROUPS:
         raise UserError(
-            f"{_KEY}: makes {len(groups)} groups, and Cycles has {MOST_GROUPS} at most; name "
+            f"{_KEY}: makes {len(groups)} groups, and Cycles has {_MOST_GROUPS} at most; name "
             "groups of several emitters"
         )
     return groups
@@ -87,12 +87,12 @@ def _named_apart(emitters: Sequence[str]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     taken = {REST}
     for emitter in sorted(emitters, key=lambda name: (name != WORLD, name)):
-        name = group_name(emitter)
+        name = _group_name(emitter)
         number = 1
         while name.lower() in taken:
             number += 1
             suffix = f"_{number}"
-            name = group_name(emitter)[: LONGEST_NAME - len(suffix)] + suffix
+            name = _group_name(emitter)[: LONGEST_NAME - len(suffix)] + suffix
         taken.add(name.lower())
         groups[name] = [emitter]
     return groups

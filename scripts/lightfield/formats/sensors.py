@@ -25,7 +25,7 @@ Stops = Annotated[float, Field(ge=-MOST_STOPS, le=MOST_STOPS)]
 Colour = Annotated[float, Field(ge=-MOST_COLOUR, le=MOST_COLOUR)]
 Alpha = Annotated[float, Field(ge=-100, le=100)]
 Place = Annotated[float, Field(ge=-1, le=1)]
-Alphas = Annotated[tuple[Alpha, Alpha, Alpha], as_list(3)]
+_Alphas = Annotated[tuple[Alpha, Alpha, Alpha], as_list(3)]
 
 
 def _increasing(brackets: list[float]) -> list[float]:
@@ -69,7 +69,7 @@ class Varied(Settings):
 class Vignetting(Settings):
     """Light is multiplied by 1 + α₁r² + α₂r⁴ + α₃r⁶, limited to the range from 0 to 1."""
 
-    alpha: Alphas | Annotated[tuple[Alphas, Alphas, Alphas], as_list(CHANNELS)] = Field(
+    alpha: _Alphas | Annotated[tuple[_Alphas, _Alphas, _Alphas], as_list(CHANNELS)] = Field(
         description="α₁, α₂ and α₃, or three such lists for red, green and blue. r is the distance "
         "from the centre, divided by the image's longer side.",
     )

@@ -13,9 +13,9 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 # A point is hidden if the other view sees a surface that is nearer by more than this part.
 HIDDEN = 0.01
 # Two cameras are equally near if their distances differ by less than this part.
-AS_NEAR = 1e-6
+_AS_NEAR = 1e-6
 # A surface is followed if its way there and back ends within this many pixels.
-RETURNS = 0.5
+_RETURNS = 0.5
 # The pixels around a point belong to one surface if their distances differ by less than this part.
 SAME_SURFACE = 0.1
 
@@ -33,12 +33,12 @@ def neighbours(matrices: Array) -> list[int]:
     cameras = Cameras(places)
     chosen = []
     for view, look in enumerate(ahead):
-        candidates = cameras.nearest_apart(view, ONE_PLACE, AS_NEAR)
+        candidates = cameras.nearest_apart(view, ONE_PLACE, _AS_NEAR)
         away = np.linalg.norm(places[candidates] - places[view], axis=1)
         away[away < ONE_PLACE] = np.inf
         if np.isinf(away.min()):
             raise UserError("flow: all views are from one place; must be two or more")
-        near = candidates[away <= away.min() * (1 + AS_NEAR)]
+        near = candidates[away <= away.min() * (1 + _AS_NEAR)]
         chosen.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
     return chosen
 
@@ -123,7 +123,7 @@ def scene_flow(
             back += weights[..., None] * next_motion[row, column]
     returned = motion + back
     returned[..., 0] = shorter(lens, returned[..., 0])
-    is_known &= np.linalg.norm(returned, axis=-1) < RETURNS
+    is_known &= np.linalg.norm(returned, axis=-1) < _RETURNS
     is_known &= farthest < (1 + SAME_SURFACE) * nearest
     rays = lens.rays(target[..., 0], target[..., 1])
     is_known &= np.isfinite(rays).all(axis=-1)

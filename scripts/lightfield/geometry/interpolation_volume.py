@@ -13,7 +13,7 @@ Courteaux et al. 2022 (the SILVR paper), section "Related Datasets". This file m
 Within 90° of its axis, a camera's field of view is a cone. A convex cone holds all rays to a
 triangle if it holds the rays to its corners. Each side of the cone and each corner then bound the
 point by a plane. So the volume is a convex polyhedron, and nothing is sampled. For 180° fisheyes,
-as SILVR has, the result is exact. Other fields of view become `CONE_SIDES`-sided pyramids inside
+as SILVR has, the result is exact. Other fields of view become `_CONE_SIDES`-sided pyramids inside
 the cone, which takes less than 1e-4 off the volume. What a lens sees beyond 90° does not count,
 unless it sees all round.
 """
@@ -26,12 +26,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from lightfield.geometry.lenses import Lens
 
-CONE_SIDES = 360
+_CONE_SIDES = 360
 
 Floats = NDArray[np.float64]
 
 
-def immersive_planes(
+def _immersive_planes(
     mesh: list[tuple[int, ...]],
     hull: ConvexHull,
     matrices: Floats,
@@ -47,7 +47,7 @@ def immersive_planes(
     outside: Floats = hull.equations
     if sees_all_round(lens):
         return outside
-    sides = cone_sides(lens)
+    sides = _cone_sides(lens)
     if sides is None:
         return None
     # If cameras face inside, a ray runs from the surface through the point.
@@ -77,7 +77,7 @@ def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
         return nowhere
     outward = ((positions - middle) * -matrices[:, :3, 2]).sum() >= 0
     mesh = [tuple(map(int, cell)) for cell in hull.simplices]
-    planes = immersive_planes(mesh, hull, matrices, lens, not outward)
+    planes = _immersive_planes(mesh, hull, matrices, lens, not outward)
     if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
         return nowhere
     reach = -(planes[:, :3] @ middle + planes[:, 3])
@@ -96,13 +96,13 @@ def sees_all_round(lens: Lens) -> bool:
     return bool(_is_visible(lens, _directions(theta, azimuth)).all())
 
 
-def cone_sides(lens: Lens) -> Floats | None:
+def _cone_sides(lens: Lens) -> Floats | None:
     """Return the inward normals (n, 3), in camera coordinates, of the field of view's sides.
 
     The lens sees a direction d if normal · d ≥ 0 for all of them. None if the lens does not see
     its own axis. For a field of view of 180° or more the only side is the camera's plane.
     """
-    azimuths = 2 * math.pi * np.arange(CONE_SIDES) / CONE_SIDES
+    azimuths = 2 * math.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = [
         math.atan2(lens.center[1] - y, x - lens.center[0])
         for x in (0, lens.width)

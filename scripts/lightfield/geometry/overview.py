@@ -10,7 +10,7 @@ from lightfield.geometry.rotations import euler_to_matrix
 # So many directions are tested, spread evenly.
 DIRECTIONS = 200
 # The cameras must see at least this part of the directions.
-SEEN_PART = 0.75
+_SEEN_PART = 0.75
 # More cameras than this would not change the answer.
 MOST_CAMERAS = 200
 
@@ -34,7 +34,7 @@ def sees_all_round(rig: Rig) -> bool:
     x, y = np.moveaxis(lens.pixels(directions @ turns), -1, 0)
     side = (places - np.array(rig.center)) @ directions.T
     seen = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height) & (side >= -1e-9)
-    return bool(seen.any(axis=0).mean() >= SEEN_PART)
+    return bool(seen.any(axis=0).mean() >= _SEEN_PART)
 
 
 def middle_view(rig: Rig) -> int:

@@ -45,7 +45,7 @@ LEAST_ALPHA = 1e-3
 HALF_MAX = 65504.0
 
 # Of a picture, in pixels.
-LARGEST_SIDE = 65536
+_LARGEST_SIDE = 65536
 
 # OpenEXR's codecs that keep every bit of halves and floats.
 CODECS = {
@@ -162,7 +162,7 @@ class Header:
 
 
 # Of 100. Most values are off by a level at most.
-JPEG_QUALITY = 98
+_JPEG_QUALITY = 98
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
@@ -321,7 +321,7 @@ def write_jpeg(path: Path | str, pixels: np.ndarray[Any, Any]) -> None:
 
     height, width, count = pixels.shape
     spec = oiio.ImageSpec(width, height, count, "uint8")
-    spec.attribute("Compression", f"jpeg:{JPEG_QUALITY}")
+    spec.attribute("Compression", f"jpeg:{_JPEG_QUALITY}")
     spec.attribute("jpeg:subsampling", "4:4:4")
     with atomic_path(path) as temporary:
         file = oiio.ImageOutput.create(str(temporary))
@@ -416,9 +416,9 @@ def _placed_window(path: Path | str, data: Sequence[int], display: Sequence[int]
     """
     x, y, width, height = display
     window = Window(width, height, data[0] - x, data[1] - y, *data[2:])
-    if not window.is_stored_whole and max(width, height) > LARGEST_SIDE:
+    if not window.is_stored_whole and max(width, height) > _LARGEST_SIDE:
         raise UserError(
-            f"{path}: displayWindow: is {width} × {height}; must have at most {LARGEST_SIDE} "
+            f"{path}: displayWindow: is {width} × {height}; must have at most {_LARGEST_SIDE} "
             "pixels a side"
         )
     return window

@@ -24,9 +24,9 @@ GREEN = "#009e73"
 VERMILION = "#d55e00"
 PURPLE = "#cc79a7"
 SKY = "#56b4e9"
-YELLOW = "#f0e442"
+_YELLOW = "#f0e442"
 GREY = "#777777"
-COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW, GREY)
+COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, _YELLOW, GREY)
 # Each colour has a marker, so that lines differ without colour, too.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 

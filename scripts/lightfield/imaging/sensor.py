@@ -175,7 +175,7 @@ def sense(light: NDArray[Any], parameters: Parameters, with_weights: bool = True
         strip = np.nan_to_num(light[rows].astype(np.float64), posinf=_BRIGHTEST).clip(0)
         clean = np.minimum(strip * 2.0**parameters.exposure * falloff, _BRIGHTEST)
         raw = noisy(clean, parameters, random)
-        codes = np.rint(respond(recolour(raw, parameters), parameters) * parameters.largest)
+        codes = np.rint(_respond(_recolour(raw, parameters), parameters) * parameters.largest)
         scale = parameters.stored_largest / parameters.largest
         pixels[rows] = np.rint(codes * scale).astype(dtype)
         is_white = (codes == parameters.largest) | (raw >= 1)
@@ -238,7 +238,7 @@ def homography(colour: Sequence[float]) -> Floats:
     return np.asarray(matrix / matrix[2, 2])
 
 
-def recolour(raw: Floats, parameters: Parameters) -> Floats:
+def _recolour(raw: Floats, parameters: Parameters) -> Floats:
     """Apply PPISP's colour to a raw signal (…, 3), and keep its intensity R + G + B."""
     intensity = raw.sum(axis=-1)
     moved = _with_intensity(raw, intensity) @ parameters.homography.T
@@ -247,10 +247,10 @@ def recolour(raw: Floats, parameters: Parameters) -> Floats:
 
 
 def _colour_undone(colour: Floats, parameters: Parameters) -> Floats:
-    """Return the raw signal that `recolour` turns into ``colour``."""
+    """Return the raw signal that `_recolour` turns into ``colour``."""
     moved = _with_intensity(colour, colour.sum(axis=-1))
     back = moved @ np.linalg.inv(parameters.homography).T
-    # `recolour` divides by the moved intensity plus a small number. Solve for the factor.
+    # `_recolour` divides by the moved intensity plus a small number. Solve for the factor.
     third = np.maximum(moved[..., 2], 0)
     scaled = np.maximum(back[..., 2], 0)
     root = np.sqrt(third**2 + 4 * _INTENSITY_FLOOR * scaled)
@@ -267,7 +267,7 @@ def _without_intensity(moved: Floats) -> Floats:
     return np.stack([moved[..., 0], moved[..., 1], blue], axis=-1)
 
 
-def respond(colour: Floats, parameters: Parameters) -> Floats:
+def _respond(colour: Floats, parameters: Parameters) -> Floats:
     """Return the response (…, 3) to linear colour, which is clipped to [0, 1].
 
     Source: apply_crf_ppisp in ppisp_math.cuh.
@@ -285,7 +285,7 @@ def respond(colour: Floats, parameters: Parameters) -> Floats:
 
 
 def _response_undone(encoded: Floats, parameters: Parameters) -> Floats:
-    """Return the linear colour (…, 3) to which `respond` gives ``encoded``, 0 to 1."""
+    """Return the linear colour (…, 3) to which `_respond` gives ``encoded``, 0 to 1."""
     if parameters.response is None:
         return decode_srgb(encoded)
     out = np.empty_like(encoded)
@@ -313,8 +313,8 @@ def _weights(clean: Floats, falloff: Floats, parameters: Parameters) -> Floats:
     """
     variance = parameters.gain * clean + parameters.floor
     margin = _SAFE_DEVIATIONS * np.sqrt(variance)
-    colour = recolour(clean, parameters)
-    encoded = respond(colour, parameters)
+    colour = _recolour(clean, parameters)
+    encoded = _respond(colour, parameters)
     half_code = 0.5 / parameters.largest
     width = _response_undone(np.minimum(encoded + half_code, 1), parameters)
     width -= _response_undone(np.maximum(encoded - half_code, 0), parameters)

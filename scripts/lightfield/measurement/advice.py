@@ -31,13 +31,13 @@ SEEDS = range(1, 5)
 # Adaptive sampling has no effect below about thirty samples.
 ADAPTIVE = {"samples": 64, "adaptive_threshold": 0.2}
 # A change is advised if it saves at least the factor WORTH, by SURE standard errors.
-WORTH = 1.03
-SURE = 2.0
+_WORTH = 1.03
+_SURE = 2.0
 # A render slower than this times the median of its seeds was slowed by another load.
-DISTURBED = 1.5
+_DISTURBED = 1.5
 
 # The methods that changes are compared with: path traced and denoised, at rising samples.
-UNCHANGED = {
+_UNCHANGED = {
     name: [
         Method(name, {"samples": samples, "denoise": name == DENOISED})
         for samples in (SAMPLES // 2, SAMPLES, 2 * SAMPLES)
@@ -58,14 +58,14 @@ COSTLY = (
     "displacement",
 )
 # The table names at most this many materials, objects or lights of a kind.
-MOST_NAMES = 8
+_MOST_NAMES = 8
 
 
 @dataclass(frozen=True)
 class Change:
     """A change of a scene's ``render`` block, and the ``settings`` that render it.
 
-    ``compared_with`` names the unchanged renders in `UNCHANGED`. ``unbiased`` says that the change
+    ``compared_with`` names the unchanged renders in `_UNCHANGED`. ``unbiased`` says that the change
     is known to keep the picture. A change that is not ``may_be_advised`` is only reported.
     """
 
@@ -119,7 +119,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Difference:
+class _Difference:
     """How a change moves the picture: ``bias``, ``noise`` and ``light`` of a `Saving`."""
 
     bias: float
@@ -166,11 +166,11 @@ def measure(
     """
     title = f"{name}: trials"
     changes = changes_to_try({**inventory["sampling"], **render}, experiment.device == "CPU")
-    unchanged = [method for methods in UNCHANGED.values() for method in methods]
+    unchanged = [method for methods in _UNCHANGED.values() for method in methods]
     experiment.run([*unchanged, *(change.method for change in changes)], SEEDS, title)
     measured = [(change, savings(experiment, change)) for change in changes]
-    advised = advised_changes(measured)
-    combined = combination([change for change in advised if change.compared_with == TRACED])
+    advised = _advised_changes(measured)
+    combined = _combination([change for change in advised if change.compared_with == TRACED])
     if combined:
         experiment.run([combined.method], SEEDS, title)
         measured.append((combined, savings(experiment, combined)))
@@ -180,8 +180,8 @@ def measure(
         "strata": experiment.areas,
         "own": {key: render[key] for key in ("samples", "denoise")},
         "unchanged": {
-            of: [unchanged_figures(experiment, method) for method in methods]
-            for of, methods in UNCHANGED.items()
+            of: [_unchanged_figures(experiment, method) for method in methods]
+            for of, methods in _UNCHANGED.items()
         },
         "tried": [
             {
@@ -201,7 +201,7 @@ def measure(
     }
 
 
-def advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
+def _advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
     """Return the advised changes. Of several values of a key, only the one that saves most."""
     good = [
         (saved[WHOLE_VIEWS].times, change)
@@ -214,7 +214,7 @@ def advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> 
     return list(by_keys.values())
 
 
-def combination(changes: Sequence[Change]) -> Change | None:
+def _combination(changes: Sequence[Change]) -> Change | None:
     """Return several changes as one, which is only reported. None for fewer than two."""
     if len(changes) < 2:
         return None
@@ -234,9 +234,9 @@ def is_advised(change: Change, saving: Saving | None) -> bool:
     return (
         saving is not None
         and change.may_be_advised
-        and saving.times - SURE * saving.uncertainty >= WORTH
+        and saving.times - _SURE * saving.uncertainty >= _WORTH
         # A change must not save by hiding rare bright pixels.
-        and saving.times_of_all_pixels + SURE * saving.uncertainty_of_all_pixels >= 1
+        and saving.times_of_all_pixels + _SURE * saving.uncertainty_of_all_pixels >= 1
         and (change.compared_with == DENOISED or change.unbiased or saving.same_picture)
     )
 
@@ -247,8 +247,8 @@ def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
     Leaves out a stratum whose renders are no worse than the reference.
     """
     changed = figures(experiment, change.method)
-    unchanged = [figures(experiment, method) for method in UNCHANGED[change.compared_with]]
-    differences = picture_differences(experiment, change)
+    unchanged = [figures(experiment, method) for method in _UNCHANGED[change.compared_with]]
+    differences = _picture_differences(experiment, change)
     saved = {}
     for stratum, of_seeds in changed.items():
         rising = [by_stratum[stratum] for by_stratum in unchanged]
@@ -260,14 +260,14 @@ def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
         times_of_all_pixels = []
         for seed, now in enumerate(of_seeds):
             by_error = [(before[seed].seconds, before[seed].error) for before in rising]
-            times.append(seconds_to_error(now.error, by_error) / now.seconds)
+            times.append(_seconds_to_error(now.error, by_error) / now.seconds)
             by_error = [
                 (before[seed].seconds, before[seed].error_of_all_pixels) for before in rising
             ]
-            seconds = seconds_to_error(now.error_of_all_pixels, by_error)
+            seconds = _seconds_to_error(now.error_of_all_pixels, by_error)
             times_of_all_pixels.append(seconds / now.seconds)
         saved[stratum] = Saving(
-            *geometric_mean(times), *geometric_mean(times_of_all_pixels), **asdict(difference)
+            *_geometric_mean(times), *_geometric_mean(times_of_all_pixels), **asdict(difference)
         )
     return saved
 
@@ -275,7 +275,7 @@ def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
 def figures(experiment: Experiment, method: Method) -> dict[str, list[Figures]]:
     """Return the figures of each seed, by stratum and of whole views."""
     by_stratum = {
-        stratum: stratum_figures(experiment, method, references)
+        stratum: _stratum_figures(experiment, method, references)
         for stratum, references in experiment.strata.items()
     }
     whole_views = []
@@ -294,7 +294,7 @@ def figures(experiment: Experiment, method: Method) -> dict[str, list[Figures]]:
     return by_stratum
 
 
-def stratum_figures(
+def _stratum_figures(
     experiment: Experiment, method: Method, references: References
 ) -> list[Figures]:
     """Return the figures of each seed: means over the windows of a stratum."""
@@ -302,7 +302,7 @@ def stratum_figures(
     errors_of_all_pixels = experiment.errors(method, references, left_out=0)
     seconds = []
     for of_window in experiment.seconds(method, references):
-        limit = DISTURBED * median(of_window)
+        limit = _DISTURBED * median(of_window)
         seconds.append([min(value, limit) for value in of_window])
     return [
         Figures(
@@ -314,7 +314,7 @@ def stratum_figures(
     ]
 
 
-def unchanged_figures(experiment: Experiment, method: Method) -> dict[str, Any]:
+def _unchanged_figures(experiment: Experiment, method: Method) -> dict[str, Any]:
     """Return the samples, the error and the seconds of the unchanged scene in whole views."""
     of_seeds = figures(experiment, method)[WHOLE_VIEWS]
     return {
@@ -324,10 +324,10 @@ def unchanged_figures(experiment: Experiment, method: Method) -> dict[str, Any]:
     }
 
 
-def picture_differences(experiment: Experiment, change: Change) -> dict[str, Difference]:
+def _picture_differences(experiment: Experiment, change: Change) -> dict[str, _Difference]:
     """Return how a change moves the picture, by stratum and of whole views."""
     changed = experiment.renders(change.method)
-    unchanged = experiment.renders(UNCHANGED[change.compared_with][1])
+    unchanged = experiment.renders(_UNCHANGED[change.compared_with][1])
     by_stratum = {}
     for stratum, references in experiment.strata.items():
         biases = []
@@ -347,8 +347,8 @@ def picture_differences(experiment: Experiment, change: Change) -> dict[str, Dif
             light = fmean(float(now.colour[counted].mean()) for now, _ in pairs)
             light_before = fmean(float(before.colour[counted].mean()) for _, before in pairs)
             lights.append(light / light_before - 1 if light_before else 0.0)
-        by_stratum[stratum] = Difference(fmean(biases), fmean(noises), fmean(lights))
-    by_stratum[WHOLE_VIEWS] = Difference(
+        by_stratum[stratum] = _Difference(fmean(biases), fmean(noises), fmean(lights))
+    by_stratum[WHOLE_VIEWS] = _Difference(
         bias=experiment.over_views({s: d.bias for s, d in by_stratum.items()}),
         noise=experiment.over_views({s: d.noise for s, d in by_stratum.items()}),
         light=experiment.over_views({s: d.light for s, d in by_stratum.items()}),
@@ -356,7 +356,7 @@ def picture_differences(experiment: Experiment, change: Change) -> dict[str, Dif
     return by_stratum
 
 
-def seconds_to_error(error: float, points: Sequence[tuple[float, float]]) -> float:
+def _seconds_to_error(error: float, points: Sequence[tuple[float, float]]) -> float:
     """Return the seconds to an error, from (seconds, error) points in rising order of seconds.
 
     Beyond the points the error is inversely proportional to the seconds.
@@ -367,7 +367,7 @@ def seconds_to_error(error: float, points: Sequence[tuple[float, float]]) -> flo
     return effort_for(error, points)
 
 
-def geometric_mean(factors: Sequence[float]) -> tuple[float, float]:
+def _geometric_mean(factors: Sequence[float]) -> tuple[float, float]:
     """Return the geometric mean of some factors, and its standard error."""
     logarithms = [math.log(factor) for factor in factors]
     mean = math.exp(fmean(logarithms))
@@ -444,8 +444,8 @@ def _unchanged_table(content: Mapping[str, Any]) -> list[str]:
 def _costly_list(content: Mapping[str, Any]) -> list[str]:
     lines = ["", "What may cost time in the scene:", ""]
     for kind, names in content["costly"].items():
-        more = " …" if len(names) > MOST_NAMES else ""
-        lines.append(f"- {kind}: {len(names)}, {', '.join(names[:MOST_NAMES])}{more}")
+        more = " …" if len(names) > _MOST_NAMES else ""
+        lines.append(f"- {kind}: {len(names)}, {', '.join(names[:_MOST_NAMES])}{more}")
     return lines
 
 

@@ -27,24 +27,24 @@ from lightfield.planning.sampling import (
 )
 from lightfield.planning.unit_costs import DENOISING_SAMPLES
 
-PROBE_SEED = 1
-HELD_OUT_SEED = 2
+_PROBE_SEED = 1
+_HELD_OUT_SEED = 2
 
 # Cycles' largest number of samples of a pixel.
 MOST_SAMPLES = 2**24
 # The most samples of adaptive sampling. The calibration chooses its threshold.
-MOST_ADAPTIVE_SAMPLES = 4096
-FIRST_THRESHOLD = 0.4
-LEAST_THRESHOLD = 1e-4
+_MOST_ADAPTIVE_SAMPLES = 4096
+_FIRST_THRESHOLD = 0.4
+_LEAST_THRESHOLD = 1e-4
 
 # The target leaves out the worst thousandth of pixels. A method that reaches it may have at most
 # this many times the error of all pixels of plain path tracing at the target. More hides fireflies.
-MOST_OF_PLAIN = 2
+_MOST_OF_PLAIN = 2
 
 # An error within this part of the target counts as on the target.
-CLOSE = 0.05
+_CLOSE = 0.05
 # Held-out views confirm the choice if their error is within this part of the target.
-CONFIRMED = 0.2
+_CONFIRMED = 0.2
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Search:
         _print_progress(f"plain path tracing needs {self._plain_samples_needed:.3g} samples")
         # The error of all pixels of plain path tracing is inversely proportional to its samples.
         error_of_one_sample = fmean(e.whole_error * e.samples for e in self.measured)
-        self.most_whole_error = MOST_OF_PLAIN * error_of_one_sample / self._plain_samples_needed
+        self.most_whole_error = _MOST_OF_PLAIN * error_of_one_sample / self._plain_samples_needed
         if denoise in (None, True):
             self._climb("denoised", _with_samples, {"denoise": True}, 1, self.limit)
             self._climb_thresholds("adaptive, denoised", {"denoise": True})
@@ -174,7 +174,7 @@ class Search:
     def reaches(self, entry: Candidate) -> bool:
         """Return whether the error is at most the target, without hiding fireflies."""
         keeps_fireflies = entry.way == "plain" or entry.whole_error <= self.most_whole_error
-        return keeps_fireflies and entry.error <= self.target * (1 + CLOSE)
+        return keeps_fireflies and entry.error <= self.target * (1 + _CLOSE)
 
     def choose(self) -> Candidate:
         """Return the cheapest candidate that reaches the target, or the one with least error."""
@@ -209,10 +209,10 @@ class Search:
 
         def with_threshold(effort: float) -> dict[str, Any]:
             threshold = float(f"{1 / effort:.3g}")
-            samples = min(self.limit, MOST_ADAPTIVE_SAMPLES)
+            samples = min(self.limit, _MOST_ADAPTIVE_SAMPLES)
             return {"samples": samples, "adaptive_threshold": threshold}
 
-        self._climb(name, with_threshold, fixed, 1 / FIRST_THRESHOLD, 1 / LEAST_THRESHOLD)
+        self._climb(name, with_threshold, fixed, 1 / _FIRST_THRESHOLD, 1 / _LEAST_THRESHOLD)
 
     def _climb(
         self,
@@ -231,7 +231,7 @@ class Search:
         measured = [entry for _, entry in points]
         bracket = points[-2:]
         while len(bracket) == 2 and self.reaches(bracket[1][1]):
-            if bracket[1][1].error >= self.target * (1 - CLOSE):
+            if bracket[1][1].error >= self.target * (1 - _CLOSE):
                 break
             effort = effort_for(self.target, [(at, entry.error) for at, entry in bracket])
             settings = {**PLAIN, **settings_at(effort), **fixed}
@@ -286,14 +286,14 @@ def calibrate(
     """
     target = render["target_error"]
     windows = maker.windows(size, count)
-    unseen_windows = held_out_windows(maker, windows)
+    unseen_windows = _held_out_windows(maker, windows)
     # The pilot renders first, because it sets up Cycles for the parts of light.
     classes = strata.classes_of(maker, [*windows, *unseen_windows])
-    bench = Bench(maker, windows, PROBE_SEED, target)
+    bench = Bench(maker, windows, _PROBE_SEED, target)
     search = Search(bench.measure, target, render.get("most_samples"), render.get("denoise"))
     choice = search.choose()
     held_out = Bench(
-        maker, unseen_windows, HELD_OUT_SEED, target, bench.experiment.references[0].exposure
+        maker, unseen_windows, _HELD_OUT_SEED, target, bench.experiment.references[0].exposure
     )
     for each in (bench, held_out):
         each.measure(choice.method)
@@ -301,7 +301,7 @@ def calibrate(
     least_error = min(bench.own_error, target)
     plain_samples = search.plain_samples(max(choice.error, least_error))
     record = {
-        **choice_evidence(search, choice, bench),
+        **_choice_evidence(search, choice, bench),
         **confirmation(held_out.errors(choice.method), target),
         "plain_samples_at_equal_error": plain_samples,
         "times_fewer_samples": plain_samples / choice.cost,
@@ -312,17 +312,17 @@ def calibrate(
             {"probe": window.name, "error": error}
             for window, error in zip(unseen_windows, held_out.errors(choice.method), strict=True)
         ],
-        "strata": errors_by_stratum([bench, held_out], classes, choice.method),
+        "strata": _errors_by_stratum([bench, held_out], classes, choice.method),
         "references": {
             "samples": [each.reference_seeds * REFERENCE_SAMPLES for each in (bench, held_out)],
             "own_error": [each.own_error for each in (bench, held_out)],
         },
         "candidates": [entry.evidence() for entry in search.measured],
     }
-    return record, seconds_taken(search, choice, plain_samples)
+    return record, _seconds_taken(search, choice, plain_samples)
 
 
-def held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
+def _held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
     """Return each window's place in the nearest view without a window, or else in its own view."""
     views_of_windows = [window.view for window in windows]
     views = [view for view in maker.lightfield.views if view not in views_of_windows]
@@ -332,7 +332,7 @@ def held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
     return held_out
 
 
-def choice_evidence(search: Search, choice: Candidate, bench: Bench) -> dict[str, Any]:
+def _choice_evidence(search: Search, choice: Candidate, bench: Bench) -> dict[str, Any]:
     """Return the choice, and its errors on the bench that chose it."""
     return {
         "target_error": search.target,
@@ -355,11 +355,11 @@ def confirmation(errors: Sequence[float], target: float) -> dict[str, Any]:
         "held_out_error": error,
         "held_out_ratio": error / target,
         "held_out_standard_error": standard_error(errors),
-        "confirmed": abs(error / target - 1) <= CONFIRMED,
+        "confirmed": abs(error / target - 1) <= _CONFIRMED,
     }
 
 
-def seconds_taken(search: Search, choice: Candidate, plain_samples: float) -> dict[str, Any]:
+def _seconds_taken(search: Search, choice: Candidate, plain_samples: float) -> dict[str, Any]:
     """Return the seconds of the choice, of all candidates, and of ``plain_samples`` samples."""
     plain = max((e for e in search.measured if e.way == "plain"), key=lambda e: e.samples)
     plain_seconds = plain.seconds * plain_samples / plain.samples
@@ -374,7 +374,7 @@ def seconds_taken(search: Search, choice: Candidate, plain_samples: float) -> di
     }
 
 
-def errors_by_stratum(
+def _errors_by_stratum(
     benches: Sequence[Bench], classes: Sequence[strata.Classes], method: Method
 ) -> dict[str, dict[str, float]]:
     """Return the error of a measured method in each stratum of all windows, and the stratum's area.

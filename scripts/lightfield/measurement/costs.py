@@ -24,20 +24,20 @@ from lightfield.workflow import journal
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 
 # The stages that every dataset has, in the order of the work. Other stages come between.
-FIRST_STAGES = ("scene", "cameras", "render")
-LAST_STAGES = ("export", "validate", "report")
+_FIRST_STAGES = ("scene", "cameras", "render")
+_LAST_STAGES = ("export", "validate", "report")
 # The file and the folder that exporters write beside the views.
-EXPORTED = ("transforms.json", "exports")
+_EXPORTED = ("transforms.json", "exports")
 # The files and folders of a stage. Without an entry, the folder has the stage's name.
-STAGE_PATHS = {
+_STAGE_PATHS = {
     "cameras": ("lightfield.json",),
     "render": ("exr", *PASSES, f"{GROUP_PREFIX}*"),
     # Exports of reprojected views lie in the reprojection's folder.
-    "export": (*EXPORTED, *(f"*/{name}" for name in EXPORTED)),
+    "export": (*_EXPORTED, *(f"*/{name}" for name in _EXPORTED)),
     "validate": ("validation.json",),
 }
 # Files of the report that differ from build to build do not count.
-NOT_COUNTED = ("costs.json", "index.html")
+_NOT_COUNTED = ("costs.json", "index.html")
 
 
 @dataclass
@@ -96,7 +96,7 @@ class Power:
         return self.watts * machine_seconds / 3.6e6
 
 
-def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
+def _shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
     """Add up all processes that worked on one shard."""
     first, end = map(int, name.split("-"))
     views = [view for run in runs for view in run.views]
@@ -127,7 +127,7 @@ def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {k: round(v, 3) if isinstance(v, float) else v for k, v in figures.items()}
 
 
-def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
+def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
     """Add up the jobs' TSVs by stage: the name of a TSV's folder, or else its own name.
 
     Leaves out the TSVs of shards, because they hold only a shard's last run. Warns about a TSV that
@@ -166,7 +166,7 @@ def job_times(path: Path) -> tuple[float, float, int]:
     return wall, cpu, memory
 
 
-def stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dict[str, int]:
+def _stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dict[str, int]:
     """Return the size of the files of each stage. 0 for a stage without files in the dataset.
 
     A file that exports link to takes no more space there. It counts in the first of its stages.
@@ -175,7 +175,7 @@ def stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dic
     counted: set[tuple[int, int]] = set()
     for stage in stages:
         sizes[stage] = 0
-        for file in stage_files(stage, dataset, blend):
+        for file in _stage_files(stage, dataset, blend):
             status = file.stat()
             if (status.st_dev, status.st_ino) not in counted:
                 counted.add((status.st_dev, status.st_ino))
@@ -183,18 +183,18 @@ def stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dic
     return sizes
 
 
-def stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
+def _stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
     """Return the files of a stage that count, in the folder ``dataset``."""
     if stage == "scene":
         return [blend] if blend else []
     files = []
-    for name in STAGE_PATHS.get(stage, (stage,)):
+    for name in _STAGE_PATHS.get(stage, (stage,)):
         for path in dataset.glob(name):
             inside = [path] if path.is_file() else files_below(path)
-            files += [file for file in inside if file.name not in NOT_COUNTED]
+            files += [file for file in inside if file.name not in _NOT_COUNTED]
     if stage == "export":
         return files
-    exported = [dataset / stage / name for name in EXPORTED]
+    exported = [dataset / stage / name for name in _EXPORTED]
     return [file for file in files if not any(file.is_relative_to(path) for path in exported)]
 
 
@@ -222,24 +222,24 @@ def renderings(run: journal.Run) -> Iterator[Rendering]:
     for index, view in enumerate(run.views):
         traced = view["render_seconds"]
         rest = max(0.0, view["wall_seconds"] - traced)
-        if on_processor(run):
+        if _on_processor(run):
             busy = run.start["threads"] * traced
             traced = view["cpu_seconds"] * busy / (busy + rest)
             rest = view["cpu_seconds"] - traced
         yield Rendering(view["view"], view["finished"], traced, rest, first=index == 0)
 
 
-def on_processor(run: journal.Run) -> bool:
+def _on_processor(run: journal.Run) -> bool:
     """Return whether a process rendered on the processor's cores."""
     return bool(run.start["device"] == "CPU")
 
 
 def on_card(run: journal.Run) -> bool:
     """Return whether a process rendered views on a graphics card."""
-    return bool(run.views) and not on_processor(run)
+    return bool(run.views) and not _on_processor(run)
 
 
-def latest_device(runs: Sequence[journal.Run]) -> str | None:
+def _latest_device(runs: Sequence[journal.Run]) -> str | None:
     """Return the device that rendered the latest view. None without a rendered view."""
     rendered = [run for run in runs if run.views]
     if not rendered:
@@ -269,11 +269,11 @@ def costs(
         for path in sorted(journals.glob(journal.JOURNALS))
     }
     runs = [run for runs_of_shard in by_shard.values() for run in runs_of_shard]
-    shards = [shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
+    shards = [_shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
-    stages = in_order(job_stages(benchmarks, scene_benchmarks) | {"render": render_stage(shards)})
-    sizes = stage_bytes(stages, dataset, blend)
-    device = latest_device(runs)
+    stages = in_order(_job_stages(benchmarks, scene_benchmarks) | {"render": _render_stage(shards)})
+    sizes = _stage_bytes(stages, dataset, blend)
+    device = _latest_device(runs)
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
         "stages": [
@@ -285,7 +285,7 @@ def costs(
         "device": device,
         "cores": power.cores,
         "watts": power.watts,
-        "energy_kwh": power.kwh(machine_seconds(stages, runs, power.cores)),
+        "energy_kwh": power.kwh(_machine_seconds(stages, runs, power.cores)),
         "attribution": (
             f"{power.watts:g} W, the whole machine's, times wall time, times the part of its "
             f"{power.cores} cores that was busy"
@@ -303,7 +303,7 @@ def costs(
     }
 
 
-def render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
+def _render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
     """Return the sums over the jobs of all shards."""
     return Stage(
         jobs=len(shards),
@@ -315,12 +315,12 @@ def render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
 
 def in_order(stages: Mapping[str, Stage]) -> dict[str, Stage]:
     """Return the stages in the order of the work."""
-    between = sorted(stages.keys() - {*FIRST_STAGES, *LAST_STAGES})
-    names = [*FIRST_STAGES, *between, *LAST_STAGES]
+    between = sorted(stages.keys() - {*_FIRST_STAGES, *_LAST_STAGES})
+    names = [*_FIRST_STAGES, *between, *_LAST_STAGES]
     return {name: stages[name] for name in names if name in stages}
 
 
-def machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], cores: int) -> float:
+def _machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], cores: int) -> float:
     """Return the seconds of the whole machine that the work took.
 
     Work on processors takes its part of the ``cores``. A run on a graphics card takes the machine.
@@ -375,8 +375,8 @@ def extrapolation(
     If both processors and graphics cards rendered, only views of the latest device count: times of
     a core and of a whole machine have no mean.
     """
-    by_processor = latest_device(runs) == "CPU"
-    runs = [run for run in runs if not run.views or on_processor(run) == by_processor]
+    by_processor = _latest_device(runs) == "CPU"
+    runs = [run for run in runs if not run.views or _on_processor(run) == by_processor]
     # Journals may have views that the dataset had under earlier settings.
     names = {view.name for view in lightfield.views}
     all_renderings = [
@@ -384,7 +384,7 @@ def extrapolation(
     ]
     if not all_renderings:
         return None
-    latest = latest_renderings(all_renderings)
+    latest = _latest_renderings(all_renderings)
     scale = Scale.of(full, lightfield)
     times = [view.path_tracing * scale.pixels * scale.effort for view in latest]
     error = None
@@ -420,7 +420,7 @@ def extrapolation(
     }
 
 
-def latest_renderings(all_renderings: Sequence[Rendering]) -> list[Rendering]:
+def _latest_renderings(all_renderings: Sequence[Rendering]) -> list[Rendering]:
     """Return the latest rendering of each view, without the first views of processes.
 
     First views do not represent the others. They count only if there are no others.

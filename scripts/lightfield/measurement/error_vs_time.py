@@ -45,14 +45,14 @@ from lightfield.planning.sampling import PLAIN as PLAIN_SAMPLING
 PLAIN = "plain"
 ADAPTIVE = "adaptive"
 BOTH = "adaptive + denoised"
-GUIDED = "path guiding"
+_GUIDED = "path guiding"
 OWN = "this scene's settings"
 
 # Thresholds above 0.2 have no effect: adaptive sampling takes its fewest samples.
-THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
+_THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
 
 # The figures of a point that are means over the errors of its renders.
-COMPARED = (
+_COMPARED = (
     "relative_mse",
     "relative_mse_whole",
     "relative_mse_unexposed",
@@ -63,7 +63,7 @@ COMPARED = (
 )
 
 # The figures of a point that have a column in its table.
-FIGURES = (
+_FIGURES = (
     "samples",
     "seconds",
     "relative_mse",
@@ -79,7 +79,7 @@ FIGURES = (
 )
 
 # The keys of a point that name its method. All others are figures.
-METHOD_KEYS = ("method", "settings")
+_METHOD_KEYS = ("method", "settings")
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def measure(
         chosen.insert(1, replace(chosen[0], view=neighbour))
     experiment = Experiment.stratified(maker, chosen, areas, reference_samples, name)
     on_cpu = experiment.device == "CPU"
-    methods = all_methods(render, octaves, guiding=on_cpu)
+    methods = _all_methods(render, octaves, guiding=on_cpu)
     experiment.run(methods, range(1, 1 + seeds), f"{name}: trials")
     points = {
         stratum: [
@@ -160,7 +160,7 @@ def measure(
             "device": experiment.device,
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },
-        **evaluated(points_of_whole_views(points, experiment), experiment.reference_error),
+        **evaluated(_points_of_whole_views(points, experiment), experiment.reference_error),
         "strata": {
             stratum: {
                 "area": areas[stratum],
@@ -169,23 +169,23 @@ def measure(
             }
             for stratum, places in experiment.strata.items()
         },
-        "neighbouring_views": neighbour_disagreements(experiment, methods) if neighbour else [],
+        "neighbouring_views": _neighbour_disagreements(experiment, methods) if neighbour else [],
         "changes": advice.measure(experiment, render, maker.inventory, name),
     }
 
 
-def all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[Method]:
+def _all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[Method]:
     """Return all methods to measure. The scene's own settings come last."""
     counts = [2**octave for octave in range(octaves + 1)]
     methods: list[Method] = []
     for denoise, by_count, by_threshold in ((False, PLAIN, ADAPTIVE), (True, DENOISED, BOTH)):
         methods += [Method(by_count, {"samples": n, "denoise": denoise}) for n in counts]
-        for threshold in THRESHOLDS:
+        for threshold in _THRESHOLDS:
             settings = {"samples": counts[-1], "adaptive_threshold": threshold, "denoise": denoise}
             methods.append(Method(by_threshold, settings))
     # In all other methods guiding stays as the .blend has it, which is usually off.
     if guiding:
-        methods += [Method(GUIDED, {"samples": n, "guiding": True}) for n in counts]
+        methods += [Method(_GUIDED, {"samples": n, "guiding": True}) for n in counts]
     own_settings = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
     return [*methods, Method(OWN, own_settings)]
 
@@ -199,7 +199,7 @@ def measured_point(
         for trials, reference in zip(renders, references, strict=True)
     ]
     all_errors = [error for of_window in errors for error in of_window]
-    means = {name: fmean(getattr(error, name) for error in all_errors) for name in COMPARED}
+    means = {name: fmean(getattr(error, name) for error in all_errors) for name in _COMPARED}
     parts = [
         metrics.bias_and_variance([trial.colour for trial in trials], reference)
         for trials, reference in zip(renders, references, strict=True)
@@ -226,7 +226,7 @@ def measured_point(
     )
 
 
-def points_of_whole_views(
+def _points_of_whole_views(
     points: Mapping[str, Sequence[Point]], experiment: Experiment
 ) -> list[Point]:
     """Return each method's point of whole views, from its points in the strata."""
@@ -247,7 +247,7 @@ def whole_views_point(
 
     ``reference_error`` is the references' own error in whole views.
     """
-    names = ("samples", "seconds", *COMPARED, "bias", "variance")
+    names = ("samples", "seconds", *_COMPARED, "bias", "variance")
     means = {
         name: over_views({s: getattr(point, name) for s, point in points.items()}, areas)
         for name in names
@@ -380,7 +380,7 @@ def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
     return lines
 
 
-def neighbour_disagreements(
+def _neighbour_disagreements(
     experiment: Experiment, methods: Sequence[Method]
 ) -> list[dict[str, Any]]:
     """Return how the first two windows, of neighbouring views, disagree under each method.
@@ -428,13 +428,13 @@ def disagreement(
 
 def write(stem: Path, content: Mapping[str, Any]) -> None:
     """Write the points as ``stem``.csv, a plot as .svg and .png, tables as .md, all as .json."""
-    write_csv(stem.with_name(stem.name + ".csv"), csv_rows(content))
+    write_csv(stem.with_name(stem.name + ".csv"), _csv_rows(content))
     draw(stem, content)
     write_text(stem.with_name(stem.name + ".md"), tables(stem.name, content))
     write_json(stem.with_name(stem.name + ".json"), content)
 
 
-def csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return a row for each point of whole views and of each stratum."""
     rows = []
     for stratum, measured in {WHOLE_VIEWS: content, **content["strata"]}.items():
@@ -447,7 +447,7 @@ def csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
                     "most_samples": settings["samples"],
                     "adaptive_threshold": settings["adaptive_threshold"],
                     "denoise": settings["denoise"],
-                    **{name: value for name, value in point.items() if name not in METHOD_KEYS},
+                    **{name: value for name, value in point.items() if name not in _METHOD_KEYS},
                     "pareto": point in measured["pareto_front"],
                 }
             )
@@ -506,7 +506,7 @@ def _figures_table(content: Mapping[str, Any]) -> list[str]:
     for method in content["methods"]:
         point = method["nearest"]
         key = (point["method"], json.dumps(point["settings"]))
-        figures = [point[figure] for figure in FIGURES]
+        figures = [point[figure] for figure in _FIGURES]
         lines.append(_row(point["method"], *figures, bias_correlations.get(key)))
     return lines
 

@@ -30,12 +30,12 @@ from lightfield.measurement import metrics
 # Neighbouring depths of different surfaces differ by more than this part.
 EDGE = 0.1
 # The width of an edge in pixels.
-EDGE_PIXELS = 5
-NORMALS = "normal"
+_EDGE_PIXELS = 5
+_NORMALS = "normal"
 # A render's alpha differs from the truth's if more than ALPHA_PART of the pixels are off by more
 # than ALPHA_STEP. At silhouettes they always differ somewhat.
-ALPHA_STEP = 0.1
-ALPHA_PART = 0.01
+_ALPHA_STEP = 0.1
+_ALPHA_PART = 0.01
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
         colour,
         alpha,
         source.depth(view, source.lightfield.depth or "") if has_depth else None,
-        _normals(source.dataset / source.name / NORMALS / f"{view.name}.exr", source),
+        _normals(source.dataset / source.name / _NORMALS / f"{view.name}.exr", source),
     )
 
 
@@ -137,7 +137,7 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
     alpha = _alpha(image)
     colour = _developed(image, alpha, source, background)
     depth = image.channels.get("Z")
-    normals = _normals(path.parent / NORMALS / f"{path.stem}.exr", source)
+    normals = _normals(path.parent / _NORMALS / f"{path.stem}.exr", source)
     return Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals)
 
 
@@ -220,15 +220,15 @@ def background_problem(
         if not empty.any():
             return None
         colour = np.median(shown.colour[empty], axis=0)
-        if np.abs(colour - background).max() <= ALPHA_STEP:
+        if np.abs(colour - background).max() <= _ALPHA_STEP:
             return None
         return (
             f"has no alpha, and is {hexadecimal(colour)} where the truth is transparent, instead "
             f"of {hexadecimal(background)}; give its background by --background"
         )
     true_alpha = np.ones(counted.shape) if true.alpha is None else true.alpha
-    part = float((np.abs(shown.alpha - true_alpha)[counted] > ALPHA_STEP).mean())
-    if part <= ALPHA_PART:
+    part = float((np.abs(shown.alpha - true_alpha)[counted] > _ALPHA_STEP).mean())
+    if part <= _ALPHA_PART:
         return None
     return f"has another alpha than the truth in {part:.0%} of its pixels"
 
@@ -257,8 +257,8 @@ def regions(
         # Compare distances: towards the rim of a wide lens, Z decreases on any surface.
         distance = stored_distance(depth, rays, source.lightfield.depth)
         finite_distance = np.where(np.isfinite(distance), distance, 1e9)
-        near = minimum_filter(np.where(valid, finite_distance, np.inf), EDGE_PIXELS)
-        far = maximum_filter(np.where(valid, finite_distance, 0), EDGE_PIXELS)
+        near = minimum_filter(np.where(valid, finite_distance, np.inf), _EDGE_PIXELS)
+        far = maximum_filter(np.where(valid, finite_distance, 0), _EDGE_PIXELS)
         by_name["edges"] = compared & (far > (1 + EDGE) * near)
         by_name["background"] = compared & np.isposinf(depth)
     return {name: region for name, region in by_name.items() if region.any()}

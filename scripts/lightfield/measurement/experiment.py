@@ -23,7 +23,7 @@ from lightfield.measurement.trials import Trial, Trials, Window
 WHOLE_VIEWS = "whole views"
 
 # A stratified reference splits its samples among this many seeds. Their differences tell its error.
-REFERENCE_SEEDS = 8
+_REFERENCE_SEEDS = 8
 
 # The renders of one method, by window and seed.
 Renders = Sequence[Sequence[Trial]]
@@ -85,10 +85,10 @@ class Experiment:
         # The pilot renders first, because it sets up Cycles for the parts of light.
         classes = strata.classes_of(maker, windows)
         progress = Progress(len(windows), f"{name}: references")
-        samples_of_seed = samples_of_reference(samples) // REFERENCE_SEEDS
+        samples_of_seed = samples_of_reference(samples) // _REFERENCE_SEEDS
         references = []
         for window in windows:
-            references.append(maker.reference(window, REFERENCE_SEEDS, samples_of_seed))
+            references.append(maker.reference(window, _REFERENCE_SEEDS, samples_of_seed))
             progress.done()
         references = metrics.exposed_alike(references)
         by_stratum = split_by_stratum(references, classes)
@@ -176,7 +176,7 @@ class Experiment:
 
 def samples_of_reference(least: int) -> int:
     """Return the samples of a stratified reference: at least ``least``, and equal for all seeds."""
-    return REFERENCE_SEEDS * math.ceil(least / REFERENCE_SEEDS)
+    return _REFERENCE_SEEDS * math.ceil(least / _REFERENCE_SEEDS)
 
 
 def split_by_stratum(

@@ -24,13 +24,13 @@ SAMPLES = 16
 # Blocks of this many pixels along a side are compared, because means are less noisy than pixels.
 BLOCK = 8
 # The largest squared difference of the same picture, in units of that by noise alone.
-MOST_OF_NOISE = 2.0
+_MOST_OF_NOISE = 2.0
 # The largest difference of all light, in standard errors.
-MOST_ERRORS = 6.0
+_MOST_ERRORS = 6.0
 # Depths of the same picture differ by less than this part.
 SAME_DEPTH = 1e-4
 # At silhouettes rounding decides which surface a ray hits, so this part of the pixels may differ.
-SILHOUETTES = 1e-3
+_SILHOUETTES = 1e-3
 
 
 class GpuCheckSettings(Settings):
@@ -62,9 +62,9 @@ class Comparison:
     def same(self) -> bool:
         """Whether the devices render the same picture."""
         return (
-            self.colour <= MOST_OF_NOISE
-            and abs(self.light) <= MOST_ERRORS
-            and self.depth <= SILHOUETTES
+            self.colour <= _MOST_OF_NOISE
+            and abs(self.light) <= _MOST_ERRORS
+            and self.depth <= _SILHOUETTES
         )
 
 
@@ -89,11 +89,11 @@ def compare(
     second_depth = second[0].depth
     differ = np.zeros(mask.shape, dtype=bool)
     if first_depth is not None and second_depth is not None:
-        differ = depths_differ(first_depth, second_depth)
+        differ = _depths_differ(first_depth, second_depth)
     return Comparison(_over(difference, noise), light, float(differ[mask].mean()))
 
 
-def depths_differ(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _depths_differ(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Return where two depths (h, w) differ by more than `SAME_DEPTH`, or only one is infinite."""
     with np.errstate(invalid="ignore"):
         near = np.abs(second / first - 1) <= SAME_DEPTH
@@ -173,9 +173,9 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             "",
             f"{'Both' if content['same'] else 'They do not'} render the same picture. Colours "
             f"differ {content['colour']:.2f} times as much as noise explains (at most "
-            f"{MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard errors "
-            f"(at most {MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by more than "
-            f"a part of {SAME_DEPTH:g} (at most {SILHOUETTES:.1%}).",
+            f"{_MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard "
+            f"errors (at most {_MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by more "
+            f"than a part of {SAME_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
             f"A sample of a megapixel takes {content['gpu_seconds']:.3g} s on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",

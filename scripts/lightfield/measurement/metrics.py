@@ -46,21 +46,21 @@ from lightfield.imaging.tonemap import encode_srgb, tone_map
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-EPSILON = 0.01
+_EPSILON = 0.01
 # The part of the pixels, those with the largest errors, that does not count.
 OUTLIERS = 0.001
 # The pixels along a side of SSIM's window: 3.5 standard deviations of 1.5 pixels around its middle.
-SSIM_WINDOW = 11
+_SSIM_WINDOW = 11
 # From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
 TO_YCBCR = np.array(
     [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
 )
 # IV-PSNR weights luma and both colour differences by these. Whole numbers, so that a mean of equal
 # values is exact on every processor.
-IV_WEIGHTS = np.array([4.0, 1.0, 1.0])
+_IV_WEIGHTS = np.array([4.0, 1.0, 1.0])
 # IV-PSNR forgives shifts of this many pixels, and this difference of the mean colour.
-SHIFT = 2
-MOST_OFFSET = 0.01
+_SHIFT = 2
+_MOST_OFFSET = 0.01
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Reference:
     def unexposed_weights(self) -> tuple[Array, Array]:
         """The factors of the unexposed relative mean squared error, and of pbrt's MRSE."""
         truth = self.colour[self.counted]
-        return 1 / (truth**2 + EPSILON), 1 / (truth + EPSILON) ** 2
+        return 1 / (truth**2 + _EPSILON), 1 / (truth + _EPSILON) ** 2
 
     @property
     def own_error(self) -> float:
@@ -107,7 +107,7 @@ class Reference:
 
 def _weights(truth: Array, exposure: float) -> Array:
     gain = 4.0**exposure
-    weights: Array = gain / (gain * truth**2 + EPSILON)
+    weights: Array = gain / (gain * truth**2 + _EPSILON)
     return weights
 
 
@@ -188,7 +188,7 @@ def ssim_map(truth: Array, shown: Array) -> Array:
     beyond their borders.
     """
     # scikit-image refuses pictures smaller than its window.
-    border = SSIM_WINDOW // 2
+    border = _SSIM_WINDOW // 2
     margins = ((border, border), (border, border), (0, 0))
     similarity: Array = structural_similarity(
         np.pad(truth, margins, mode="symmetric"),
@@ -259,7 +259,7 @@ def iv_psnr(
     true_picture = truth @ TO_YCBCR.T
     shown_picture = shown @ TO_YCBCR.T
     offset = (true_picture - shown_picture)[counted].mean(axis=0)
-    shown_picture = shown_picture + offset.clip(-MOST_OFFSET, MOST_OFFSET)
+    shown_picture = shown_picture + offset.clip(-_MOST_OFFSET, _MOST_OFFSET)
     return min(
         _iv_psnr(true_picture, shown_picture, part),
         _iv_psnr(shown_picture, true_picture, part),
@@ -269,18 +269,18 @@ def iv_psnr(
 def _iv_psnr(picture: Array, other: Array, weights: Array) -> float:
     """Return the PSNR of a ``picture`` whose pixels are compared with their best matches."""
     height, width = weights.shape
-    padded = np.pad(other, ((SHIFT, SHIFT), (SHIFT, SHIFT), (0, 0)), mode="edge")
+    padded = np.pad(other, ((_SHIFT, _SHIFT), (_SHIFT, _SHIFT), (0, 0)), mode="edge")
     least = np.full(weights.shape, np.inf)
     best = np.zeros_like(picture)
-    for row in range(2 * SHIFT + 1):
-        for column in range(2 * SHIFT + 1):
+    for row in range(2 * _SHIFT + 1):
+        for column in range(2 * _SHIFT + 1):
             squares = (picture - padded[row : row + height, column : column + width]) ** 2
-            error = squares @ IV_WEIGHTS
+            error = squares @ _IV_WEIGHTS
             is_less = error < least
             least[is_less] = error[is_less]
             best[is_less] = squares[is_less]
     means = np.average(best.reshape(-1, 3), axis=0, weights=weights.ravel())
-    return float(np.average(-10 * np.log10(np.maximum(means, 1e-10)), weights=IV_WEIGHTS))
+    return float(np.average(-10 * np.log10(np.maximum(means, 1e-10)), weights=_IV_WEIGHTS))
 
 
 def relative_mse(

@@ -9,9 +9,9 @@ from skimage.util import view_as_blocks
 Array = NDArray[Any]
 
 # The median magnitude of normally distributed values, over their standard deviation.
-MEDIAN_OF_NORMAL = 0.6745
+_MEDIAN_OF_NORMAL = 0.6745
 # The root of the sum of the squares of Immerkær's mask.
-MASK_NORM = 6.0
+_MASK_NORM = 6.0
 # A block with at least this many pixels along a side has an estimate exact to a few percent.
 SMALLEST_BLOCK = 8
 
@@ -26,8 +26,8 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
     """
     light = luminance.astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
-        residual = np.abs(np.diff(np.diff(light, 2, axis=0), 2, axis=1)) / MASK_NORM
-        deviation = np.median(_blocks(residual, block), axis=2) / MEDIAN_OF_NORMAL
+        residual = np.abs(np.diff(np.diff(light, 2, axis=0), 2, axis=1)) / _MASK_NORM
+        deviation = np.median(_blocks(residual, block), axis=2) / _MEDIAN_OF_NORMAL
         mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=2)
         ratio = deviation / mean
     return np.where((mean > 0) & np.isfinite(mean), ratio, np.nan)

@@ -28,12 +28,12 @@ COLUMNS = (
 )
 
 # The keys of a probe that `read_probe` needs.
-PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
+_PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
 
 # The error that the calibrated time is for.
-TARGET_ERROR = 0.01
+_TARGET_ERROR = 0.01
 # A method that takes this many times as long as plain path tracing does not reach its error.
-OUT_OF_REACH = 1e4
+_OUT_OF_REACH = 1e4
 
 # The formulas of the columns, printed below the table.
 FORMULAS = f"""\
@@ -41,7 +41,7 @@ FORMULAS = f"""\
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
 probe, ± its standard error
 - denoised = time × seconds to the same error with the denoiser / seconds without it
-- calibrated = time × seconds to the error {TARGET_ERROR:g}, by the cheaper of both / seconds of \
+- calibrated = time × seconds to the error {_TARGET_ERROR:g}, by the cheaper of both / seconds of \
 the samples
 - size = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the \
 probe
@@ -98,7 +98,7 @@ class Expected:
 
 def read_probe(path: Path | str) -> dict[str, Any]:
     """Return the result of scripts/probe.py. Raises `UserError` if the file is damaged."""
-    probe = read_keys(path, "probe.py", *PROBED)
+    probe = read_keys(path, "probe.py", *_PROBED)
     with reading(path, "probe"):
         width, height = probe["resolution"]
         numbers = [*probe["view_seconds"], *probe["view_bytes"]]
@@ -132,9 +132,9 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
         f"| {' | '.join(COLUMNS)} |",
         "| --- " + "| ---: " * (len(COLUMNS) - 1) + "|",
         *(dataset.row for dataset in expected),
-        sums_row(expected),
+        _sums_row(expected),
         "",
-        device_of(expected),
+        _device_of(expected),
         "",
         FORMULAS,
         "Probes are a few small views with all their samples. The seconds to an error follow from",
@@ -146,7 +146,7 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
     return "\n".join(lines)
 
 
-def sums_row(expected: Sequence[Expected]) -> str:
+def _sums_row(expected: Sequence[Expected]) -> str:
     """Return the table's last row: the sums over all datasets.
 
     Times of a core and of a graphics card have no sum.
@@ -170,7 +170,7 @@ def on_card(expected: Sequence[Expected]) -> list[str]:
     return [dataset.name for dataset in expected if dataset.probe["device"] != "CPU"]
 
 
-def device_of(expected: Sequence[Expected]) -> str:
+def _device_of(expected: Sequence[Expected]) -> str:
     """Return the device of the times, and how long this machine's cores take."""
     names = on_card(expected)
     if len(names) == len(expected):
@@ -217,10 +217,10 @@ def cheaper_parts(
     errors, overhead, sample_seconds = laws[TRACED]
     plain = overhead + sample_seconds * samples
     denoised = seconds_to(errors.at(samples), DENOISED) / plain
-    calibrated = min(seconds_to(TARGET_ERROR, method) for method in laws) / plain
+    calibrated = min(seconds_to(_TARGET_ERROR, method) for method in laws) / plain
     return (
-        denoised if denoised < OUT_OF_REACH else None,
-        calibrated if calibrated < OUT_OF_REACH else None,
+        denoised if denoised < _OUT_OF_REACH else None,
+        calibrated if calibrated < _OUT_OF_REACH else None,
     )
 
 

@@ -20,11 +20,11 @@ from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
 Classes = NDArray[np.int64]
 
 # Strata by the light that dominates a pixel. Glossy is the light of metal and mirrors.
-BY_LIGHT = ("diffuse", "glossy", "emission", "environment")
+_BY_LIGHT = ("diffuse", "glossy", "emission", "environment")
 # All strata, in the order of their numbers. Leaves and paper are translucent, glass is transparent.
-STRATA = [*BY_LIGHT, "translucent", "transparent", "volume"]
+STRATA = [*_BY_LIGHT, "translucent", "transparent", "volume"]
 # A pixel shows fog, smoke or fire if they give at least this part of its light.
-OF_VOLUME = 0.25
+_OF_VOLUME = 0.25
 # The class of pixels outside the image circle.
 NONE = -1
 
@@ -34,7 +34,7 @@ SIZE = 96
 SAMPLES = 4
 SEEDS = 2
 # A stratum has at least this part of the pilot's pixels.
-SMALLEST_AREA = 0.0005
+_SMALLEST_AREA = 0.0005
 # A window counts in a stratum if it has at least this many of its pixels.
 FEWEST_PIXELS = 64
 
@@ -53,7 +53,7 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     kinds[translucent & ~mirrors] = STRATA.index("translucent")
     kinds[transparent & ~mirrors] = STRATA.index("transparent")
     total = sum(parts[name] for name in PARTS_OF_LIGHT)
-    kinds[(of_volumes > 0) & (of_volumes >= OF_VOLUME * total)] = STRATA.index("volume")
+    kinds[(of_volumes > 0) & (of_volumes >= _OF_VOLUME * total)] = STRATA.index("volume")
     light = [trial.colour.mean(axis=-1, dtype=np.float64) for trial in trials]
     noise = np.abs(light[0] - light[1]) / (light[0] + light[1] + 1e-6)
     return np.where(pilot.mask(window), kinds, NONE), noise
@@ -83,7 +83,7 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
     for number, name in enumerate(STRATA):
         members = [kinds == number for kinds, _ in pilots]
         area = sum(int(member.sum()) for member in members) / total
-        if area < SMALLEST_AREA:
+        if area < _SMALLEST_AREA:
             continue
         areas[name] = area
         inner = [binary_erosion(member) for member in members]

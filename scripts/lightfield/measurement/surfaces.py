@@ -21,21 +21,21 @@ from lightfield.core.files import reading
 Points = NDArray[np.float64]
 
 # DTU's values, in metres: points this far apart, and distances from which on points do not count.
-DTU_SPACING = 0.2e-3
-DTU_MOST_DISTANCE = 20e-3
+_DTU_SPACING = 0.2e-3
+_DTU_MOST_DISTANCE = 20e-3
 NERF_SYNTHETIC_POINTS = 2_500_000
 # More points would take hours.
-MOST_POINTS = 20_000_000
+_MOST_POINTS = 20_000_000
 # How many random points a surface gets for each square of the spacing or voxel, before they are
 # thinned. With 8 about one square in three thousand stays empty.
-OVERSAMPLING = 8
+_OVERSAMPLING = 8
 # Seeds of the random points. With the same points on both surfaces, equal meshes would have no
 # error, and similar ones too little.
-SHOWN = 1
+_SHOWN = 1
 TRUE = 2
 SUFFIXES = (".ply", ".obj", ".glb", ".gltf", ".stl")
 # glTF has Y up. All other files are as the dataset: Z up.
-Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+_Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,8 @@ def read_surface(path: Path) -> Surface:
     vertices = np.concatenate(points).astype(np.float64)
     corners = np.concatenate(triangles).astype(np.float64) if triangles else np.zeros((0, 3, 3))
     if path.suffix.lower() in (".glb", ".gltf"):
-        vertices = vertices @ Z_UP.T
-        corners = corners @ Z_UP.T
+        vertices = vertices @ _Z_UP.T
+        corners = corners @ _Z_UP.T
     if not np.isfinite(vertices).all():
         raise UserError(f"{path}: has points that are not finite")
     return Surface(path, corners if len(corners) else None, vertices)
@@ -79,8 +79,8 @@ def read_surface(path: Path) -> Surface:
 def dtu(
     candidate: Surface,
     reference: Surface,
-    spacing: float = DTU_SPACING,
-    most_distance: float = DTU_MOST_DISTANCE,
+    spacing: float = _DTU_SPACING,
+    most_distance: float = _DTU_MOST_DISTANCE,
 ) -> dict[str, float]:
     """Return DTU's figures in metres: accuracy, completeness, and their mean, the Chamfer distance.
 
@@ -88,7 +88,7 @@ def dtu(
     ``spacing`` apart. Distances of ``most_distance`` or more do not count. DTU leaves out what its
     scanner did not observe. Here the reference is complete.
     """
-    shown = thinned(_dense(candidate, spacing, SHOWN), spacing)
+    shown = thinned(_dense(candidate, spacing, _SHOWN), spacing)
     # DTU takes its scanned points as they are.
     true = reference.points
     if reference.triangles is not None:
@@ -112,7 +112,7 @@ def nerf_synthetic(
 
     The Chamfer distance is the sum of both mean distances, not squared.
     """
-    shown = _sampled(candidate, count, SHOWN)
+    shown = _sampled(candidate, count, _SHOWN)
     true = _sampled(reference, count, TRUE)
     accuracy, completeness = (float(distances.mean()) for distances in _both_distances(shown, true))
     return {
@@ -128,8 +128,8 @@ def tanks_and_temples(candidate: Surface, reference: Surface, tau: float) -> dic
     Precision is the part of the candidate's points that are nearer than ``tau`` metres to the
     reference, recall the part of the reference's. Both have one point in each voxel of tau / 2.
     """
-    shown = voxel_means(_dense(candidate, tau / 2, SHOWN), tau / 2)
-    true = voxel_means(_dense(reference, tau / 2, TRUE), tau / 2)
+    shown = _voxel_means(_dense(candidate, tau / 2, _SHOWN), tau / 2)
+    true = _voxel_means(_dense(reference, tau / 2, TRUE), tau / 2)
     precision, recall = (
         float((distances < tau).mean()) for distances in _both_distances(shown, true)
     )
@@ -159,7 +159,7 @@ def thinned(points: Points, spacing: float) -> Points:
     return kept
 
 
-def voxel_means(points: Points, size: float) -> Points:
+def _voxel_means(points: Points, size: float) -> Points:
     """Return the mean of the points (n, 3) in each voxel of a grid, as Open3D does."""
     lowest = points.min(axis=0) - size / 2
     voxels = np.floor((points - lowest) / size).astype(np.int64)
@@ -174,9 +174,9 @@ def _dense(surface: Surface, spacing: float, seed: int) -> Points:
     """Return points much denser than one in a square of ``spacing``. A cloud is returned as is."""
     if surface.triangles is None:
         return surface.points
-    count = int(np.ceil(OVERSAMPLING * surface.area / spacing**2))
-    if count > MOST_POINTS:
-        least = float(np.sqrt(OVERSAMPLING * surface.area / MOST_POINTS))
+    count = int(np.ceil(_OVERSAMPLING * surface.area / spacing**2))
+    if count > _MOST_POINTS:
+        least = float(np.sqrt(_OVERSAMPLING * surface.area / _MOST_POINTS))
         raise UserError(
             f"{surface.path}: has {surface.area:.4g} square metres, too many for a spacing of "
             f"{spacing:g} m; give one of {least:.2g} m or more"

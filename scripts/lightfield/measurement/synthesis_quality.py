@@ -31,7 +31,7 @@ from lightfield.synthesis.view import Sources, reader
 
 
 @dataclass(frozen=True)
-class Variant:
+class _Variant:
     """One way to synthesise.
 
     - ``name``, ``value``: what it changes, and to which value.
@@ -46,7 +46,7 @@ class Variant:
     size: int
 
 
-def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
+def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[_Variant]:
     """Yield the variants and controls of a dataset's ``views``, the unchanged one first."""
     lens = source.lens
     read = reader(source)
@@ -55,13 +55,13 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
     fills_holes = not source.lightfield.transparent
     make = partial(Sources, lens, fills_holes=fills_holes)
     all_views = make(views, read)
-    yield Variant("all", str(len(views)), all_views, BEST, size)
-    for subset in subsets(source.lightfield, views):
+    yield _Variant("all", str(len(views)), all_views, BEST, size)
+    for subset in _subsets(source.lightfield, views):
         fewer = make(subset, read)
-        yield Variant("views", str(len(subset)), fewer, BEST, sum(sizes[v.name] for v in subset))
+        yield _Variant("views", str(len(subset)), fewer, BEST, sum(sizes[v.name] for v in subset))
     for best in (1, 2, 4, 8):
         if best <= len(views):
-            yield Variant("best", str(best), all_views, best, size)
+            yield _Variant("best", str(best), all_views, best, size)
     for part in (2, 4):
         if part > min(lens.width, lens.height):
             break
@@ -76,7 +76,7 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
             return small_colour, distance[np.ix_(rows, columns)]
 
         coarse = Sources(small, views, shrunk, fills_holes=fills_holes)
-        yield Variant(
+        yield _Variant(
             "resolution", f"{small.width} × {small.height}", coarse, BEST, size // part**2
         )
     for precision in ("rounded", "half"):
@@ -85,7 +85,7 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
             colour, distance = read(view)
             return colour, with_precision(distance, precision)
 
-        yield Variant("depth", precision, make(views, with_depth), BEST, size)
+        yield _Variant("depth", precision, make(views, with_depth), BEST, size)
 
     def flat(view: View) -> tuple[Array, Array]:
         colour, distance = read(view)
@@ -93,16 +93,16 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
 
     nearest = make(views, flat)
     nearest.distances = all_views.distances
-    yield Variant("control", "nearest view alone", nearest, 1, size)
+    yield _Variant("control", "nearest view alone", nearest, 1, size)
     after = dict(zip([view.name for view in views], [*views[1:], views[0]], strict=True))
 
     def mixed(view: View) -> tuple[Array, Array]:
         return read(view)[0], read(after[view.name])[1]
 
-    yield Variant("control", "shuffled depth", make(views, mixed), BEST, size)
+    yield _Variant("control", "shuffled depth", make(views, mixed), BEST, size)
 
 
-def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
+def _subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
     """Yield smaller and smaller subsets of a dataset's ``views``.
 
     A sphere's subsets are the coarser spheres. Other rigs are halved.
@@ -131,7 +131,7 @@ def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]
 
 
 def compare(
-    variant: Variant,
+    variant: _Variant,
     around: Sequence[View],
     views: Sequence[View],
     truth: SourceDataset,

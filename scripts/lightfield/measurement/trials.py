@@ -33,14 +33,14 @@ from lightfield.planning.sampling import PLAIN, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
-REFERENCE_SEED = 1000
+_REFERENCE_SEED = 1000
 
 # The steps of Roberts' R2 sequence, which fills a square evenly.
-R2 = (0.7548776662466927, 0.5698402909980532)
+_R2 = (0.7548776662466927, 0.5698402909980532)
 # A window has at least this part of its pixels in the image circle, if possible.
 FULL_ENOUGH = 0.75
 # Tries at most this many places for a window.
-MOST_PLACES = 64
+_MOST_PLACES = 64
 
 # The kinds of surfaces that a pilot finds, and the features by which the inventory lists their
 # materials.
@@ -50,9 +50,9 @@ SURFACES = {
     "transparent": ("transmission", "transparency"),
 }
 
-SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
-SAMPLES_ATTRIBUTE = "plenoforge:samples"
-DEVICE_ATTRIBUTE = "plenoforge:device"
+_SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
+_SAMPLES_ATTRIBUTE = "plenoforge:samples"
+_DEVICE_ATTRIBUTE = "plenoforge:device"
 
 
 @dataclass(frozen=True)
@@ -183,16 +183,16 @@ class Trials:
         return Trial(
             colour=image.colour,
             depth=image.channels.get("Z"),
-            samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
-            seconds=float(image.attributes[SECONDS_ATTRIBUTE]),
-            device=str(image.attributes[DEVICE_ATTRIBUTE]),
+            samples=float(image.attributes[_SAMPLES_ATTRIBUTE]),
+            seconds=float(image.attributes[_SECONDS_ATTRIBUTE]),
+            device=str(image.attributes[_DEVICE_ATTRIBUTE]),
             parts={name: image.channels[f"{name}.Y"] for name in part_names},
         )
 
     def reference(self, window: Window, seeds: int, samples: int) -> Reference:
         """Return the mean of renders of a window with ``seeds`` seeds, ``samples`` samples each."""
         renders = [
-            self.render(window, REFERENCE_SEED + number, {"samples": samples})
+            self.render(window, _REFERENCE_SEED + number, {"samples": samples})
             for number in range(seeds)
         ]
         depths = [render.depth for render in renders if render.depth is not None]
@@ -223,9 +223,9 @@ class Trials:
             view = views[int((number + 0.5) * len(views) / count)]
             # The corners of a fisheye view have no pixels in the image circle.
             places: list[tuple[float, Window]] = []
-            while not places or (places[-1][0] < FULL_ENOUGH and len(places) < MOST_PLACES):
+            while not places or (places[-1][0] < FULL_ENOUGH and len(places) < _MOST_PLACES):
                 point += 1
-                across, down = (point * step % 1 for step in R2)
+                across, down = (point * step % 1 for step in _R2)
                 x = round(across * (self.lens.width - size))
                 y = round(down * (self.lens.height - size))
                 window = Window(view, x, y, size, size)
@@ -268,9 +268,9 @@ class Trials:
             channels,
             {
                 images.KEY_ATTRIBUTE: key,
-                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(window)].mean()),
-                SECONDS_ATTRIBUTE: seconds,
-                DEVICE_ATTRIBUTE: self._on,
+                _SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(window)].mean()),
+                _SECONDS_ATTRIBUTE: seconds,
+                _DEVICE_ATTRIBUTE: self._on,
             },
         )
 

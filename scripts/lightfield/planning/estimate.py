@@ -32,19 +32,19 @@ from lightfield.planning.unit_costs import (
 )
 
 # A pixel's samples if a target error is given instead.
-GUESSED_SAMPLES = 256
+_GUESSED_SAMPLES = 256
 # The light groups of a scene whose emitters are not known yet.
-GUESSED_LIGHT_GROUPS = 16
+_GUESSED_LIGHT_GROUPS = 16
 # Start-up takes at most this part of a shard's time.
-START_UP_PART = 0.05
+_START_UP_PART = 0.05
 # More jobs would lengthen the plan, but not render faster. A cluster may get more.
-USUAL_SHARDS = 64
+_USUAL_SHARDS = 64
 # On a cluster each job is expected to take at most so long.
-CLUSTER_JOB_MINUTES = 20
+_CLUSTER_JOB_MINUTES = 20
 # Planning more shards than this takes too long.
-MOST_SHARDS = 10_000
+_MOST_SHARDS = 10_000
 # Bytes for a pixel of an 8-bit PNG.
-PNG_BYTES = 2
+_PNG_BYTES = 2
 
 
 class Estimate:
@@ -112,7 +112,7 @@ class Estimate:
         try:
             return len(json.loads(Path(str(self.dataset.inventory)).read_bytes())["emitters"])
         except (OSError, *DAMAGE):
-            return GUESSED_LIGHT_GROUPS
+            return _GUESSED_LIGHT_GROUPS
 
     def _reprojected_pixel_bytes(self, reprojection: Reprojection) -> float:
         """Return the bytes of a pixel of a reprojection, with the files beside its views."""
@@ -121,7 +121,7 @@ class Estimate:
         if reprojection.format == "exr":
             return 10 * COMPRESSED + pass_bytes
         if not isinstance(reprojection, SensorReprojection):
-            return PNG_BYTES * reprojection.bits / 8 + pass_bytes
+            return _PNG_BYTES * reprojection.bits / 8 + pass_bytes
         size = NOISY_BYTES * reprojection.bits / 8
         if reprojection.sensor.bracket is not None:
             size += WEIGHT_BYTES * COMPRESSED
@@ -198,12 +198,12 @@ class Estimate:
         """
         dataset = self.dataset
         seconds = self._probe[0] if self._probe else self._planned_view_seconds
-        shortest = math.ceil(START_UP_SECONDS / START_UP_PART / max(seconds, 1e-6))
-        most = USUAL_SHARDS
+        shortest = math.ceil(START_UP_SECONDS / _START_UP_PART / max(seconds, 1e-6))
+        most = _USUAL_SHARDS
         if dataset.cluster:
-            job_seconds = 60 * CLUSTER_JOB_MINUTES * dataset.cluster.cores
+            job_seconds = 60 * _CLUSTER_JOB_MINUTES * dataset.cluster.cores
             short_jobs = math.ceil(dataset.view_count * seconds / job_seconds)
-            most = min(max(most, dataset.cluster.jobs, short_jobs), MOST_SHARDS)
+            most = min(max(most, dataset.cluster.jobs, short_jobs), _MOST_SHARDS)
         return min(math.ceil(dataset.view_count / shortest), most)
 
     @property
@@ -213,8 +213,8 @@ class Estimate:
         The bounds of shards depend on it, and must depend only on the configuration.
         """
         samples = self.dataset.render.get("samples", FILE)
-        limit = self.dataset.render.get("most_samples", GUESSED_SAMPLES)
-        return min(limit, GUESSED_SAMPLES) if samples == FILE else int(samples)
+        limit = self.dataset.render.get("most_samples", _GUESSED_SAMPLES)
+        return min(limit, _GUESSED_SAMPLES) if samples == FILE else int(samples)
 
     @property
     def _cost_samples(self) -> float:

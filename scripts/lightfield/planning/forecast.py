@@ -29,11 +29,11 @@ from lightfield.planning.unit_costs import (
 )
 
 # These three were measured in the courtyard. A calibration's search renders each window this often.
-SEARCH_RENDERS = 9
+_SEARCH_RENDERS = 9
 # Together these renders take this many times the samples that the target needs.
-SEARCH_PART = 2.5
+_SEARCH_PART = 2.5
 # A render takes this many seconds beside its samples.
-WINDOW_SECONDS = 0.07
+_WINDOW_SECONDS = 0.07
 
 # The formulas of the columns, printed below the table.
 FORMULAS = f"""\
@@ -47,7 +47,7 @@ After the target `plan`, the seconds and bytes of a view are those that its prob
 
 # The phase of the jobs that develop views as a sensor sees them, and their part of the formulas.
 SENSOR_PHASE = "sensor"
-SENSOR_FORMULA = f"""\
+_SENSOR_FORMULA = f"""\
 A sensor adds {1e6 * SENSOR_SECONDS:g} µs a pixel, or {1e6 * BRACKET_SECONDS:g} µs for a bracket \
 with its mask and weights."""
 
@@ -81,7 +81,7 @@ def forecast(works: Sequence[Work]) -> str:
     tables = [_table("phase", {**phases, "all": works})]
     if len(datasets) > 1:
         tables.append(_table("dataset", dict(sorted(datasets.items()))))
-    formulas = f"{FORMULAS}\n{SENSOR_FORMULA}" if SENSOR_PHASE in phases else FORMULAS
+    formulas = f"{FORMULAS}\n{_SENSOR_FORMULA}" if SENSOR_PHASE in phases else FORMULAS
     return "\n\n".join([*tables, formulas])
 
 
@@ -118,11 +118,11 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
     while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
         seeds *= 2
     # Windows and held-out windows have references. Plain path tracing and the search add samples.
-    search_samples = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
+    search_samples = sum(PLAIN_SAMPLES) + _SEARCH_PART * min(needed, most or needed)
     samples = 2 * seeds * REFERENCE_SAMPLES + search_samples
-    renders = 2 * seeds + SEARCH_RENDERS
+    renders = 2 * seeds + _SEARCH_RENDERS
     pixels = min(size, WINDOW_SIZE) ** 2
-    window = renders * WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
+    window = renders * _WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
     return START_UP_SECONDS + PROBES * window
 
 

@@ -7,11 +7,11 @@ PIXEL_BYTES = 300
 # The same with OpenImageDenoise. bpy 5.0 took 910.
 DENOISED_PIXEL_BYTES = 1000
 # Bytes for each pixel of a temporary file with all passes in 32-bit floats, and a reserve.
-PASSES_PIXEL_BYTES = 200
+_PASSES_PIXEL_BYTES = 200
 # More bytes for each light group: Cycles and its file took 36, and the view's arrays take 30.
-GROUP_PIXEL_BYTES = 70
+_GROUP_PIXEL_BYTES = 70
 # More bytes of the temporary file for each light group.
-GROUP_PASS_PIXEL_BYTES = 12
+_GROUP_PASS_PIXEL_BYTES = 12
 # Bytes for a scene that has not been measured yet.
 UNKNOWN_SCENE = 6_000_000_000
 
@@ -23,12 +23,12 @@ def needed(scene: int, pixels: int, denoise: bool, groups: int = 0) -> int:
     views have this many light ``groups``.
     """
     pixel_bytes = DENOISED_PIXEL_BYTES if denoise else PIXEL_BYTES
-    return scene + pixels * (pixel_bytes + groups * GROUP_PIXEL_BYTES)
+    return scene + pixels * (pixel_bytes + groups * _GROUP_PIXEL_BYTES)
 
 
 def passes_pixel_bytes(groups: int) -> int:
     """Return the bytes for each pixel of a temporary file with all passes and light groups."""
-    return PASSES_PIXEL_BYTES + groups * GROUP_PASS_PIXEL_BYTES
+    return _PASSES_PIXEL_BYTES + groups * _GROUP_PASS_PIXEL_BYTES
 
 
 def threads(cores: int, shards: int, need: int, available: int) -> int:

@@ -10,7 +10,7 @@ from lightfield.core.files import read_keys, reading
 from lightfield.planning.unit_costs import DENOISING_SAMPLES
 
 # Keys of a `render` block that only its calibration reads: the target error, and a preset's limits.
-UNCALIBRATED = ("target_error", "most_samples", "denoise")
+_UNCALIBRATED = ("target_error", "most_samples", "denoise")
 
 # A calibration renders this many windows of views, and as many held-out ones.
 PROBES = 16
@@ -52,7 +52,7 @@ def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 def without_target(render: Mapping[str, Any]) -> dict[str, Any]:
     """Return a ``render`` block without the keys that only its calibration reads."""
-    return {key: value for key, value in render.items() if key not in UNCALIBRATED}
+    return {key: value for key, value in render.items() if key not in _UNCALIBRATED}
 
 
 def standard_error(values: Sequence[float]) -> float:

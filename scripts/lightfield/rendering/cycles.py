@@ -31,9 +31,9 @@ from lightfield.rendering import (
 )
 
 # `auto` tries the kinds of GPU in this order.
-GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
+_GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
 
-CAMERA_NAME = "plenoforge_camera"
+_CAMERA_NAME = "plenoforge_camera"
 
 # Cycles' settings by the keys of ``render`` blocks. Without a key, the .blend's value stays.
 SAMPLING = {
@@ -45,7 +45,7 @@ SAMPLING = {
 
 # The names of passes that a scene has only once they are added to it begin so: those of light
 # groups, and what materials write.
-ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
+_ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
 
 # The passes of Cycles that make up a view's geometry, and their channels.
 GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
@@ -182,7 +182,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
     needed = [name for each in passes for name in each.needed]
-    built_in = [name for name in needed if not name.startswith(ADDED_PASSES)]
+    built_in = [name for name in needed if not name.startswith(_ADDED_PASSES)]
     for name in ("Combined", *built_in, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # A cryptomatte pass holds two objects: 6 gives three passes.
@@ -251,7 +251,7 @@ def gpu(device: str) -> str | None:
     "gpu" means any kind. Raises `UserError` if the machine has no such GPU.
     """
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    for name in {"auto": GPU_DEVICES, "gpu": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
+    for name in {"auto": _GPU_DEVICES, "gpu": _GPU_DEVICES, "cpu": ()}.get(device, (device,)):
         try:
             entries = list(preferences.get_devices_for_type(name.upper()) or ())
         except (TypeError, ValueError):
@@ -260,7 +260,7 @@ def gpu(device: str) -> str | None:
             return name.upper()
     if device == "gpu":
         raise UserError(
-            f"device: this machine has no GPU that Cycles can use ({', '.join(GPU_DEVICES)}), so "
+            f"device: this machine has no GPU that Cycles can use ({', '.join(_GPU_DEVICES)}), so "
             "there is nothing to check"
         )
     if device not in ("auto", "cpu"):
@@ -318,7 +318,7 @@ def machine(denoise: bool) -> str:
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
     """Set the camera up from the ``camera`` and the sizes in a lightfield.json."""
     intrinsics = lightfield["camera"]
-    camera = bpy.data.cameras.new(CAMERA_NAME)
+    camera = bpy.data.cameras.new(_CAMERA_NAME)
     camera.type = intrinsics["type"]
     sensor_width, sensor_height = lightfield["sensor_size"]
     camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
@@ -343,7 +343,7 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
         for name, value in intrinsics.items():
             if hasattr(camera, name) and name not in ("type", "lens"):
                 setattr(camera, name, value)
-    camera_object = bpy.data.objects.new(CAMERA_NAME, camera)
+    camera_object = bpy.data.objects.new(_CAMERA_NAME, camera)
     camera_object.rotation_mode = "XYZ"
     scene.collection.objects.link(camera_object)
     scene.camera = camera_object

@@ -23,8 +23,8 @@ Array = NDArray[Any]
 
 # A ray passes through surfaces that transparency cuts out, and each of them writes a number. There
 # are channels for this many layers.
-LAYERS = 12
-_COLOURS = [f"plenoforge_instance_{number}" for number in range(LAYERS // 3)]
+_LAYERS = 12
+_COLOURS = [f"plenoforge_instance_{number}" for number in range(_LAYERS // 3)]
 _COUNT = "plenoforge_layers"
 # The passes of Cycles with the numbers, and their channels.
 CYCLES_PASSES = {**dict.fromkeys(_COLOURS, "RGB"), _COUNT: "X"}
@@ -135,7 +135,7 @@ def decoded(passes: dict[str, Array], objects: Array) -> Array:
     """
     instances = shown()
     layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
-    last = passes[_COUNT].astype(int).clip(1, LAYERS) - 1
+    last = passes[_COUNT].astype(int).clip(1, _LAYERS) - 1
     random = np.take_along_axis(layers, last, axis=-1)[..., 0]
     numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
     # Accept a number only if it is one of this object's.

@@ -11,7 +11,7 @@ from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
 # The feature that a shader node gives a material. The Principled BSDF gives them by its inputs.
-SHADERS = {
+_SHADERS = {
     "ShaderNodeBsdfGlass": "transmission",
     "ShaderNodeBsdfRefraction": "transmission",
     "ShaderNodeBsdfTranslucent": "translucency",
@@ -25,17 +25,21 @@ SHADERS = {
         "procedural",
     ),
 }
-PRINCIPLED_INPUTS = {
+_PRINCIPLED_INPUTS = {
     "Transmission Weight": ("transmission", 0.0),
     "Subsurface Weight": ("subsurface", 0.0),
     "Emission Strength": ("emission", 0.0),
     "Alpha": ("transparency", 1.0),
 }
-OUTPUT_INPUTS = {"Volume": "volumes", "Displacement": "displacement"}
+_OUTPUT_INPUTS = {"Volume": "volumes", "Displacement": "displacement"}
 FEATURES = sorted(
-    {*SHADERS.values(), *OUTPUT_INPUTS.values(), *(name for name, _ in PRINCIPLED_INPUTS.values())}
+    {
+        *_SHADERS.values(),
+        *_OUTPUT_INPUTS.values(),
+        *(name for name, _ in _PRINCIPLED_INPUTS.values()),
+    }
 )
-IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
+_IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
 # Triangles are counted in at most this many frames.
 MOST_FRAMES = 8
 
@@ -129,14 +133,14 @@ def _triangles(depsgraph: Any) -> dict[str, int]:
 def rendered_materials() -> list[Any]:
     """Return the materials of all objects, by name. A view layer may override them."""
     slots = [slot for obj in bpy.data.objects for slot in obj.material_slots]
-    materials = {slot.material for slot in slots if slot.material} | set_by_nodes()
+    materials = {slot.material for slot in slots if slot.material} | _set_by_nodes()
     override = bpy.context.view_layer.material_override
     if override:
         materials.add(override)
     return sorted(materials, key=lambda material: str(material.name_full))
 
 
-def set_by_nodes() -> set[Any]:
+def _set_by_nodes() -> set[Any]:
     """Return the materials that geometry nodes, or their modifiers' inputs, give to objects."""
     users = bpy.data.user_map(subset=list(bpy.data.materials))
     kinds = (bpy.types.GeometryNodeTree, bpy.types.Object)
@@ -149,18 +153,18 @@ def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
     output = tree.get_output_node("CYCLES") if tree else None
     if output is None:
         return
-    for name, feature in OUTPUT_INPUTS.items():
+    for name, feature in _OUTPUT_INPUTS.items():
         if name in output.inputs and output.inputs[name].is_linked:
             yield feature, None
     for node in contributing(output):
-        if node.bl_idname in SHADERS:
-            yield SHADERS[node.bl_idname], None
+        if node.bl_idname in _SHADERS:
+            yield _SHADERS[node.bl_idname], None
         elif node.bl_idname == "ShaderNodeBackground":
             yield "emission", None
-        elif node.bl_idname in IMAGE_NODES and node.image:
+        elif node.bl_idname in _IMAGE_NODES and node.image:
             yield None, node.image
         elif node.bl_idname == "ShaderNodeBsdfPrincipled":
-            for name, (feature, without) in PRINCIPLED_INPUTS.items():
+            for name, (feature, without) in _PRINCIPLED_INPUTS.items():
                 socket = node.inputs[name]
                 if socket.is_linked or socket.default_value != without or _is_animated(socket):
                     yield feature, None

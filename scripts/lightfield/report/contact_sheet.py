@@ -13,12 +13,12 @@ from lightfield.core.errors import UserError
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
 
-SHEET_WIDTH = 1600
+_SHEET_WIDTH = 1600
 # Narrower cells have no room for a view's name.
-LEAST_CELL = 96
+_LEAST_CELL = 96
 GAP = 4
-CAPTION = 14
-BACKGROUND = 24
+_CAPTION = 14
+_BACKGROUND = 24
 INK = (0.8, 0.8, 0.8)
 # The font comes with Matplotlib, so that captions look the same on every machine.
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
@@ -31,16 +31,16 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
     """
     columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
     rows = math.ceil(len(views) / columns)
-    cell_width = min(max(width, LEAST_CELL), (SHEET_WIDTH - GAP) // columns - GAP)
+    cell_width = min(max(width, _LEAST_CELL), (_SHEET_WIDTH - GAP) // columns - GAP)
     # Limit the height too: a single tall view would exceed the largest WebP.
-    cell_width = max(1, min(cell_width, SHEET_WIDTH * width // height))
+    cell_width = max(1, min(cell_width, _SHEET_WIDTH * width // height))
     cell_height = max(1, round(cell_width * height / width))
     cells = [small_view(path, cell_width, cell_height) for path in views]
     exposure = pictures.exposure_for(np.stack(cells))
 
     step_x = cell_width + GAP
-    step_y = cell_height + GAP + CAPTION
-    page = np.full((GAP + rows * step_y, GAP + columns * step_x, 3), BACKGROUND, dtype=np.uint8)
+    step_y = cell_height + GAP + _CAPTION
+    page = np.full((GAP + rows * step_y, GAP + columns * step_x, 3), _BACKGROUND, dtype=np.uint8)
     corners = [(GAP + n % columns * step_x, GAP + n // columns * step_y) for n in range(len(views))]
     for path, cell, (left, top) in zip(views, cells, corners, strict=True):
         developed = cell if path.suffix == ".png" else pictures.develop(cell, exposure)
@@ -50,7 +50,7 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
         oiio.ImageBufAlgo.render_text(
             buffer,
             left + cell_width // 2,
-            top + cell_height + CAPTION // 2 + 1,
+            top + cell_height + _CAPTION // 2 + 1,
             path.stem,
             fontsize=10,
             fontname=str(FONT),

@@ -19,7 +19,7 @@ from lightfield.workflow.view_store import ViewStore
 
 FORMAT = "plenoforge corpus"
 # Bins of a histogram.
-BINS = 20
+_BINS = 20
 
 
 def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def distribution(values: Sequence[Any]) -> dict[str, Any]:
         return {"counts": {}}
     low = min(values)
     high = max(values)
-    bins = [0] * (BINS if high > low else 1)
+    bins = [0] * (_BINS if high > low else 1)
     for value in values:
         place = int((value - low) / (high - low) * len(bins)) if high > low else 0
         bins[min(place, len(bins) - 1)] += 1

@@ -27,7 +27,7 @@ from lightfield.workflow.member_record import MemberRecord
 VIEWS = 4
 # Pixels of a thumbnail's longer side.
 THUMBNAIL = 160
-QUALITY = 75
+_QUALITY = 75
 # The cache is written each time after so many members, because a kill may come.
 STEP = 200
 
@@ -81,7 +81,7 @@ def _read(cache: Path) -> dict[str, dict[str, Any]]:
 def _made_of(member: MemberRecord) -> str:
     """Return what changes with any byte of a member's datasets, and with how they are shown."""
     sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
-    made_of = repr([sums, VIEWS, THUMBNAIL, QUALITY])
+    made_of = repr([sums, VIEWS, THUMBNAIL, _QUALITY])
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 
@@ -173,6 +173,6 @@ def _webp(image: Array) -> bytes:
     colour = small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1))
     file = io.BytesIO()
     Image.fromarray(pictures.develop(colour, exposure)).save(
-        file, "WEBP", quality=QUALITY, method=4
+        file, "WEBP", quality=_QUALITY, method=4
     )
     return file.getvalue()

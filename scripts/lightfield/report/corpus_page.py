@@ -21,7 +21,7 @@ from lightfield.report import page
 WIDTH = 240
 HEIGHT = 80
 # More values than these of a name are put together as the last bar.
-MOST_COUNTS = 8
+_MOST_COUNTS = 8
 TITLES = {
     "nearest_metres": "Nearest surface, in metres",
     "farthest_metres": "Farthest surface, in metres",
@@ -136,7 +136,7 @@ def _drawn(title: str, distribution: Mapping[str, Any]) -> Markup:
 def _most_frequent(counts: Mapping[str, int]) -> list[tuple[str, int]]:
     """Return the most frequent values with their counts, and the sum of the others."""
     ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    rest = ordered[MOST_COUNTS:]
+    rest = ordered[_MOST_COUNTS:]
     if not rest:
         return ordered
-    return [*ordered[:MOST_COUNTS], ("others", sum(count for _, count in rest))]
+    return [*ordered[:_MOST_COUNTS], ("others", sum(count for _, count in rest))]

@@ -1,7 +1,7 @@
 """Describes a published dataset for programs, as Croissant 1.1 with the responsible-AI fields.
 
 Sources: docs.mlcommons.org/croissant/docs/croissant-spec-1.1.html and croissant-rai-spec.html.
-NeurIPS 2026 asks for the responsible-AI fields that `RESPONSIBLE_AI` names, for hasSyntheticData,
+NeurIPS 2026 asks for the responsible-AI fields that `_RESPONSIBLE_AI` names, for hasSyntheticData,
 and for the provenance.
 """
 
@@ -13,7 +13,7 @@ from lightfield.report.published import Published
 from lightfield.report.shards import INDEX
 
 # The context that the specification recommends, with PROV for the provenance.
-CONTEXT: dict[str, Any] = {
+_CONTEXT: dict[str, Any] = {
     "@language": "en",
     "@vocab": "https://schema.org/",
     "arrayShape": "cr:arrayShape",
@@ -58,7 +58,7 @@ CONTEXT: dict[str, Any] = {
     "transform": "cr:transform",
 }
 # The responsible-AI fields, with the keys of `publish` that they hold.
-RESPONSIBLE_AI = {
+_RESPONSIBLE_AI = {
     "rai:dataLimitations": "limitations",
     "rai:dataBiases": "biases",
     "rai:personalSensitiveInformation": "personal_information",
@@ -79,7 +79,7 @@ def describe(published: Published) -> dict[str, Any]:
     """Return the content of croissant.json."""
     publication = published.publication
     content: dict[str, Any] = {
-        "@context": CONTEXT,
+        "@context": _CONTEXT,
         "@type": "sc:Dataset",
         "conformsTo": [
             "http://mlcommons.org/croissant/1.1",
@@ -99,7 +99,7 @@ def describe(published: Published) -> dict[str, Any]:
         "distribution": [*map(_file, published.files), *_file_sets(published)],
         "recordSet": [_views(), *_pictures(published)],
     }
-    for name, key in RESPONSIBLE_AI.items():
+    for name, key in _RESPONSIBLE_AI.items():
         content[name] = getattr(publication, key)
     content["rai:hasSyntheticData"] = publication.synthetic
     content["rai:dataCollection"] = _generation(published)

@@ -28,8 +28,8 @@ PICTURES = ("overview", "contact_sheet")
 PLOTS = ("depth", "noise")
 WIDEST = 1600
 # The page shows at most this many views of each reprojection.
-MOST_REPROJECTED = 24
-SHEET_QUALITY = 84
+_MOST_REPROJECTED = 24
+_SHEET_QUALITY = 84
 DEPTHS = {"z": "Z-depth, metres", "distance": "distance, metres"}
 
 
@@ -193,7 +193,7 @@ def facts(
         "Views": f"{len(parts)}" + (f" ({', '.join(counts)})" if counts else ""),
         "Rig": rig_text(rig, lightfield.matrices[:, :3, 3]),
         "Lens": lens.description,
-        "Field of view": field_of_view(lens),
+        "Field of view": _field_of_view(lens),
         "Resolution": f"{lens.width} × {lens.height}",
         "Frame": str(lightfield.frame),
         "Samples": samples,
@@ -219,7 +219,7 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"
 
 
-def field_of_view(lens: Lens) -> str:
+def _field_of_view(lens: Lens) -> str:
     """Return the angles that the image spans, across and down, through the principal point."""
     x, y = lens.center
     lines = (
@@ -240,10 +240,10 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
         lightfield = LightField.read(path)
         lens = lightfield.lens
         count = len(lightfield.views)
-        shown = lightfield.views[:: math.ceil(count / MOST_REPROJECTED)]
+        shown = lightfield.views[:: math.ceil(count / _MOST_REPROJECTED)]
         suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
-        sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), SHEET_QUALITY)
+        sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), _SHEET_QUALITY)
         title = f"{lens.description}{', relit' if lightfield.is_relit else ''}"
         yield path.parent.name, title, count, len(shown), sheet
 

@@ -22,7 +22,7 @@ from lightfield.geometry.rigs import Rig
 
 Array = NDArray[Any]
 
-FEWEST_CAMERAS = 3
+_FEWEST_CAMERAS = 3
 TILTS = tuple(range(-40, 41, 10))
 """Degrees by which an image's plane, or a ring's cone, is raised above the level one."""
 COLUMNS = {"line": 512, "ring": 720}
@@ -57,7 +57,7 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
     faces = rig.views_a_position
     local = (matrices[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
     numbers = rig.middle_row(local)
-    if len(numbers) < FEWEST_CAMERAS:
+    if len(numbers) < _FEWEST_CAMERAS:
         return None
     views = [number * faces for number in numbers]
     if rig.is_round:

@@ -17,7 +17,7 @@ from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
 
 # The page shows pictures of at most this many views. The table has all.
-SHOWN_VIEWS = 24
+_SHOWN_VIEWS = 24
 WIDEST = 1500
 
 
@@ -63,7 +63,7 @@ def write(
         problems=[problem.removeprefix(f"{renders}/") for problem in problems],
         pictures={
             view.name: page.photo(output / "pictures" / f"{view.name}.png", WIDEST)
-            for view in tests[:SHOWN_VIEWS]
+            for view in tests[:_SHOWN_VIEWS]
         },
     )
     return means[0]

@@ -28,12 +28,12 @@ from lightfield.measurement import noise
 from lightfield.report import contact_sheet
 
 # The viewpoint of the rig's drawing, in degrees: round the rig from −Y, and above the ground.
-AZIMUTH = 30.0
-ELEVATION = 24.0
+_AZIMUTH = 30.0
+_ELEVATION = 24.0
 MISS = "#b0b0b0"
 # The noise map has about this many blocks across.
-NOISE_BLOCKS = 128
-PART_COLOURS = {None: BLUE, "train": BLUE, "validation": ORANGE, "test": PURPLE}
+_NOISE_BLOCKS = 128
+_PART_COLOURS = {None: BLUE, "train": BLUE, "validation": ORANGE, "test": PURPLE}
 DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no depth"}
 
 
@@ -59,16 +59,16 @@ def draw(dataset: Path, rig: Rig, panorama: Path | None, output: Path) -> None:
     parts = [view.split for view in lightfield.views]
     draw_rig(output / "rig", rig, lightfield.matrices, parts)
     if panorama:
-        overview = read_panorama(panorama)
+        overview = _read_panorama(panorama)
     else:
         overview = read_view(views[middle_view(rig)], lightfield)
     exposure = pictures.exposure_for(overview.colour)
     images.write_png(output / "overview.png", pictures.develop(overview.colour, exposure))
-    draw_depth(output / "depth", overview)
+    _draw_depth(output / "depth", overview)
     draw_noise(output / "noise", overview)
 
 
-def read_panorama(path: Path) -> Overview:
+def _read_panorama(path: Path) -> Overview:
     image = images.read_image(path)
     unknown = np.full(image.colour.shape[:2], np.nan, np.float32)
     depth = image.channels.get("Z", unknown).astype(np.float32)
@@ -96,8 +96,8 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
 
     ``poses`` are (n, 4, 4). ``parts`` (n,) of the split, such as train and test, have colours.
     """
-    turn = np.radians(AZIMUTH)
-    rise = np.radians(ELEVATION)
+    turn = np.radians(_AZIMUTH)
+    rise = np.radians(_ELEVATION)
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     ahead = np.array([-np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
     screen = np.stack([right, np.cross(right, ahead)], axis=-1)
@@ -126,21 +126,21 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
             headwidth=4,
             headlength=5,
         )
-        colours = [PART_COLOURS[parts[view]] for view in order]
+        colours = [_PART_COLOURS[parts[view]] for view in order]
         dots = [(*to_rgb(colour), alpha) for colour, alpha in zip(colours, near, strict=True)]
         axes.scatter(*start.T, s=min(20.0, 350 / np.sqrt(len(poses))), c=dots, linewidths=0)
         for part in sorted({part for part in parts if part}, reverse=True):
             axes.scatter(
-                [], [], s=20, color=PART_COLOURS[part], label=f"{part} {parts.count(part)}"
+                [], [], s=20, color=_PART_COLOURS[part], label=f"{part} {parts.count(part)}"
             )
         if any(parts):
             axes.legend(loc="upper right")
-        draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
+        _draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
         axes.set_aspect("equal")
         axes.set_axis_off()
 
 
-def draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
+def _draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
     """Draw the axes X, Y and Z below left of the points ``drawn``. Their length is round."""
     length = 10.0 ** np.floor(np.log10(0.3 * extent))
     length *= max(step for step in (1, 2, 5) if step * length <= 0.3 * extent)
@@ -158,19 +158,19 @@ def draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
     axes.autoscale_view()
 
 
-def draw_depth(stem: Path, overview: Overview) -> None:
+def _draw_depth(stem: Path, overview: Overview) -> None:
     """Draw depth in metres. Misses are grey."""
     depth = overview.depth
     hit = np.where(np.isfinite(depth) & (depth > 0), depth, np.nan)
     depths = hit[np.isfinite(hit)]
     low, high = np.percentile(depths, [0.1, 99.9]) if depths.size else (1.0, 2.0)
     label = f"{overview.depth_label} (m)"
-    draw_map(stem, hit, (low, max(high, 1.01 * low)), "viridis_r", label, overview.is_panorama)
+    _draw_map(stem, hit, (low, max(high, 1.01 * low)), "viridis_r", label, overview.is_panorama)
 
 
 def draw_noise(stem: Path, overview: Overview) -> None:
     """Draw the relative noise in percent."""
-    block = max(noise.SMALLEST_BLOCK, overview.colour.shape[1] // NOISE_BLOCKS)
+    block = max(noise.SMALLEST_BLOCK, overview.colour.shape[1] // _NOISE_BLOCKS)
     percent = 100 * noise.relative_noise(pictures.luminance(overview.colour), block)
     if not percent.size:
         # The picture is smaller than a block.
@@ -178,10 +178,10 @@ def draw_noise(stem: Path, overview: Overview) -> None:
     measured = percent[np.isfinite(percent) & (percent > 0)]
     low, high = np.percentile(measured, [2, 99]) if measured.size else (1.0, 2.0)
     limits = (max(low, high / 1e3), max(high, 1.01 * low))
-    draw_map(stem, percent, limits, "magma", "noise of luminance (%)", overview.is_panorama)
+    _draw_map(stem, percent, limits, "magma", "noise of luminance (%)", overview.is_panorama)
 
 
-def draw_map(
+def _draw_map(
     stem: Path,
     values: Array,
     limits: tuple[float, float],

@@ -14,7 +14,7 @@ from lightfield.report.page import TEMPLATES
 from lightfield.report.published import Published
 
 # Licences that Hugging Face knows by their names. They are the short names in small letters.
-HUGGING_FACE_LICENCES = {
+_HUGGING_FACE_LICENCES = {
     "apache-2.0",
     "mit",
     "cc0-1.0",
@@ -42,7 +42,7 @@ def describe(published: Published) -> str:
     """Return the content of README.md."""
     licence = published.credits.data_licence or ""
     front_matter: dict[str, Any] = {"pretty_name": published.title}
-    if licence.lower() in HUGGING_FACE_LICENCES:
+    if licence.lower() in _HUGGING_FACE_LICENCES:
         front_matter["license"] = licence.lower()
     else:
         front_matter |= {

@@ -14,7 +14,7 @@ from lightfield.report.packing import light_scale, pack_light, webp
 # The longer side of the pictures in pixels, at most. Smaller for more than MANY_GROUPS.
 SIDE = 256
 SMALLER_SIDE = 128
-MANY_GROUPS = 16
+_MANY_GROUPS = 16
 
 
 def collect(
@@ -25,7 +25,7 @@ def collect(
     ``exposure`` in stops is that of the page.
     """
     names = lightfield.light_groups
-    small = lightfield.lens.fitted(SIDE if len(names) <= MANY_GROUPS else SMALLER_SIDE)
+    small = lightfield.lens.fitted(SIDE if len(names) <= _MANY_GROUPS else SMALLER_SIDE)
     groups = []
     for name in names:
         try:

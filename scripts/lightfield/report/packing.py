@@ -19,7 +19,7 @@ Array = NDArray[Any]
 
 # Steps of light become linear this many stops below white, nearly as fine as those of 8-bit sRGB.
 # Logarithmic steps would end above black, and change the dark channels of saturated colours.
-TOE_STOPS = 7.0
+_TOE_STOPS = 7.0
 # 12 bits of depth: a step is 0.3 percent in a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096
 NO_DEPTH = 0
@@ -29,9 +29,9 @@ MISS = DEPTH_STEPS - 1
 def light_scale(colour: Array) -> tuple[float, float]:
     """Return the scale (toe, highest) that light (..., 3) is packed on.
 
-    Steps are linear below the toe. The toe is `TOE_STOPS` below white at the colour's own exposure.
+    Steps are linear below the toe. It is `_TOE_STOPS` below white at the colour's own exposure.
     """
-    toe = 2.0 ** -(TOE_STOPS + pictures.exposure_for(colour))
+    toe = 2.0 ** -(_TOE_STOPS + pictures.exposure_for(colour))
     lit = colour[np.isfinite(colour) & (colour > 0)]
     return toe, float(lit.max()) if lit.size else toe
 

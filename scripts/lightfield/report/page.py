@@ -18,8 +18,8 @@ from lightfield.report.packing import data_uri, webp
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 # A plot stays sharp as SVG. A plot of thousands of points is smaller as PNG.
-LARGEST_SVG = 300_000
-PHOTO_QUALITY = 84
+_LARGEST_SVG = 300_000
+_PHOTO_QUALITY = 84
 
 
 def write(output: Path, template: str, **content: Any) -> None:
@@ -64,14 +64,14 @@ def photo(path: Path, widest: int) -> str | None:
     height, width = shown.shape[:2]
     if width > widest:
         shown = pictures.shrunk_8_bit(shown, widest, max(1, round(height * widest / width)))
-    return webp(shown, PHOTO_QUALITY)
+    return webp(shown, _PHOTO_QUALITY)
 
 
 def plot(stem: Path) -> str | None:
     """Return the plot ``stem``.svg or .png as a data URI. None if neither exists."""
     svg = stem.with_name(f"{stem.name}.svg")
     png = stem.with_name(f"{stem.name}.png")
-    if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
+    if svg.is_file() and (svg.stat().st_size <= _LARGEST_SVG or not png.is_file()):
         return data_uri(svg.read_bytes(), "image/svg+xml")
     return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
 
@@ -124,7 +124,7 @@ def cell(value: Any) -> str:
         return str(value)
 
 
-UNITS: dict[str, Callable[[float], str]] = {
+_UNITS: dict[str, Callable[[float], str]] = {
     "seconds": seconds,
     "bytes": bytes_,
     "kwh": lambda value: f"{value:.3g} kWh",
@@ -135,7 +135,7 @@ UNITS: dict[str, Callable[[float], str]] = {
 
 
 # How to write some words of keys.
-SPELLINGS = {
+_SPELLINGS = {
     "mse": "MSE",
     "psnr": "PSNR",
     "ssim": "SSIM",
@@ -147,7 +147,7 @@ SPELLINGS = {
 
 def measure(value: Any, name: str) -> str:
     """Return the cell of a quantity called ``name``, in the unit at the end of the name."""
-    with_unit = UNITS.get(name.rpartition("_")[2])
+    with_unit = _UNITS.get(name.rpartition("_")[2])
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if with_unit and is_number and "_per_" not in name:
         return with_unit(value)
@@ -157,9 +157,9 @@ def measure(value: Any, name: str) -> str:
 def title(name: str) -> str:
     """Return a key as a title, without the unit that `measure` writes beside the value."""
     parts = name.split("_")
-    if len(parts) > 1 and parts[-1] in UNITS and parts[-1] != "hours" and "per" not in parts:
+    if len(parts) > 1 and parts[-1] in _UNITS and parts[-1] != "hours" and "per" not in parts:
         parts.pop()
-    text = " ".join(SPELLINGS.get(part, part) for part in parts)
+    text = " ".join(_SPELLINGS.get(part, part) for part in parts)
     return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, text)
 
 

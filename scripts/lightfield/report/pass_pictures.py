@@ -18,9 +18,9 @@ from lightfield.report.packing import webp
 # The longer side of a picture in pixels, at most.
 SIDE = 320
 # A motion of fewer pixels counts as none.
-STILL = 0.01
+_STILL = 0.01
 # Steps of the golden ratio give neighbouring numbers very different hues.
-GOLDEN = (math.sqrt(5) - 1) / 2
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def collect(
@@ -73,7 +73,7 @@ def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
 
 def _distinct(numbers: Array) -> Array:
     """Return a colour (…, 3) for each number (…)."""
-    hue = numbers.astype(np.float64) * GOLDEN % 1
+    hue = numbers.astype(np.float64) * _GOLDEN % 1
     return np.asarray(hsv_to_rgb(np.stack([hue, np.full_like(hue, 0.6), 0.6 + 0.4 * hue], -1)))
 
 
@@ -81,6 +81,6 @@ def _directions(x: Array, y: Array) -> Array:
     """Return a colour (…, 3) for each motion: hue is direction, saturation is length."""
     length = np.hypot(x, y)
     # Still pixels move only by rounding errors. Do not amplify those.
-    far = max(np.quantile(length, 0.99), STILL)
+    far = max(np.quantile(length, 0.99), _STILL)
     hue = np.arctan2(-y, x) / (2 * np.pi) % 1
     return np.asarray(hsv_to_rgb(np.stack([hue, (length / far).clip(0, 1), np.ones_like(hue)], -1)))

@@ -34,7 +34,7 @@ from lightfield.report.package import add_entry, tar_size
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
-OTHER_FILES = "other_files"
+_OTHER_FILES = "other_files"
 INDEX = "views.csv"
 
 
@@ -191,7 +191,7 @@ def write_shards(
 
 def write_others(output: Path, name: str, datasets: Sequence[Dataset]) -> Path:
     """Write all files without a view as a tar that unpacks to the folder ``name``."""
-    path = output / f"{OTHER_FILES}.tar"
+    path = output / f"{_OTHER_FILES}.tar"
     files = {inside: file for dataset in datasets for inside, file in dataset.others.items()}
     write_tar(path, ((f"{name}/{inside}", files[inside]) for inside in sorted(files)))
     return path

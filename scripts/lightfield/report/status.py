@@ -25,7 +25,7 @@ from lightfield.workflow.member_record import read_member
 # The rate is measured over this many seconds.
 WINDOW = 600.0
 # A process on another machine counts as dead after this many silent seconds.
-SILENCE = 3600.0
+_SILENCE = 3600.0
 
 
 def of_family(name: str, folder: Path, count: int) -> str:
@@ -118,7 +118,7 @@ def _add_shard(
     silence = now - last.last_heard
     if is_running:
         rendering.running.append(name)
-    elif is_running is None and silence < SILENCE:
+    elif is_running is None and silence < _SILENCE:
         host = last.start["host"]
         rendering.running.append(f"{name} on {host} (heard of {duration(silence)} ago)")
     elif missing and last.end is None:

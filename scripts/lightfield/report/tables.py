@@ -14,11 +14,11 @@ from lightfield.measurement import summaries
 from lightfield.report import page
 
 # The page shows this many of the cases that use most of their bound. The full table is folded.
-WORST_CASES = 12
+_WORST_CASES = 12
 
-CHECK_KEYS = ("passed", "detail", "views", "problems", "warnings", "figures")
+_CHECK_KEYS = ("passed", "detail", "views", "problems", "warnings", "figures")
 # The unfolded tables of error_vs_time, in this order, by their names in its file.
-ERROR_TABLES = {
+_ERROR_TABLES = {
     "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
     "settings": "This scene's settings",
     "pareto front": "On the Pareto front: no other method is both faster and better",
@@ -55,7 +55,7 @@ def validation(path: Path) -> dict[str, Any] | None:
     try:
         for check in content["checks"]:
             group, _, name = check["name"].rpartition("/")
-            kept = {key: check[key] for key in CHECK_KEYS}
+            kept = {key: check[key] for key in _CHECK_KEYS}
             groups.setdefault(group, []).append({**kept, "short": name})
         return {"valid": content["valid"], "groups": groups}
     except (LookupError, TypeError, AttributeError):
@@ -99,7 +99,7 @@ def stability(files: Sequence[Path]) -> Measurement | None:
         numbers = [counts[group, precision, kind] for kind in kinds]
         summary_rows.append([group, precision, *numbers])
     summary = Table(["cases", "precision", *kinds], summary_rows)
-    worst = sorted(rows, key=_bound_used, reverse=True)[:WORST_CASES]
+    worst = sorted(rows, key=_bound_used, reverse=True)[:_WORST_CASES]
     names = ("case", "dtype", "condition", "error", "error_bound", "unit", "verdict")
     shown = [[*map(row.get, names), f"{_bound_used(row):.0%}"] for row in worst]
     failed = sum(not row["verdict"].startswith("ok") for row in rows)
@@ -179,7 +179,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
         raise UserError(f"{path}: must be a mapping")
     # Strata have tables of their own.
     tables, _ = _tables({name: part for name, part in content.items() if name != "strata"})
-    unfolded = {name: table for name, table in tables.items() if name in ERROR_TABLES}
+    unfolded = {name: table for name, table in tables.items() if name in _ERROR_TABLES}
     folded = {name: table for name, table in tables.items() if name not in unfolded}
     folded.pop("measured on", None)
     if "slopes" in unfolded:
@@ -190,7 +190,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
                 f"{path}: slopes: is not what scripts/error_vs_time.py writes"
             ) from None
     measured_on = content.get("measured_on")
-    shown = {ERROR_TABLES[name]: unfolded[name] for name in ERROR_TABLES if name in unfolded}
+    shown = {_ERROR_TABLES[name]: unfolded[name] for name in _ERROR_TABLES if name in unfolded}
     if content.get("strata"):
         try:
             shown["By what pixels show"] = Table(*summaries.strata_table(content))

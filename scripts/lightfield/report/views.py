@@ -39,18 +39,18 @@ Array = NDArray[Any]
 # most MOST_BYTES. With more than MANY_VIEWS it is at most SMALLER_SIDE.
 SIDES = (448, 384, 320, 256, 192, 128, 96, 64)
 SMALLER_SIDE = 192
-MANY_VIEWS = 60
+_MANY_VIEWS = 60
 # The rest of a page has up to 2 MB, so that it has at most 10 MB.
 MOST_BYTES = 8_000_000
-LIGHT_QUALITY = 95
+_LIGHT_QUALITY = 95
 # The longer side in pixels of the views that epipolar-plane images sample: their columns' number.
-EPIPOLAR_SIDE = 512
-MOST_ROWS = 48
+_EPIPOLAR_SIDE = 512
+_MOST_ROWS = 48
 # The page shows POINTS points of the scene, chosen from CANDIDATES.
 POINTS = 8_000
-CANDIDATES = 30_000
+_CANDIDATES = 30_000
 # The side in pixels of the square in a view's middle where its noise is measured.
-NOISE_SIDE = 512
+_NOISE_SIDE = 512
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class PackedViews:
+class _PackedViews:
     """The views of a page.
 
     - ``data``: for the page's program.
@@ -97,7 +97,7 @@ def collect(
     rig: Rig,
     unreadable: Collection[str] = (),
     sensor: Path | None = None,
-) -> PackedViews:
+) -> _PackedViews:
     """Read the views that the page shows, and pack them.
 
     ``folder`` holds the views of ``lightfield``, whose cameras are those of ``rig``. The
@@ -124,7 +124,7 @@ def collect(
         if len(json.dumps(shown)) <= MOST_BYTES:
             break
     row = epipolar.find_row(rig, lightfield.matrices)
-    row_views = epipolar.thinned(row.views, MOST_ROWS) if row else []
+    row_views = epipolar.thinned(row.views, _MOST_ROWS) if row else []
     middle = lightfield.matrices[middle_view(rig)]
     distances = np.abs(lightfield.matrices[embedded] - middle).sum(axis=(1, 2))
     data = {
@@ -139,7 +139,7 @@ def collect(
         **shown,
     }
     noises = [view.noise for view in views if math.isfinite(view.noise)]
-    return PackedViews(
+    return _PackedViews(
         data=data,
         embedded=len(embedded),
         views=len(names),
@@ -154,7 +154,7 @@ def collect(
 
 def _lenses(lens: Lens, view_count: int) -> list[Lens]:
     """Return the lenses that ``view_count`` embedded views can have, from large to small."""
-    most = SIDES[0] if view_count <= MANY_VIEWS else SMALLER_SIDE
+    most = SIDES[0] if view_count <= _MANY_VIEWS else SMALLER_SIDE
     sides = [side for side in SIDES if side <= most]
     # A view has no more pixels than the dataset's own.
     largest = max(lens.width, lens.height)
@@ -172,7 +172,7 @@ def _sensed(path: Path, small: Lens) -> str:
     except UserError:
         pixels = np.zeros((small.height, small.width, 3), np.uint8)
     height, width = pixels.shape[:2]
-    return webp(pixels[_picked(height, width, small)], LIGHT_QUALITY)
+    return webp(pixels[_picked(height, width, small)], _LIGHT_QUALITY)
 
 
 def _picked(height: int, width: int, small: Lens) -> tuple[Array, ...]:
@@ -217,7 +217,7 @@ def _pictures(
     scale = light_scale(light)
     exposure = round(pictures.exposure_for(light), 2)
     packed: list[dict[str, Any]] = [
-        {"view": number, "light": webp(pack_light(colour, scale), LIGHT_QUALITY)}
+        {"view": number, "light": webp(pack_light(colour, scale), _LIGHT_QUALITY)}
         for number, colour in zip(embedded, light, strict=True)
     ]
     shown = {"light": scale, "exposure": exposure, "embedded": packed}
@@ -270,8 +270,8 @@ def _black(lens: Lens, meaning: str | None) -> View:
 
 
 def _middle(length: int) -> slice:
-    start = max(0, (length - NOISE_SIDE) // 2)
-    return slice(start, start + NOISE_SIDE)
+    start = max(0, (length - _NOISE_SIDE) // 2)
+    return slice(start, start + _NOISE_SIDE)
 
 
 def _points(
@@ -286,7 +286,7 @@ def _points(
     view, row, column = np.nonzero(np.isfinite(distances) & (distances > 0))
     if not len(view):
         return None
-    picked = np.linspace(0, len(view) - 1, min(len(view), CANDIDATES)).astype(int)
+    picked = np.linspace(0, len(view) - 1, min(len(view), _CANDIDATES)).astype(int)
     at = view[picked], row[picked], column[picked]
     turned = np.einsum("nij,nj->ni", matrices[at[0], :3, :3], rays[at[1:]])
     places = matrices[at[0], :3, 3] + distances[at][:, None] * turned
@@ -337,7 +337,7 @@ def _epipolar_images(
     ``kept`` are the positions of the shown views in the row.
     """
     matrices = lightfield.matrices
-    fitted = lightfield.lens.fitted(EPIPOLAR_SIDE)
+    fitted = lightfield.lens.fitted(_EPIPOLAR_SIDE)
     columns = epipolar.COLUMNS[row.kind]
     count = len(kept)
     light = np.zeros((len(epipolar.TILTS), count, columns, 3), np.float32)

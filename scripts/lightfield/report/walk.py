@@ -20,7 +20,7 @@ from lightfield.synthesis.defaults import BEST
 Array = NDArray[Any]
 
 # The side in pixels of the octahedral map of the directions that the lens sees.
-SIGHT = 64
+_SIGHT = 64
 
 
 def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -> dict[str, Any]:
@@ -38,7 +38,7 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     - ``pixel``: the angle between two pixels, in radians.
     - ``nearest``: the first percentile of the distances.
     """
-    steps = (np.arange(SIGHT) + 0.5) / SIGHT
+    steps = (np.arange(_SIGHT) + 0.5) / _SIGHT
     x, y = np.meshgrid(steps, steps)
     _, _, is_seen = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
     sample = distances[:: max(1, len(distances) // 4)]
@@ -50,7 +50,7 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     return {
         "rays": webp(np.stack([stacked >> 8, stacked & 255, 0 * stacked], -1).astype(np.uint8)),
         "sight": packed_bytes(is_seen.astype(np.uint8).tobytes()),
-        "side": SIGHT,
+        "side": _SIGHT,
         "planes": np.round(_bounds(places), 6).tolist(),
         "toRim": webp(np.stack([to_rim] * 3, axis=-1)),
         "pixel": synthesis.pixel_angle(lens),

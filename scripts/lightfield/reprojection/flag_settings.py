@@ -20,7 +20,7 @@ from lightfield.reprojection.filters import DEFAULT_FILTER
 from lightfield.reprojection.flags import add_lens_map_flags, add_reproject_flags
 
 # The longest side of an image, or of a cube map's strip of faces.
-MOST_PIXELS = 2**19
+_MOST_PIXELS = 2**19
 
 
 class FlagSettings(ReprojectionSettings):
@@ -113,9 +113,9 @@ def _output_lens(arguments: argparse.Namespace, source: Lens) -> Lens:
     if arguments.cubemap is not None:
         if arguments.no_reproject:
             raise UserError("--no-reproject: excludes an output lens")
-        if not 1 <= arguments.cubemap <= MOST_PIXELS // 6:
+        if not 1 <= arguments.cubemap <= _MOST_PIXELS // 6:
             raise UserError(
-                f"--cubemap {arguments.cubemap}: must be from 1 to {MOST_PIXELS // 6} pixels"
+                f"--cubemap {arguments.cubemap}: must be from 1 to {_MOST_PIXELS // 6} pixels"
             )
         return CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
     lens = _lens(arguments, "", width, height)
@@ -136,8 +136,8 @@ def _output_size(arguments: argparse.Namespace, source: Lens) -> tuple[int, int]
     height = int(source.height * arguments.scale)
     if min(width, height) < 1:
         raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
-    if max(width, height) > MOST_PIXELS:
-        raise UserError(f"--scale {arguments.scale:g}: makes a side of over {MOST_PIXELS}")
+    if max(width, height) > _MOST_PIXELS:
+        raise UserError(f"--scale {arguments.scale:g}: makes a side of over {_MOST_PIXELS}")
     return width, height
 
 
@@ -165,6 +165,6 @@ def _numbers(text: str, flag: str, form: str) -> list[float]:
 
 def _size(text: str, flag: str) -> tuple[int, int]:
     width, height = _numbers(text, flag, "WIDTH,HEIGHT")
-    if not all(side.is_integer() and 1 <= side <= MOST_PIXELS for side in (width, height)):
-        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {MOST_PIXELS}")
+    if not all(side.is_integer() and 1 <= side <= _MOST_PIXELS for side in (width, height)):
+        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {_MOST_PIXELS}")
     return int(width), int(height)

@@ -81,7 +81,7 @@ def _check_apart(job: Job, views: list[SourceView]) -> None:
 def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
     """Yield each view with its files, or with the error that stopped it."""
     with ThreadPoolExecutor(max(1, job.arguments.parallel)) as pool:
-        futures = {pool.submit(reproject_view, job, view): view for view in views}
+        futures = {pool.submit(_reproject_view, job, view): view for view in views}
         for future in as_completed(futures):
             error = future.exception()
             if error is not None and not isinstance(error, UserError | OSError):
@@ -89,7 +89,7 @@ def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, An
             yield futures[future], error or future.result()
 
 
-def reproject_view(job: Job, view: SourceView) -> list[Path]:
+def _reproject_view(job: Job, view: SourceView) -> list[Path]:
     """Make a view's missing or outdated files. Return all of its files."""
     arguments = job.arguments
     paths_of_view: list[Path] = []

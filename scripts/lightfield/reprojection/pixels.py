@@ -36,7 +36,7 @@ Attributes = Mapping[str, Attribute]
 
 # Level 4, and libpng's PNG_FILTER_AVG for every row. The defaults are zlib's level, and a choice of
 # filter for each row: they take seven times as long, and the files are no smaller.
-PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
+_PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ def write(
             case "exr":
                 _write_exr(path, image, attributes, job.settings.primaries)
             case "png":
-                _write_png(path, image, {**attributes, **PNG_OPTIONS})
+                _write_png(path, image, {**attributes, **_PNG_OPTIONS})
             case "depth":
                 assert job.settings.depth_png is not None
                 lost = _write_depth(path, image, job.settings.depth_png, key)
@@ -292,7 +292,7 @@ def _write_of_sensor(
         case "parameters":
             write_json(path, {"key": key, **parameters.to_json()})
         case "clipped":
-            write_png(path, sensed.clipped, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})
+            write_png(path, sensed.clipped, {KEY_ATTRIBUTE: key, **_PNG_OPTIONS})
         case "weights":
             assert sensed.weights is not None
             planes = np.moveaxis(sensed.weights, -1, 0)

@@ -24,13 +24,13 @@ LARGEST = 256
 # Differences of roots of colours are averaged over windows of this many pixels along a side.
 WINDOW = 7
 # Views disagree if the roots of their colours differ by more than this.
-DISAGREE = 0.02
+_DISAGREE = 0.02
 # They agree farther away if their difference is there less than this part of what it was.
-BETTER = 0.85
+_BETTER = 0.85
 # A window needs details to be compared: at least this standard deviation of the roots, and a
 # surface in one piece: at most this part of its pixels beside a tear.
-DETAIL = 0.04
-TORN = 0.1
+_DETAIL = 0.04
+_TORN = 0.1
 # A window must be seen by more than this many other views on average.
 OTHERS = 1.0
 # Reflections grow by at most this many pixels. They grow on surfaces whose inverse distances differ
@@ -38,7 +38,7 @@ OTHERS = 1.0
 REACH = 16
 FLAT = 0.3
 EDGE = 3
-GROWS = 1.0
+_GROWS = 1.0
 # Views see the same surface if their distances differ by less than this part.
 SAME = np.float32(0.05)
 # Beyond this inverse distance, in 1/m, nothing can seem to be farther away.
@@ -60,7 +60,7 @@ class Picture:
 def picture(colour: Array, distance: Array, matrix: Array) -> Picture:
     """Return a view's linear ``colour`` (h, w, 3) and ``distance`` (h, w) as a small picture."""
     inverse = inverse_of(colour, distance)
-    height, width = shape = small_shape(inverse.shape)
+    height, width = shape = _small_shape(inverse.shape)
     colour = np.nan_to_num(colour).clip(min=0)
     if shape != inverse.shape:
         colour = pictures.shrunk(colour, width, height)
@@ -80,7 +80,7 @@ def inverse_of(colour: Array, distance: Array) -> Array:
     return inverse
 
 
-def small_shape(shape: tuple[int, ...]) -> tuple[int, int]:
+def _small_shape(shape: tuple[int, ...]) -> tuple[int, int]:
     """Return the shape of the `picture` of a view with a ``shape``."""
     shrink = max(1.0, max(shape) / LARGEST)
     height, width = (max(1, round(side / shrink)) for side in shape)
@@ -112,8 +112,8 @@ def farther(here: Picture, others: Sequence[Picture], lens: Lens, torn: Array) -
     difference = _mean_difference(*on_surface, WINDOW)
     grey = here.root.mean(axis=-1)
     detail = np.sqrt(np.maximum(_mean(grey * grey) - _mean(grey) ** 2, 0))
-    disagree = is_near & (difference < np.inf) & (difference > DISAGREE)
-    disagree &= (detail > DETAIL) & (_mean(torn.astype(np.float32)) < TORN)
+    disagree = is_near & (difference < np.inf) & (difference > _DISAGREE)
+    disagree &= (detail > _DETAIL) & (_mean(torn.astype(np.float32)) < _TORN)
     if not disagree.any():
         return steps
     around = maximum_filter(disagree, WINDOW) & is_near
@@ -124,7 +124,7 @@ def farther(here: Picture, others: Sequence[Picture], lens: Lens, torn: Array) -
         is_better = disagree & (moved < least)
         steps[is_better] = step
         least = np.where(is_better, moved, least)
-    agree = disagree & (least < BETTER * difference)
+    agree = disagree & (least < _BETTER * difference)
     # Single pixels follow most of those around them.
     most = _mean(agree.astype(np.float32)) > 0.5
     steps = np.where(most, median_filter(steps, 5), 0).astype(np.uint8)
@@ -143,7 +143,7 @@ def _grown(steps: Array, comparison: "_Comparison", on_surface: tuple[Array, Arr
     is_near &= np.abs(inverse - inverse[row, column]) < FLAT * inverse[row, column]
     there = comparison.differences(nearest, is_near)
     is_better = is_near & (
-        _mean_difference(*there, EDGE) < GROWS * _mean_difference(*on_surface, EDGE)
+        _mean_difference(*there, EDGE) < _GROWS * _mean_difference(*on_surface, EDGE)
     )
     joins = _mean(((steps > 0) | is_better).astype(np.float32), EDGE) > 0.5
     joins &= is_better | (steps > 0)

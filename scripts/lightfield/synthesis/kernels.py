@@ -84,7 +84,7 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 
 
 @kernel
-def penalty(from_target: Any, from_view: Any) -> Any:
+def _penalty(from_target: Any, from_view: Any) -> Any:
     """Return how differently a target and a view see a point. Less is better.
 
     The vectors (x, y, z) lead from the target's and from the view's camera to the point, in the
@@ -104,12 +104,12 @@ def penalty(from_target: Any, from_view: Any) -> Any:
 def qualities(from_target: Array, from_view: Array, is_seen: Array, quality: Array) -> None:
     """Write how well a view sees points: 1 / penalty, 0 for points that it does not see.
 
-    The vectors (n, 3) are as in `penalty`.
+    The vectors (n, 3) are as in `_penalty`.
     """
     for n in range(len(is_seen)):
         quality[n] = 0
         if is_seen[n]:
-            quality[n] = 1 / penalty(
+            quality[n] = 1 / _penalty(
                 (from_target[n, 0], from_target[n, 1], from_target[n, 2]),
                 (from_view[n, 0], from_view[n, 1], from_view[n, 2]),
             )
@@ -166,7 +166,7 @@ def look(
         for c in range(4):
             values[n, c + 1] = shade[n, c]
         # The unit of `length` is the view's distance, so a near view counts more: it sees more.
-        worth = min(length, CLOSEST) / penalty((x, y, z), ray)
+        worth = min(length, CLOSEST) / _penalty((x, y, z), ray)
         values[n, 5] = counts[n] * worth * worth
 
 

@@ -28,7 +28,7 @@ from lightfield.synthesis.defaults import BEST
 # points lie in this many directions across and down the picture.
 DIRECTIONS = 12
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent.
-STEEPEST = 6.0
+_STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
 TORN_WEIGHT = 0.25
 # What a mirror shows is elsewhere from another place. It counts this much if it is drawn unmoved.
@@ -407,7 +407,7 @@ def pixel_angle(lens: Lens) -> float:
 
 def steepest(lens: Lens) -> np.float32:
     """Return the part by which a surface's distances may differ from one pixel to the next."""
-    return np.float32(STEEPEST * pixel_angle(lens))
+    return np.float32(_STEEPEST * pixel_angle(lens))
 
 
 def _least_cosine(lens: Lens) -> np.float32:

@@ -39,22 +39,22 @@ _ROWS, _COLUMNS = (offset.ravel() for offset in np.mgrid[-1:2, -1:2])
 
 # A patch is smooth if the standard deviation of its points from their plane is below this many
 # pixel footprints. The jitter of Cycles' default filter gives up to 0.25.
-SMOOTH_SPREAD = 0.35
+_SMOOTH_SPREAD = 0.35
 # A patch is not used if the cosine between its normal and the line of sight is smaller.
-GRAZING_COSINE = 0.2
+_GRAZING_COSINE = 0.2
 
 # A point lies on a recorded surface within this many standard deviations of both planes. This part
 # of a footprint is added for curvature that a plane cannot follow.
-TOLERANCE_DEVIATIONS = 4.0
-TOLERANCE_FOOTPRINTS = 0.05
+_TOLERANCE_DEVIATIONS = 4.0
+_TOLERANCE_FOOTPRINTS = 0.05
 
 # Fewer points than this say nothing about a pair of views, nor about six unknowns of motion.
-FEWEST_POINTS = 30
+_FEWEST_POINTS = 30
 # Rounding may move all points alike by this many pixel footprints.
 ROUNDING = 1e-4
 NEIGHBOURS = 6
 # The farther neighbours are chosen from this many of the nearest views.
-NEIGHBOURHOOD = 48
+_NEIGHBOURHOOD = 48
 # Distances in metres are equal if they agree to this many decimals.
 DECIMALS = 6
 
@@ -176,8 +176,8 @@ def _patches(
         error = precision + distance * camera.grain * sine / np.sqrt(2.0)
         smooth = (
             finite
-            & (spread < SMOOTH_SPREAD * footprint + precision)
-            & (np.abs(cosine) > GRAZING_COSINE)
+            & (spread < _SMOOTH_SPREAD * footprint + precision)
+            & (np.abs(cosine) > _GRAZING_COSINE)
         )
         curvature = _curvature(np.einsum("nij,nj->ni", around, normals))
     # Pixels without points have no plane, and so neither a footprint nor an error.
@@ -265,7 +265,7 @@ class Comparison:
     def measuring(self) -> "Comparison | None":
         """Return the patches that measure the surfaces' distance. None if they are too few."""
         used = self.smooth & (np.abs(self.residual) < SAME_SURFACE)
-        if used.sum() < FEWEST_POINTS:
+        if used.sum() < _FEWEST_POINTS:
             return None
         return Comparison(*(getattr(self, each.name)[used] for each in fields(self)))
 
@@ -274,7 +274,7 @@ def _visible_patches(patches: Patches, camera: Camera) -> tuple[NDArray[np.bool_
     """Return which patches turn towards a view and lie in it, and at which pixels (n, 2)."""
     sight = camera.position - patches.points
     distance = np.linalg.norm(sight, axis=1)
-    facing = np.einsum("ij,ij->i", patches.normals, sight) > GRAZING_COSINE * distance
+    facing = np.einsum("ij,ij->i", patches.normals, sight) > _GRAZING_COSINE * distance
     pixels = camera.pixels(patches.points)
     rim = float(camera.spacing)
     last = np.array([camera.lens.width, camera.lens.height]) - rim
@@ -302,8 +302,8 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     deviation = np.sqrt(queried.spread**2 / 9 + recorded.spread**2 * (1 / 9 + 0.5 / 6))
     footprint = np.maximum(queried.footprint, recorded.footprint)
     tolerance = (
-        TOLERANCE_DEVIATIONS * deviation
-        + TOLERANCE_FOOTPRINTS * footprint
+        _TOLERANCE_DEVIATIONS * deviation
+        + _TOLERANCE_FOOTPRINTS * footprint
         + queried.error
         + recorded.error
     )
@@ -320,7 +320,7 @@ def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison
     verdict[rough[np.isnan(nearest)]] = UNKNOWN
     # The variance of a rounding error is a twelfth of its squared bound.
     rounding = (queried.error**2 + recorded.error**2) / 12
-    finest = TOLERANCE_FOOTPRINTS * footprint / TOLERANCE_DEVIATIONS
+    finest = _TOLERANCE_FOOTPRINTS * footprint / _TOLERANCE_DEVIATIONS
     expected = np.sqrt(deviation**2 + finest**2 + rounding)
     unit = np.maximum(footprint, np.finfo(np.float64).tiny)
     return Comparison(
@@ -430,12 +430,12 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     nearest = Cameras(positions)
     pairs = set()
     for view, patches_of_view in enumerate(patches):
-        if len(patches_of_view) < FEWEST_POINTS:
+        if len(patches_of_view) < _FEWEST_POINTS:
             continue
-        candidates = nearest.nearest(view, NEIGHBOURHOOD, 10**-DECIMALS)
+        candidates = nearest.nearest(view, _NEIGHBOURHOOD, 10**-DECIMALS)
         away = np.linalg.norm(positions[candidates] - positions[view], axis=1)
         order = np.argsort(np.round(away, DECIMALS), kind="stable")
-        near = candidates[order[:NEIGHBOURHOOD]]
+        near = candidates[order[:_NEIGHBOURHOOD]]
         starts = [0] * (NEIGHBOURS // 2)
         starts += [len(near) * step // 4 for step in range(1, NEIGHBOURS - NEIGHBOURS // 2 + 1)]
         chosen: set[int] = set()
@@ -445,7 +445,7 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
                 if other in chosen or other in blind:
                     continue
                 visible, _ = _visible_patches(patches_of_view, cameras[other])
-                if visible.sum() >= FEWEST_POINTS:
+                if visible.sum() >= _FEWEST_POINTS:
                     chosen.add(other)
                     break
                 blind.add(other)
@@ -475,7 +475,7 @@ class Answer:
     def contradiction(self) -> float | None:
         """The part of the points not occluded that contradict. None if there are too few points."""
         decided = self.agree + self.contradict
-        return self.contradict / decided if decided >= FEWEST_POINTS else None
+        return self.contradict / decided if decided >= _FEWEST_POINTS else None
 
     def __add__(self, other: "Answer") -> "Answer":
         return Answer(
@@ -524,7 +524,7 @@ def scales(answers: Answer) -> tuple[Array, Array]:
     """
     squares = answers.moments[:2, :2]
     products = answers.moments[:2, 2]
-    if answers.measured < FEWEST_POINTS or np.linalg.cond(squares) > 1e9:
+    if answers.measured < _FEWEST_POINTS or np.linalg.cond(squares) > 1e9:
         return np.zeros(2), np.full(2, np.inf)
     inverse = np.linalg.inv(squares)
     errors = inverse @ products

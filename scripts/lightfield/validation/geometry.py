@@ -23,10 +23,10 @@ from lightfield.validation.result import Check
 # limits are wider.
 CONTRADICTIONS_LIMIT = 0.05
 DISPLACEMENT_LIMIT = 0.2
-REPROJECTED_DISPLACEMENT_LIMIT = 0.4
-EXPECTED_DISPLACEMENTS = 3.0
+_REPROJECTED_DISPLACEMENT_LIMIT = 0.4
+_EXPECTED_DISPLACEMENTS = 3.0
 SCALE_LIMIT = 0.007
-REPROJECTED_SCALE_LIMIT = 0.015
+_REPROJECTED_SCALE_LIMIT = 0.015
 # A scale is not checked if its standard deviation is larger than this.
 SCALE_DEVIATION_LIMIT = 0.0015
 
@@ -117,7 +117,7 @@ def _judge(
     name: str, image_set: ImageSet, files: Sequence[File], pairs: Mapping[Pair, Answer]
 ) -> Check:
     """Return the check that follows from the pairs' answers. It names the bad views."""
-    limit = REPROJECTED_DISPLACEMENT_LIMIT if grain_of(image_set) else DISPLACEMENT_LIMIT
+    limit = _REPROJECTED_DISPLACEMENT_LIMIT if grain_of(image_set) else DISPLACEMENT_LIMIT
     verdicts = _view_verdicts(pairs, limit)
     if not verdicts:
         return Check(name, None, "no two views see enough of the same smooth surfaces")
@@ -131,7 +131,7 @@ def _judge(
             "those of the images",
         )
     scales = _scales(pairs, set(bad_views))
-    scale_limit = REPROJECTED_SCALE_LIMIT if grain_of(image_set) else SCALE_LIMIT
+    scale_limit = _REPROJECTED_SCALE_LIMIT if grain_of(image_set) else SCALE_LIMIT
     for quantity, (error, deviation) in scales.items():
         if deviation < SCALE_DEVIATION_LIMIT and abs(error) > scale_limit + 3 * deviation:
             problems.append(
@@ -222,7 +222,7 @@ def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float
     A pair's limit is ``limit``, or more if resolution and precision alone lead to more.
     """
     pairs = [
-        (answer.displacement, max(limit, EXPECTED_DISPLACEMENTS * answer.expected))
+        (answer.displacement, max(limit, _EXPECTED_DISPLACEMENTS * answer.expected))
         for answer in answers
         if answer.displacement is not None and answer.expected is not None
     ]

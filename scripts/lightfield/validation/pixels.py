@@ -25,23 +25,23 @@ from lightfield.validation.result import Check
 Bools = NDArray[np.bool_]
 
 # How many surface patches of a view are compared with its neighbours.
-RAYS_A_VIEW = 400
+_RAYS_A_VIEW = 400
 
 # Pixels this near to the rim of the image circle may hold light from both sides of it.
-RIM_PIXELS = 2
+_RIM_PIXELS = 2
 # An image counts as having one colour if at most this part of it has another.
 FEW = 0.002
 # A unit vector's length differs from 1 by less than this.
-NOT_UNIT = 1e-4
+_NOT_UNIT = 1e-4
 # Outside the image circle, at most this part of the values may exceed FAINT.
-MOST_LIT_OUTSIDE = 0.05
-FAINT = 0.001
+_MOST_LIT_OUTSIDE = 0.05
+_FAINT = 0.001
 # A flow may be this many pixels off the place that follows from depth.
-FLOW_OFF = 0.01
+_FLOW_OFF = 0.01
 # A point is hidden if it is farther away than this factor times the farthest surface around.
 HIDDEN = 1.011
 # Regions of this many differently turned views are kept in memory.
-MOST_REGIONS = 16
+_MOST_REGIONS = 16
 
 
 @dataclass
@@ -151,7 +151,7 @@ class Examiner:
             wrong = int((depth <= 0).sum())
             facts.fault("depth", f"{wrong} depths are not positive", wrong)
             facts.missed = float(np.isposinf(depth[in_circle]).mean())
-            facts.patches = consistency.sample(camera_of(image_set, file.view), depth, RAYS_A_VIEW)
+            facts.patches = consistency.sample(camera_of(image_set, file.view), depth, _RAYS_A_VIEW)
         if is_rendered and images.MACHINE_ATTRIBUTE in image.attributes:
             facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
         if not is_rendered:
@@ -205,7 +205,7 @@ class Examiner:
             facts.fault("colour", "has one colour everywhere", is_rendered and not is_empty)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
-            is_lit = (colour[:, outside] > FAINT).mean() > MOST_LIT_OUTSIDE
+            is_lit = (colour[:, outside] > _FAINT).mean() > _MOST_LIT_OUTSIDE
             facts.fault("colour", "has colour where the lens sees nothing", is_lit)
 
     def _examine_pass(self, file: File, view_pass: Pass, image: images.Image, facts: Facts) -> None:
@@ -219,7 +219,7 @@ class Examiner:
         facts.fault("passes", f"{wrong} values are not finite", wrong)
         if view_pass.kind == "normal":
             lengths = np.linalg.norm(pixels, axis=0)
-            wrong = int(((np.abs(lengths - 1) > NOT_UNIT) & (lengths != 0)).sum())
+            wrong = int(((np.abs(lengths - 1) > _NOT_UNIT) & (lengths != 0)).sum())
             facts.fault("passes", f"{wrong} normals are not unit vectors", wrong)
         if view_pass.kind == "value":
             wrong = int(((pixels < 0) | (pixels > 1)).sum())
@@ -272,7 +272,7 @@ class Examiner:
         off = other.pixels(points) - places
         off[:, 0] = shorter(other.lens, off[:, 0])
         # NaN where the other view has no ray to a point.
-        is_there = (np.abs(off) <= FLOW_OFF).all(axis=-1)
+        is_there = (np.abs(off) <= _FLOW_OFF).all(axis=-1)
         wrong = int((is_visible & ~is_there).sum())
         if wrong:
             yield f"{wrong} visible points are not where their depth puts them"
@@ -390,7 +390,7 @@ class Examiner:
             frame = np.array([from_lens.width, from_lens.height], np.float32)
             with np.errstate(invalid="ignore"):
                 in_source = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
-            if len(self.regions) > MOST_REGIONS:
+            if len(self.regions) > _MOST_REGIONS:
                 self.regions.clear()
             self.regions[key] = (_inner(in_source), _inner(~in_source))
         return self.regions[key]
@@ -518,9 +518,9 @@ def _hashes(image: images.Image) -> set[float]:
 
 def _inner(region: Bools, *, outside: bool = True) -> Bools:
     """Return a region without its rim. ``outside`` says whether it goes on beyond the image."""
-    window = 2 * RIM_PIXELS + 1
+    window = 2 * _RIM_PIXELS + 1
     # Importing scipy's erosion takes a quarter of a second.
-    padded = np.pad(region, RIM_PIXELS, constant_values=outside)
+    padded = np.pad(region, _RIM_PIXELS, constant_values=outside)
     rows = np.lib.stride_tricks.sliding_window_view(padded, window, axis=0).all(axis=-1)
     inner: Bools = np.lib.stride_tricks.sliding_window_view(rows, window, axis=1).all(axis=-1)
     return inner

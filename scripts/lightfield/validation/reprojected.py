@@ -23,28 +23,28 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # About this many pixels of a view are compared, spread evenly.
-PIXELS = 500
+_PIXELS = 500
 # A colour is compared with those of the source within this many pixels: of the source in a
 # magnified image, and of the view in a reduced one. Some filters reach farther, but give little
 # weight to what is there.
 REACH = 1.0
 # Where that is more than this many pixels of the source, colours are not compared.
-LARGEST_REACH = 24
+_LARGEST_REACH = 24
 # By this part of the range of colours around it, a filter may overshoot the range.
-OVERSHOOT = 0.3
+_OVERSHOOT = 0.3
 # A colour may be this much outside the range: a step of 8 bits, or rounding of half floats.
 STEP = 1.5 / 255
 ROUNDING = 0.01
 # At most this part of the compared colours, and of the distances, may be wrong. Right views with
 # the noise of 4 samples reach 0.016.
-MOST_WRONG = 0.05
+_MOST_WRONG = 0.05
 # Four neighbouring distances are of one surface if the largest is at most this times the smallest.
-ONE_SURFACE = 1.1
+_ONE_SURFACE = 1.1
 # A distance is wrong if its logarithm is off by more than this. The median may be off by less.
-OFF = 0.05
-MEDIAN_OFF = 0.005
+_OFF = 0.05
+_MEDIAN_OFF = 0.005
 # Fewer pixels than this say nothing.
-FEWEST = 20
+_FEWEST = 20
 
 
 class _Rays:
@@ -59,7 +59,7 @@ class _Rays:
         self.source_lens = source.lightfield.lens
         to_world = target.lightfield.matrices[view, :3, :3]
         self.turn = source.lightfield.matrices[source_view, :3, :3].T @ to_world
-        step = max(1, int((self.lens.width * self.lens.height / PIXELS) ** 0.5))
+        step = max(1, int((self.lens.width * self.lens.height / _PIXELS) ** 0.5))
         grid = np.mgrid[step // 2 : self.lens.height : step, step // 2 : self.lens.width : step]
         self.rows, self.columns = grid.reshape(2, -1)
         self.rays = self.lens.rays(self.columns + 0.5, self.rows + 0.5)
@@ -83,7 +83,7 @@ def faults(
     rays = _Rays(target, view, source, source_view)
     if _has_same_light(target):
         wrong = _wrong_colours(target, image, original, rays)
-        if len(wrong) >= FEWEST and wrong.mean() > MOST_WRONG:
+        if len(wrong) >= _FEWEST and wrong.mean() > _MOST_WRONG:
             yield f"{wrong.mean():.0%} of its colours are not those around their places in"
     if "Z" in image.channels and "Z" in original.channels:
         yield from _depth_faults(target, image, source, original, rays)
@@ -109,7 +109,7 @@ def _wrong_colours(
     parts = [np.empty(0, bool)]
     height, width = colour.shape[:2]
     with np.errstate(invalid="ignore"):
-        radii = np.where(reach <= LARGEST_REACH, np.ceil(reach), -1).astype(np.int64)
+        radii = np.where(reach <= _LARGEST_REACH, np.ceil(reach), -1).astype(np.int64)
         columns, rows = np.floor(np.nan_to_num(rays.places, nan=-1)).astype(np.int64).T
     for radius in np.unique(radii[radii >= 0]).tolist():
         is_inside = (radius <= columns) & (columns < width - radius)
@@ -121,7 +121,7 @@ def _wrong_colours(
         ]
         low = _developed(window.min(axis=(1, 2)), target, is_encoded)
         high = _developed(window.max(axis=(1, 2)), target, is_encoded)
-        slack = OVERSHOOT * (high - low) + (STEP if is_encoded else ROUNDING * (1e-2 + high))
+        slack = _OVERSHOOT * (high - low) + (STEP if is_encoded else ROUNDING * (1e-2 + high))
         # The limits are clipped, too: saturated colours of other primaries may be negative.
         values = np.maximum(pixels[chosen], 0)
         parts.append(((values < low - slack) | (values > high + slack)).any(axis=1))
@@ -146,18 +146,18 @@ def _depth_faults(
         target.lightfield.depth,
     )
     with np.errstate(invalid="ignore", divide="ignore"):
-        is_surface = around.max(axis=1) <= ONE_SURFACE * around.min(axis=1)
+        is_surface = around.max(axis=1) <= _ONE_SURFACE * around.min(axis=1)
         is_surface &= np.isfinite(around).all(axis=1) & ~np.isnan(distance)
         expected = 1 / (weights / around).sum(axis=1)
         off = np.abs(np.log(distance / expected))[is_surface]
         ratio = (distance / expected)[is_surface]
-    if len(off) < FEWEST:
+    if len(off) < _FEWEST:
         return
-    wrong = float(np.mean(~(off <= OFF)))
+    wrong = float(np.mean(~(off <= _OFF)))
     scale = float(np.median(ratio))
-    if wrong > MOST_WRONG:
+    if wrong > _MOST_WRONG:
         yield f"{wrong:.0%} of its depths are not those at their places in"
-    elif not abs(np.log(scale)) <= MEDIAN_OFF:
+    elif not abs(np.log(scale)) <= _MEDIAN_OFF:
         yield f"its depths are {scale:.4g} times those of"
 
 

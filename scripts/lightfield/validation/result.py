@@ -8,7 +8,7 @@ from typing import Any
 # How many problems of a check are printed. validation.json has all of them.
 _LINES_A_CHECK = 20
 # So many failed checks are named, each with its first problem.
-CAUSES = 3
+_CAUSES = 3
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Result:
 def causes(validation: Mapping[str, Any]) -> str:
     """Return the first problem of the first failed checks, and the number of other problems."""
     failed_checks = [check for check in validation["checks"] if check["passed"] is False]
-    parts = [f"{check['name']}: {check['problems'][0]}" for check in failed_checks[:CAUSES]]
+    parts = [f"{check['name']}: {check['problems'][0]}" for check in failed_checks[:_CAUSES]]
     other_problems = sum(len(check["problems"]) for check in failed_checks) - len(parts)
     if other_problems:
         parts.append(f"and {other_problems} more")

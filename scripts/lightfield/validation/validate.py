@@ -83,22 +83,22 @@ def validate(
         dataset, sets, facts, export_files, recorded_sums, ledger_sums or {}
     )
     if len(sets) <= len(reprojections):
-        files_checks[0] = UNLISTED
+        files_checks[0] = _UNLISTED
     checks += [*_sensor_checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
     rendered = layout.rendered(sets)
     view_count = len(rendered.views) if rendered else 0
     return Result(f"{dataset.parent.name}/{dataset.name}", view_count, checks, digests)
 
 
-ParallelMap = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+_ParallelMap = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 """Applies a function to each item of a sequence, in worker processes."""
 
-Sums = dict[str, tuple[int, str]]
+_Sums = dict[str, tuple[int, str]]
 """The size in bytes and the SHA-256 of files, by their paths in the dataset."""
 
 
 # The check of the files if not every lightfield.json could be read.
-UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+_UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
 
 
 def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:
@@ -111,11 +111,11 @@ def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:
     return sensor_check.checks(dataset, sets)
 
 
-def _recorded_sums(records: Sequence[Path]) -> Sums | None:
+def _recorded_sums(records: Sequence[Path]) -> _Sums | None:
     """Return the sums of the images from the records. Return None without records."""
     if not records:
         return None
-    sums: Sums = {}
+    sums: _Sums = {}
     for record in records:
         sums |= read_record(record)
     return sums
@@ -158,7 +158,7 @@ def _check_images(
 
 
 def _read_images(
-    dataset: Path, images: Sequence[File], parallel_map: ParallelMap
+    dataset: Path, images: Sequence[File], parallel_map: _ParallelMap
 ) -> dict[File, Facts]:
     """Read each image once, and return what it shows by itself."""
     facts: dict[File, Facts] = {}
@@ -173,7 +173,7 @@ def _check_set(
     image_set: ImageSet,
     facts: Mapping[File, Facts],
     volumes: Sequence[str],
-    parallel_map: ParallelMap,
+    parallel_map: _ParallelMap,
 ) -> list[Check]:
     """Return the checks of one set's pixels, its geometry, and the machines that rendered it."""
     patches = {file: fact.patches for file, fact in facts.items() if fact.patches is not None}
@@ -189,7 +189,7 @@ def _check_files(
     sets: Sequence[ImageSet],
     facts: Mapping[File, Facts],
     export_files: Sequence[str],
-    recorded_sums: Sums | None,
+    recorded_sums: _Sums | None,
     ledger_sums: Mapping[str, str],
 ) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
@@ -203,7 +203,7 @@ def _check_files(
     return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
 
 
-def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
+def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:
     """Return the sums of the JSON files beside images."""
     paths = {name: dataset / name for name in layout.json_files(sets)}
     return {
@@ -212,7 +212,7 @@ def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
 
 
 @contextmanager
-def _workers(examiner: Examiner, processes: int) -> Iterator[ParallelMap]:
+def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
     """Yield a `map` over worker processes that hold the examiner.
 
     A single process is this one.

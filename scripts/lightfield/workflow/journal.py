@@ -32,9 +32,9 @@ from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
 
 # A view is suspect if it took less than this part of the median time of its shard's views.
-SUSPECT_PART = 0.02
+_SUSPECT_PART = 0.02
 # This needs at least this many other views.
-SUSPECT_AFTER = 3
+_SUSPECT_AFTER = 3
 
 # The keys of each kind of line. The first key shows the kind.
 _LINES: dict[str, dict[str, type]] = {
@@ -158,7 +158,7 @@ def read(path: Path) -> list[Run]:
 
 def is_suspect(seconds: float, other_seconds: Sequence[float]) -> bool:
     """Return whether a view was implausibly fast, compared with its shard's other views."""
-    return len(other_seconds) >= SUSPECT_AFTER and seconds < SUSPECT_PART * median(other_seconds)
+    return len(other_seconds) >= _SUSPECT_AFTER and seconds < _SUSPECT_PART * median(other_seconds)
 
 
 def _is_sound(entry: dict[str, Any]) -> bool:

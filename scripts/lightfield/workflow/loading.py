@@ -21,7 +21,7 @@ from lightfield.geometry.rigs import Poses, Rig
 from lightfield.workflow.dataset import Dataset
 
 # A rig whose split is one of these tests what is trained on another rig.
-TESTED_WITH = ("validation", "test")
+_TESTED_WITH = ("validation", "test")
 
 
 def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> list[Dataset]:
@@ -208,7 +208,7 @@ def _exports_of(
     A rig that tests another rig's training has no training exports of its own. The other rig's
     exports include its views.
     """
-    is_tested_elsewhere = rig.split in TESTED_WITH
+    is_tested_elsewhere = rig.split in _TESTED_WITH
     exports = {}
     for key, export in written.exports.selected.items():
         sources = [source for source in export.sources if source in (VIEWS, *reprojections)]
@@ -232,9 +232,9 @@ def _split_partners(rig: Rig, written: scene_yaml.Scene, frame_folder: str) -> d
     """Return `Description.tested_by` of a rig that trains, or `trained_by` of one that tests."""
     split_of_rig = {name: other_rig.split for name, other_rig in written.rigs.items()}
     if rig.split == "train":
-        testing = [name for name, split in split_of_rig.items() if split in TESTED_WITH]
+        testing = [name for name, split in split_of_rig.items() if split in _TESTED_WITH]
         return {"tested_by": tuple(f"{name}{frame_folder}" for name in testing)}
-    if rig.split in TESTED_WITH:
+    if rig.split in _TESTED_WITH:
         training = next((name for name, split in split_of_rig.items() if split == "train"), None)
         return {"trained_by": f"{training}{frame_folder}"}
     return {}

@@ -15,7 +15,7 @@ from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.view_store import ViewStore
 
 # Some file systems keep times to two seconds.
-TIME_PRECISION_NS = 2 * 10**9
+_TIME_PRECISION_NS = 2 * 10**9
 
 
 def missing_views(dataset: Dataset) -> int:
@@ -60,7 +60,7 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
         if source is None or imported is None:
             continue
         source_size, source_time = source
-        is_other_file = abs(source_time - imported[1]) > TIME_PRECISION_NS
+        is_other_file = abs(source_time - imported[1]) > _TIME_PRECISION_NS
         if source_size != size or source_time > import_time or is_other_file:
             return True
     return False

@@ -18,11 +18,11 @@ from lightfield.core import progress
 from lightfield.core.progress import duration
 
 # After this many seconds of work, the run's rate counts.
-SURE_AFTER = 2.0
+_SURE_AFTER = 2.0
 # Without a terminal the first line of progress comes after this many seconds.
-FIRST_LINE = 30.0
+_FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
-NEXT_LINE = 0.1
+_NEXT_LINE = 0.1
 CLEAR_LINE = "\r\x1b[K"
 # The lines of a program's log that the user sees.
 _FOR_THE_USER = re.compile(r"warning: |note: ")
@@ -128,7 +128,7 @@ class RunDisplay:
         self._cores = cores
         self._phases = dict.fromkeys(task.phase for task in tasks.values())
         self._began = time.time()
-        self._due = FIRST_LINE
+        self._due = _FIRST_LINE
 
     def start(self) -> None:
         """Update the display each second, until `stop`."""
@@ -228,7 +228,7 @@ class RunDisplay:
             self._write(CLEAR_LINE + self.line(now)[: columns - 1])
             self._drawn = True
         elif now - self._began >= self._due:
-            self._due = now - self._began + max(FIRST_LINE, NEXT_LINE * (now - self._began))
+            self._due = now - self._began + max(_FIRST_LINE, _NEXT_LINE * (now - self._began))
             self._say(self.line(now))
 
     def line(self, now: float) -> str:
@@ -261,7 +261,7 @@ class RunDisplay:
             remaining += seconds * (1 - task.part)
         elapsed = now - self._began
         # Before much is done, assume that all cores work.
-        rate = done / elapsed if done > SURE_AFTER else float(self._cores)
+        rate = done / elapsed if done > _SURE_AFTER else float(self._cores)
         seconds_by_logs = [
             (task.total - task.already - task.done) * task.each
             for task in self._open.values()

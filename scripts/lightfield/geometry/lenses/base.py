@@ -44,9 +44,9 @@ LENSES: dict[str, "type[Lens]"] = {}
 
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
-Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]
+_Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]
 FocalLength = Annotated[
-    Millimetres, Field(description="Focal length of the lens.", json_schema_extra={"unit": "mm"})
+    _Millimetres, Field(description="Focal length of the lens.", json_schema_extra={"unit": "mm"})
 ]
 
 
@@ -61,7 +61,7 @@ class LensSettings(Settings):
     resolution: Annotated[tuple[Pixels, Pixels], as_list(2)] = Field(
         description="Width and height of the image.", json_schema_extra={"unit": "pixels"}
     )
-    sensor_size: Millimetres | Annotated[tuple[Millimetres, Millimetres], as_list(2)] | None = (
+    sensor_size: _Millimetres | Annotated[tuple[_Millimetres, _Millimetres], as_list(2)] | None = (
         Field(
             None,
             description="Width of the sensor, or its width and height. Without this key, it is 36 "

@@ -19,7 +19,7 @@ from lightfield.geometry.lenses.base import (
     checked_focal_length,
 )
 
-CLIP = (0.1, 1000.0)  # m, a new Blender camera's clipping, which its projection matrix contains
+_CLIP = (0.1, 1000.0)  # m, a new Blender camera's clipping, which its projection matrix contains
 
 
 class RectilinearSettings(LensSettings):
@@ -106,7 +106,7 @@ class Rectilinear(RadialLens):
         return np.where(cos > 0, sin / cos, np.nan)
 
     def _to_camera(self) -> dict[str, Any]:
-        near, far = CLIP
+        near, far = _CLIP
         unit = self._unit
         # As in Blender's calc_matrix_camera. The third column holds a shifted principal point.
         return {

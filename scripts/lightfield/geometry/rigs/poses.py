@@ -45,10 +45,10 @@ from lightfield.geometry.rotations import (
 )
 
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
-QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
-LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
+_QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
+_LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
 # The axes of a camera in ours, by the camera_convention of a transforms.json.
-CAMERA_AXES = {"opengl": np.eye(4), "opencv": np.diag([1.0, -1.0, -1.0, 1.0])}
+_CAMERA_AXES = {"opengl": np.eye(4), "opencv": np.diag([1.0, -1.0, -1.0, 1.0])}
 # In bytes. It is enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
 
@@ -201,10 +201,10 @@ def _read_csv(path: Path) -> Listing:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             keys = next(reader, [])
-            if keys not in (CSV_HEADER, QUATERNION_HEADER):
+            if keys not in (CSV_HEADER, _QUATERNION_HEADER):
                 raise UserError(
                     f"{path}: row 1: must be {','.join(CSV_HEADER)} (metres, radians) "
-                    f"or {','.join(QUATERNION_HEADER)}, not {','.join(keys)}"
+                    f"or {','.join(_QUATERNION_HEADER)}, not {','.join(keys)}"
                 )
             for row in reader:
                 if row:
@@ -244,8 +244,8 @@ def _read_json(path: Path) -> Listing:
         if "transform_matrix" in first or "transform_matrix_start" in first:
             return Listing(Poses.shape, "transform_matrix", _transforms_frames(content))
         lf_type = content.get("lf_type", Poses.shape)
-        if lf_type not in LF_TYPES:
-            raise UserError(f"lf_type: must be one of {', '.join(LF_TYPES)}, not {lf_type!r}")
+        if lf_type not in _LF_TYPES:
+            raise UserError(f"lf_type: must be one of {', '.join(_LF_TYPES)}, not {lf_type!r}")
         return Listing(lf_type, "world_matrix", read_frames(frames))
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
@@ -261,8 +261,8 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
     if content.get("from_mitsuba"):
         raise UserError("from_mitsuba: has other axes; write the poses without it")
     convention = content.get("camera_convention", "opengl")
-    if not isinstance(convention, str) or convention not in CAMERA_AXES:
-        allowed = " or ".join(CAMERA_AXES)
+    if not isinstance(convention, str) or convention not in _CAMERA_AXES:
+        allowed = " or ".join(_CAMERA_AXES)
         raise UserError(f"camera_convention: is {convention!r}; must be {allowed}")
     applied = np.eye(4)
     if "applied_transform" in content:
@@ -288,7 +288,7 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         key = "transform_matrix"
         matrices.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))
         names.append(_view_name(where, frame.get("file_path")))
-    originals = _unapplied(np.array(matrices) @ CAMERA_AXES[convention], applied, scale)
+    originals = _unapplied(np.array(matrices) @ _CAMERA_AXES[convention], applied, scale)
     return [
         Frame(f"frames[{index}]", name, matrix)
         for index, (name, matrix) in enumerate(zip(names, originals, strict=True))

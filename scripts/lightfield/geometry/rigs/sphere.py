@@ -11,7 +11,7 @@ from lightfield.geometry.rotations import Floats, matrix_to_euler
 
 # Cameras are in one ring if their heights differ by less than this part of the sphere's height.
 # They differ at all because Blender's icosahedron has rounded coordinates.
-SAME_LEVEL = 1e-3
+_SAME_LEVEL = 1e-3
 
 
 class Sphere(Rig):
@@ -52,7 +52,7 @@ class Sphere(Rig):
         """Return the ring of cameras nearest to the equator."""
         order = np.argsort(places[:, 2], kind="stable")
         heights = places[order, 2]
-        gaps = np.flatnonzero(np.diff(heights) > SAME_LEVEL * np.ptp(heights)) + 1
+        gaps = np.flatnonzero(np.diff(heights) > _SAME_LEVEL * np.ptp(heights)) + 1
         rings = [ring for ring in np.split(order, gaps) if len(ring) >= 3]
         nearest = min(rings, key=lambda ring: abs(places[ring, 2].mean()), default=order[:0])
         return [int(number) for number in np.sort(nearest)]
