@@ -174,8 +174,8 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             f"{'Both' if content['same'] else 'They do not'} render the same picture. Colours "
             f"differ {content['colour']:.2f} times as much as noise explains (at most "
             f"{_MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard "
-            f"errors (at most {_MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by more "
-            f"than a part of {SAME_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
+            f"errors (at most {_MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by "
+            f"more than a part of {SAME_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
             f"A sample of a megapixel takes {content['gpu_seconds']:.3g} s on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",
