@@ -19,6 +19,8 @@ from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
+# Programs that run in Blender, and write what tests read.
+BLENDER = ROOT / "tests" / "blender"
 
 # For the programs that tests start, as in the jobs of the workflow.
 os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

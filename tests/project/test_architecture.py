@@ -1,0 +1,125 @@
+"""The packages are those of docs/explanation/architecture.md, and import only those above them."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LIBRARY = ROOT / "scripts" / "lightfield"
+PAGE = ROOT / "docs/explanation/architecture.md"
+PACKAGES = re.findall(r"^\| (\w+) \|", PAGE.read_text(), re.M)[1:]
+
+
+def imported(file):
+    """Return the dotted names of all that a file imports, anywhere in it."""
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, file
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def test_each_package_says_what_it_holds():
+    assert {path.parent.name for path in LIBRARY.glob("*/__init__.py")} == set(PACKAGES)
+    for package in PACKAGES:
+        assert ast.get_docstring(ast.parse((LIBRARY / package / "__init__.py").read_text())), (
+            package
+        )
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_imports_only_those_above_it(package):
+    allowed = PACKAGES[: PACKAGES.index(package) + 1]
+    for file in (LIBRARY / package).rglob("*.py"):
+        imported_packages = {
+            name.split(".")[1] for name in imported(file) if name.startswith("lightfield.")
+        }
+        assert imported_packages <= set(allowed), file
+        blenders = {"bpy", "mathutils", "bmesh"} & {name.split(".")[0] for name in imported(file)}
+        assert not blenders or package == "rendering", file
+
+
+def test_no_files_import_each_other_in_a_circle():
+    arrows = {}
+    for path in LIBRARY.rglob("*.py"):
+        name = ".".join(("lightfield", *path.relative_to(LIBRARY).with_suffix("").parts))
+        imported_names = imported(path)
+        # An imported name may be a file, or a name in a file.
+        arrows[name.removesuffix(".__init__")] = imported_names | {
+            n.rpartition(".")[0] for n in imported_names
+        }
+    arrows = {name: others & arrows.keys() - {name} for name, others in arrows.items()}
+    while free := [name for name, others in arrows.items() if not others & arrows.keys()]:
+        for name in free:
+            del arrows[name]
+    assert not arrows
+
+
+def test_reading_the_rules_imports_nothing_heavy():
+    lines = "\n".join(file.read_text() for file in (ROOT / "rules").rglob("*.smk"))
+    imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
+    program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
+    modules = subprocess.run(
+        [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
+    ).stdout.split()
+    assert "lightfield.workflow.loading" in modules
+    assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
+
+
+# The modules by which the workflow knows what is finished, outdated or damaged.
+MECHANISMS = [
+    "lightfield.workflow.ledger",
+    "lightfield.workflow.records",
+    "lightfield.workflow.presence",
+    "lightfield.workflow.journal",
+    "lightfield.workflow.shard_counts",
+    "lightfield.workflow.shard_files",
+    "lightfield.workflow.view_store",
+    "lightfield.workflow.member_record",
+    "lightfield.validation.integrity",
+    "lightfield.validation.corpus_integrity",
+]
+# The names of their files.
+NOTES = re.compile(r"ledger\.txt|\.(sums|journal)\.jsonl|shards\.json|/checksums\.txt")
+
+
+def test_promises_are_tested_without_the_mechanisms_that_keep_them():
+    """These tests and their helpers ask tests/bookkeeping.py. So it alone changes with these."""
+    paths = [
+        *ROOT.glob("tests/*.py"),
+        *ROOT.glob("tests/blender/*.py"),
+        *ROOT.glob("benchmarks/*.py"),
+    ]
+    helpers = {path.stem: path for path in paths if path.stem != "bookkeeping"}
+    files = [*ROOT.glob("tests/promises/*.py")]
+    assert files
+    # The list grows while it is read.
+    for file in files:
+        names = imported(file)
+        assert not [name for name in names if name.startswith(tuple(MECHANISMS))], file
+        assert not NOTES.search(file.read_text()), file
+        modules = {name.split(".")[0] for name in names}
+        files += [helpers[name] for name in helpers.keys() & modules if helpers[name] not in files]
+
+
+# Snakemake's documentation allows a Snakefile these.
+PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
+MODULES = r"\b(?:from|import) snakemake\b(?!\.utils import min_version)"
+INSIDE = re.compile(
+    rf"(?!{PUBLIC})(?<!lightfield\.)\bworkflow\.\w+|__signature__|{MODULES}|\bhosted_repo\b|\brepo_path\b"
+)
+# What has no public interface, with its reasons.
+MAY_REACH_INSIDE = {ROOT / "rules/internals.smk", ROOT / "workflow/Snakefile"}
+
+
+def test_only_two_files_reach_inside_snakemake():
+    files = [*ROOT.glob("Snakefile"), *ROOT.glob("workflow/*"), *(ROOT / "rules").rglob("*.smk")]
+    reaching = {file for file in files if INSIDE.search(file.read_text())}
+    assert reaching == MAY_REACH_INSIDE

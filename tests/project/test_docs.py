@@ -1,0 +1,131 @@
+"""The documents: working links, pages of readable length, and a true reference."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lightfield.configuration.scene_yaml import Scene
+from lightfield.core.settings import checked
+
+# isort: split
+from pydantic import TypeAdapter
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+KINDS = ("tutorials", "how-to", "reference", "explanation")
+MOST_LINES = 149
+
+CODE_BLOCK = re.compile(r"^(```+).*?^\1$", re.M | re.S)
+CODE = re.compile(r"`[^`]*`")
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#+ (.*)$", re.M)
+# Names of pages in code, messages and comments.
+NAMED_PAGE = re.compile(r"\bdocs/[\w/.-]+\.md\b")
+
+
+def name_of(page):
+    return str(page.relative_to(ROOT))
+
+
+def text_of(page):
+    """Return a page without its blocks of code."""
+    return CODE_BLOCK.sub("", page.read_text())
+
+
+def anchors(page):
+    """Return the anchors of a page's headings, as GitHub makes them."""
+    names = [
+        re.sub(r"[^\w\- ]", "", re.sub(r"\]\([^)]*\)", "", heading).lower()).replace(" ", "-")
+        for heading in HEADING.findall(text_of(page))
+    ]
+    assert len(names) == len(set(names)), page
+    return set(names)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_link_leads_to_a_file_and_a_heading(page):
+    for link in LINK.findall(CODE.sub("", text_of(page))):
+        if re.match(r"https?://", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        # The site holds only these pages.
+        assert target.is_relative_to(DOCS) or not page.is_relative_to(DOCS), link
+        assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.is_relative_to(DOCS)], ids=name_of)
+def test_a_page_is_short_and_begins_with_a_paragraph(page):
+    text = page.read_text()
+    assert text.count("\n") <= MOST_LINES
+    assert text.startswith("# ")
+    rest = re.sub(r"<!--.*?-->", "", text.partition("\n")[2]).strip()
+    first_paragraph = rest.partition("\n\n")[0]
+    assert not first_paragraph.startswith(("#", "|", "```", "-", "!", "1."))
+    assert len(first_paragraph.split()) > 5
+
+
+def test_the_readme_fits_on_three_screens():
+    assert (ROOT / "README.md").read_text().count("\n") <= 120
+
+
+def test_every_page_is_of_one_kind_and_can_be_reached():
+    pages = {page.relative_to(DOCS) for page in DOCS.rglob("*.md")} - {Path("index.md")}
+    assert {page.parts[0] for page in pages} == set(KINDS)
+    listed = {Path(link.partition("#")[0]) for link in LINK.findall(text_of(DOCS / "index.md"))}
+    assert pages <= listed
+    navigation = re.findall(r"- ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.M)
+    assert pages == {Path(page) for page in navigation}
+
+
+def test_code_comments_and_messages_name_pages_that_exist():
+    listing = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    files = [ROOT / name for name in listing.stdout.splitlines()] or [*ROOT.rglob("*.py")]
+    texts = [f for f in files if f.suffix in (".py", ".smk", ".yaml", ".def", ".toml", ".j2", "")]
+    for file in texts:
+        if file.is_file() and ".venv" not in file.parts:
+            for named in NAMED_PAGE.findall(file.read_text(errors="ignore")):
+                assert (ROOT / named).is_file(), f"{file}: {named}"
+
+
+def complete_scenes():
+    """Return the examples of whole scene YAMLs, with the pages that show them."""
+    examples = []
+    for page in PAGES:
+        for code in re.findall(r"^```yaml\n(.*?)^```$", page.read_text(), re.M | re.S):
+            content = yaml.safe_load(code.replace("…", "x"))
+            if {"scene", "render", "rigs"} <= content.keys():
+                examples.append(pytest.param(content, id=name_of(page)))
+    return examples
+
+
+@pytest.mark.parametrize("content", complete_scenes())
+def test_an_example_of_a_scene_yaml_is_valid(content):
+    checked(TypeAdapter(Scene), content, "example")
+
+
+def test_pictures_are_shown_somewhere():
+    shown = {
+        (page.parent / link).resolve()
+        for page in PAGES
+        for link in LINK.findall(text_of(page))
+        if not link.startswith("http")
+    }
+    assert set((DOCS / "pictures").iterdir()) <= shown
+
+
+def test_the_reference_says_what_the_models_and_programs_say(tmp_path):
+    program = ROOT / "docs/reference.py"
+    subprocess.run([sys.executable, program, "--folder", tmp_path], check=True)
+    written = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    committed = {name: (DOCS / "reference" / name).read_text() for name in written}
+    assert committed == written, "run docs/reference.py"
+    generated = {page.name for page in (DOCS / "reference").glob("*-keys.md")}
+    generated |= {page.name for page in (DOCS / "reference").glob("programs-*.md")}
+    assert generated == set(written)
