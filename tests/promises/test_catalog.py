@@ -10,10 +10,10 @@ import subprocess
 import pytest
 import yaml
 from checkouts import ROOT, checkout
-from test_own_folder import SCENE, snakemake
 
 from lightfield.configuration.config_file import load_config, read_config
 from lightfield.core.files import read_text
+from promises.test_own_folder import SCENE, snakemake
 
 # As snakedeploy writes it.
 DEPLOYED = """

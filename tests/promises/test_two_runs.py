@@ -100,6 +100,19 @@ def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(buildi
     assert run().returncode == 0
 
 
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+@pytest.mark.parametrize("command", ["--dry-run", "--summary", "--lint"])
+def test_a_command_that_shows_something_leaves_a_live_run_alone(building, command):
+    folder, process, _, run = building
+    shown = run(command)
+    assert shown.returncode == 0, shown.stdout + shown.stderr
+    assert "locked" not in shown.stderr and "another run" not in shown.stderr
+    assert process.poll() is None
+    (folder / "go").touch()
+    assert process.wait() == 0
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+
+
 def test_a_build_of_another_dataset_runs_beside_it(building):
     folder, process, _, run = building
     target = "results/two/LFPlane/lightfield.json"
