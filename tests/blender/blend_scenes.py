@@ -177,6 +177,37 @@ def _parent(scale):
     scene.camera.parent = parent
 
 
+def shaking_cube():
+    """Blur a cube that goes to and fro while the shutter is open."""
+    import bpy
+
+    studio()
+    cube = bpy.data.objects["Cube"]
+    for frame, x in ((0.75, -0.5), (0.875, 0.5), (1, -0.5), (1.125, 0.5), (1.25, -0.5)):
+        cube.location.x = x
+        cube.keyframe_insert("location", frame=frame)
+    _make_linear(cube)
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.use_motion_blur = True
+
+
+def growing_cube():
+    """Blur a cube that grows by a shape key."""
+    import bpy
+
+    studio()
+    cube = bpy.data.objects["Cube"]
+    cube.shape_key_add(name="Basis")
+    tall = cube.shape_key_add(name="Tall")
+    for point in tall.data:
+        point.co.z *= 3
+    for frame, value in ((0, 0), (2, 1)):
+        tall.value = value
+        tall.keyframe_insert("value", frame=frame)
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.use_motion_blur = True
+
+
 def roots(scene):
     """Return the owners of settings, by short names."""
     import bpy
@@ -588,6 +619,13 @@ def many_samples():
 
     studio()
     bpy.context.scene.cycles.samples = 32
+
+
+def tabulated_noise():
+    import bpy
+
+    studio()
+    bpy.context.scene.cycles.sampling_pattern = "TABULATED_SOBOL"
 
 
 def clear_glass():

@@ -40,6 +40,7 @@ class Case:
       nothing is needed.
     - ``note``: a part of the note or of the error. None if nothing needs to be said.
     - ``outcome``: what becomes of the change, if it is not the row's.
+    - ``since``: the version of Blender that has the setting.
     - ``format``: the file format of Blender's picture. It may concern only pictures for display.
     """
 
@@ -50,6 +51,7 @@ class Case:
     note: str | None = None
     outcome: str | None = None
     format: str = "OPEN_EXR"
+    since: tuple[int, int] = (5, 0)
 
     @property
     def name(self) -> str:
@@ -112,7 +114,7 @@ ROWS = [
         ],
     ),
     Row(
-        "motion blur",
+        "motion blur: on or off, how long the shutter is open, motion steps, objects without blur",
         TAKEN,
         [
             Case({"render.use_motion_blur": True}, scenes.moving_cube, note="motion blur ON"),
@@ -125,6 +127,8 @@ ROWS = [
             ),
             Case({"render.motion_blur_shutter": 1}, scenes.blurred_cube),
             Case({"cube_cycles.use_motion_blur": False}, scenes.blurred_cube),
+            Case({"cube_cycles.motion_steps": 5}, scenes.shaking_cube),
+            Case({"cube_cycles.use_deform_motion": False}, scenes.growing_cube),
             Case({"layer.use_motion_blur": False}, scenes.blurred_cube),
             Case(
                 {"layer.use_motion_blur": False},
@@ -406,14 +410,8 @@ ROWS = [
         "sampling: pattern, scrambling distance, light threshold, light tree, path guiding",
         TAKEN,
         [
-            Case({"cycles.sampling_pattern": "TABULATED_SOBOL"}),
-            Case({"cycles.sampling_pattern": "TABULATED_SOBOL", "cycles.scrambling_distance": 0.3}),
-            Case(
-                {
-                    "cycles.sampling_pattern": "TABULATED_SOBOL",
-                    "cycles.auto_scrambling_distance": True,
-                }
-            ),
+            Case({"cycles.sampling_pattern": "BLUE_NOISE"}, scenes.tabulated_noise),
+            Case({"cycles.scrambling_distance": 0.3}, scenes.tabulated_noise),
             Case({"cycles.use_light_tree": False}),
             Case({"cycles.use_light_tree": False, "cycles.light_sampling_threshold": 0.9}),
             Case({"cycles.use_guiding": True}),
@@ -468,7 +466,7 @@ ROWS = [
     Row(
         "pixel jitter",
         IGNORED,
-        [Case({"cycles.use_pixel_jitter": True})],
+        [Case({"cycles.use_pixel_jitter": True}, since=(5, 2))],
         "depth is at the centres of pixels",
     ),
     Row(
@@ -672,6 +670,96 @@ ROWS = [
         ],
     ),
 ]
+
+# The owners of `blend_scenes.roots` whose properties are accounted for.
+OWNERS = [
+    "scene",
+    "render",
+    "cycles",
+    "curves",
+    "view",
+    "layer",
+    "layer_cycles",
+    "layer_collection",
+    "collection",
+    "camera",
+    "focus",
+    "world",
+    "world_cycles",
+    "world_visibility",
+    "cube",
+    "cube_cycles",
+    "lamp",
+    "lamp_cycles",
+    "material",
+    "material_cycles",
+]
+# Those of their properties that no case sets by name, by what they are, as patterns.
+NO_CASE = {
+    "names, and what Blender keeps of each data-block": """
+        *.name *.use_fake_user *.use_extra_user *.is_runtime_data *.tag *.asset_data *.use_nodes
+        *.active_* *.paint_* *.lock_* *.lineart_* *.line_* *.use_lineart_*""",
+    "set by a function of blend_scenes or camera_followers": """
+        scene.background_set scene.camera scene.world scene.frame_* scene.compositing_node_group
+        render.frame_map_old render.use_stamp* render.stamp_* layer.material_override
+        layer.world_override layer.use cycles.use_denoising cycles.use_adaptive_sampling
+        cycles.adaptive_* cycles.use_*_cull cycles.*_cull_margin cycles.dicing_camera
+        cycles.denoising_prefilter cycles.denoising_quality view.use_curve_mapping
+        focus.focus_object cube_cycles.use_*_cull cube.instance_collection scene.use_stamp_note
+        cycles.volume_biased""",
+    "about time line, sound, simulation or annotations": """
+        scene.time_jump_* scene.lock_* scene.allow_preroll scene.use_preview_range
+        scene.show_* scene.*simulation* scene.sync_mode scene.playback_loop_mode scene.*gravity
+        scene.use_audio* scene.audio_* scene.annotation scene.active_clip""",
+    "about the viewport, EEVEE, Freestyle, Grease Pencil, baking, or the user interface": """
+        render.preview_* cycles.*preview* cycles.bake_type render.*gpencil* render.use_freestyle
+        layer.use_freestyle layer.*grease_pencil render.hair_* render.line_thickness*
+        render.use_high_quality_normals render.anisotropic_filter render.sequencer_gl_preview
+        render.use_sequencer_override_scene_strip render.simplify_subdivision
+        render.simplify_child_particles render.use_simplify_normals cycles.texture_resolution
+        cycles.texture_limit cycles.ao_bounces *.hide_viewport *.hide_select collection.color_tag
+        camera.show_* camera.composition_* camera.display_size camera.passepartout_alpha
+        camera.lens_unit world.color world.use_eevee_* world.sun_* world.use_sun_*
+        world.probe_resolution lamp.shadow_* lamp.use_shadow_jitter lamp.*_factor
+        lamp.use_custom_distance lamp.cutoff_distance lamp.use_absolute_resolution
+        lamp_cycles.use_shadow material.surface_render_method material.blend_method
+        material.alpha_threshold material.use_transparency_overlap material.show_*
+        material.preview_* material.use_preview_world material.use_backface_*
+        material.use_*_refraction
+        material.use_sss_translucency material.refraction_depth material.*thickness*
+        material.volume_intersection_method material.diffuse_color material.specular_*
+        material.roughness material.metallic *.show_in_front *.show_* *.display_* cube.hide_probe_*
+        cube.hide_surface_pick cube.empty_* cube.use_empty_* cube.use_mesh_mirror_*
+        cube.use_grease_* cube.use_shape_key_edit_mode layer.use_ao layer.use_volumes""",
+    "about the files and passes that Blender writes, memory, and speed": """
+        render.threads* render.use_placeholder render.use_overwrite render.save_output
+        render.use_compositing render.use_sequencer render.use_file_extension
+        render.use_lock_interface render.filepath render.use_render_cache render.metadata_input
+        render.use_single_layer render.views_format render.engine render.use_*texture_cache
+        render.use_persistent_data render.compositor_* render.ppm_* render.dither_intensity
+        render.filter_size cycles.device cycles.shading_system cycles.denoiser
+        cycles.denoising_use_gpu cycles.time_limit cycles.use_layer_samples cycles.debug_*
+        cycles.use_auto_tile cycles.tile_size cycles.direct_light_sampling_type layer.*pass_*
+        layer_cycles.*pass_* layer_cycles.denoising_store_passes *.lightgroup
+        cycles.auto_scrambling_distance""",
+    "about lenses that `lens: file` refuses, and the view transform's white": """
+        camera.ortho_scale camera.panorama_type camera.fisheye_* camera.latitude_*
+        camera.longitude_* camera.central_* camera.custom_* focus.focus_subtarget
+        view.white_balance_whitepoint""",
+    "the place and shape of objects, as a material can read it": """
+        cube.data cube.parent* cube.use_parent_final_indices cube.use_camera_lock_parent
+        cube.track_axis cube.up_axis cube.rotation_* cube.scale cube.dimensions cube.delta_*
+        cube.matrix_* cube.add_rest_position_attribute cube.use_simulation_cache
+        cube.use_instance_vertices_rotation *.pass_index material.max_vertex_displacement""",
+    "like another that has a case, or of too little effect in a small scene": """
+        cycles.use_deterministic_guiding cycles.guiding_* cycles.use_*guiding* cycles.*guiding_*
+        cycles.offscreen_dicing_scale cycles.rolling_shutter_duration
+        cycles.texture_resolution_render render.simplify_volumes *_cycles.is_caustics_*
+        world_cycles.max_bounces world_cycles.volume_* world_cycles.use_shadows
+        world_visibility.shadow cube.visible_* cube.is_shadow_catcher cube.shadow_terminator_*
+        cube_cycles.shadow_terminator_* cube_cycles.ao_distance lamp.use_soft_falloff
+        lamp.use_square material_cycles.volume_*""",
+}
 
 
 def table() -> str:

@@ -2,18 +2,21 @@
 
 import contextlib
 import io
+from fnmatch import fnmatch
 from functools import cache
+from importlib.metadata import version
 
 import blend_scenes
 import numpy as np
 import pytest
-from blend_settings import IGNORED, PAGE, REFUSED, ROWS, page
+from blend_settings import IGNORED, NO_CASE, OWNERS, PAGE, REFUSED, ROWS, page
 
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
+from lightfield.formats.blend import lacks_exposure
 from lightfield.imaging import images
 from lightfield.workflow import lightfield_file
 from lightfield.workflow.loading import datasets_of
@@ -22,6 +25,7 @@ CASES = [
     pytest.param(case, case.outcome or row.outcome, id=f"{row.settings}-{case.name}")
     for row in ROWS
     for case in row.cases
+    if case.since <= tuple(map(int, version("bpy").split(".")[:2]))
 ]
 # Two pictures are equal if fewer of their pixels differ, and different if more do.
 EQUAL = 0.002
@@ -195,3 +199,37 @@ def test_a_setting_of_a_blend_becomes_what_the_reference_says(
 
 def test_the_reference_has_the_table_of_the_settings_that_were_tried():
     assert PAGE.read_text() == page(PAGE.read_text()), "run tests/blender/blend_settings.py"
+
+
+@pytest.mark.slow
+def test_each_property_that_blender_has_is_tried_or_accounted_for():
+    import bpy
+
+    tried = {
+        path
+        for row in ROWS
+        for case in row.cases
+        if not callable(case.change)
+        for path in case.change
+    }
+    patterns = [pattern for text in NO_CASE.values() for pattern in text.split()]
+    blend_scenes.fog()
+    owners = blend_scenes.roots(bpy.context.scene)
+    forgotten = [
+        path
+        for name in OWNERS
+        for setting in owners[name].bl_rna.properties
+        if not setting.is_readonly and setting.type != "COLLECTION"
+        if (path := f"{name}.{setting.identifier}") not in tried
+        if not any(fnmatch(path, pattern) for pattern in patterns)
+    ]
+    assert forgotten == []
+
+
+def test_an_inventory_without_the_exposure_of_blurred_views_is_made_again():
+    blend = {"motion_blur": True}
+    exposure = {"shutter": 0.5}
+    assert lacks_exposure(blend, {})
+    assert lacks_exposure({"motion_blur": False}, {"camera_motion": {}})
+    assert not lacks_exposure(blend | exposure, {})
+    assert not lacks_exposure(blend, {"motion_blur": False})
