@@ -31,7 +31,7 @@ def inventory_settings(dataset):
     datasets = scene_datasets(dataset.scene_name)
     settings = {
         # Raise this number when the program lists something else.
-        "version": 4,
+        "version": 5,
         "scene_name": written.scene.scene_name,
         "view_layers": written.scene.view_layers,
         "allow_missing": written.scene.allow_missing,

@@ -225,6 +225,7 @@ def inventory(_):
     blend = {"scene": "Scene", "frame": 3, "samples": 64, "camera": camera, "layers": ["a"]}
     blend |= {"motion_blur": True, "shutter": 0.5, "shutter_position": "START", "remapped": [1, 2]}
     blend |= {"shutter_curve": False, "rolling_shutter": False}
+    blend |= {"followers": {"by_name": ["Sign"], "active": []}}
     return {
         "blend": blend,
         "external_files": [{"path": "a.png", "sha256": "0" * 64, "bytes": 7, "mtime_ns": 7}],

@@ -156,8 +156,7 @@ for output in $outputs; do
     esac
     cat > "$output" << END
 {"name": "$output", "inputs": "$sums", "command": [${command%, }], "frames": [],
-"external_files": [], "cost_samples": 4, "sources": {}, "members": {}$listing,
-"blend": {"motion_blur": false, "followers": {}}}
+"external_files": [], "cost_samples": 4, "sources": {}, "members": {}$listing}
 END
 done
 """

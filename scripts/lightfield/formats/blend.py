@@ -71,17 +71,9 @@ def is_blurred(blend: Settings, render: Settings) -> bool:
     return bool(render.get("motion_blur", blend["motion_blur"]) or "camera_motion" in render)
 
 
-def lacks_exposure(blend: Settings, render: Settings) -> bool:
-    """Return whether blurred views need to know the .blend's exposure, which is not in ``blend``.
-
-    Inventories of earlier versions lack it.
-    """
-    return is_blurred(blend, render) and "shutter" not in blend
-
-
 def is_shutter_reset(blend: Settings, render: Settings) -> bool:
     """Return whether views are blurred at other times than a render of the .blend itself."""
-    if not is_blurred(blend, render) or "shutter" not in blend:
+    if not is_blurred(blend, render):
         return False
     old, new = blend["remapped"]
     return bool(
@@ -97,17 +89,10 @@ def followed_camera(blend: Settings, choice: str | None) -> str | None:
 
     ``choice`` is the key of the scene YAML. Return None if no view depends on the choice.
     """
-    followers = _followers_of(blend)
+    followers = blend["followers"]
     # What names the file's camera follows that one, unless something is done.
     needs_choice = followers["active"] or (choice == "view" and followers["by_name"])
     return choice or "file" if needs_choice else None
-
-
-def _followers_of(blend: Settings) -> Mapping[str, Sequence[str]]:
-    """Return the names of what follows the .blend's camera."""
-    # Inventories of earlier versions lack this key.
-    followers: Mapping[str, Sequence[str]] = blend.get("followers", {"by_name": [], "active": []})
-    return followers
 
 
 def usage_notes(
@@ -126,7 +111,7 @@ def usage_notes(
     return [
         *_scene(blend, frames, render),
         *_camera(blend["camera"], uses_camera),
-        *_followers(_followers_of(blend), followed),
+        *_followers(blend["followers"], followed),
         *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
         *_switches(blend, render),
         *_exposure(blend, render),
@@ -142,8 +127,7 @@ def _scene(blend: Settings, frames: Sequence[float], render: Settings) -> Iterat
     if len(blend["scenes"]) > 1:
         yield f"scene {blend['scene']} of {len(blend['scenes'])}"
     yield _frames(frames, blend["frame"])
-    # Inventories of earlier versions lack this key.
-    old, new = blend.get("remapped", (1, 1))
+    old, new = blend["remapped"]
     if old != new:
         yield f"frames remapped from {old} to {new}"
     if blend["view_layers"] > 1:
@@ -166,8 +150,7 @@ def _camera(camera: Settings | None, is_taken: bool) -> Iterator[str]:
     lens = camera["lens"]
     length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
     yield f"camera {camera['name']}{length} {'taken' if is_taken else 'ignored'}"
-    # Inventories of earlier versions lack this key.
-    near, far = camera.get("clip", _BLENDERS_CLIP)
+    near, far = camera["clip"]
     if is_taken and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
         yield f"clip planes at {near:g} and {far:g} m ignored"
 
@@ -196,8 +179,7 @@ def _switches(blend: Settings, render: Settings) -> Iterator[str]:
 
 def _exposure(blend: Settings, render: Settings) -> Iterator[str]:
     """Yield notes on the .blend's exposure, if anything is blurred by motion."""
-    # Inventories of earlier versions lack its keys.
-    if not is_blurred(blend, render) or "shutter" not in blend:
+    if not is_blurred(blend, render):
         return
     yield f"shutter open for {blend['shutter']:g} frames"
     if blend["shutter_position"] != "CENTER":
@@ -227,10 +209,9 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
         yield "film transparent ON"
     elif blend["film_transparent"]:
         yield "film transparent on, ignored"
-    # Inventories of earlier versions lack these keys.
-    if not blend.get("environment", True):
+    if not blend["environment"]:
         yield "environment left out by the view layer, the background is black"
-    if blend.get("pixel_aspect", 1) != 1:
+    if blend["pixel_aspect"] != 1:
         yield f"pixel aspect {blend['pixel_aspect']:g} ignored, pixels are square"
     for name, title in (
         ("border", "render border"),
@@ -241,10 +222,9 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
             yield f"{title} ignored"
     if blend["simplify"]:
         yield "simplify ON"
-    # Inventories of earlier versions lack this key.
-    if blend.get("culling"):
+    if blend["culling"]:
         yield "culling ignored"
-    if blend.get("working_space", REC_709) != REC_709:
+    if blend["working_space"] != REC_709:
         yield f"working space {blend['working_space']} converted to Rec. 709"
     if blend["unit_scale"] != 1:
         yield f"unit scale {blend['unit_scale']:g} ignored"

@@ -9,7 +9,6 @@ from typing import Any
 from lightfield.configuration import scene_yaml
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, is_outdated, size_and_time, unreadable
-from lightfield.formats import blend
 from lightfield.workflow import shard_files
 from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.view_store import ViewStore
@@ -69,17 +68,13 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
 def inventory_outdated(dataset: Dataset, store: ViewStore | None) -> bool:
     """Return whether a file that the user's .blend reads differs from its inventory.
 
-    Also return True if a view store has lost such a file, or if an earlier version wrote the
-    inventory without the exposure of blurred views, or without what follows the camera.
+    Also return True if a view store has lost such a file.
     """
     if not dataset.source.blend:
         return False
     home = Path(dataset.source.blend).parent
 
     def differs(inventory: Mapping[str, Any]) -> bool:
-        facts = inventory["blend"]
-        if blend.lacks_exposure(facts, dataset.render) or "followers" not in facts:
-            return True
         for file in inventory["external_files"]:
             if _has_changed(home, file):
                 return True
