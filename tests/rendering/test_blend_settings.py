@@ -16,7 +16,6 @@ from lightfield.configuration.config_file import Preset
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.formats.blend import lacks_exposure
 from lightfield.imaging import images
 from lightfield.workflow import lightfield_file
 from lightfield.workflow.loading import datasets_of
@@ -224,12 +223,3 @@ def test_each_property_that_blender_has_is_tried_or_accounted_for():
         if not any(fnmatch(path, pattern) for pattern in patterns)
     ]
     assert forgotten == []
-
-
-def test_an_inventory_without_the_exposure_of_blurred_views_is_made_again():
-    blend = {"motion_blur": True}
-    exposure = {"shutter": 0.5}
-    assert lacks_exposure(blend, {})
-    assert lacks_exposure({"motion_blur": False}, {"camera_motion": {}})
-    assert not lacks_exposure(blend | exposure, {})
-    assert not lacks_exposure(blend, {"motion_blur": False})
