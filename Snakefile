@@ -96,9 +96,6 @@ onstart:
         remove_leftovers()
         announce_damage()
         set_damage_aside()
-        if SETTINGS.accept_blend:
-            for name in SCENES:
-                accept_blend(name)
         begin_display()
         begin_notes()
         announce_stop()

@@ -31,7 +31,6 @@ from lightfield.core.memory import available
 from lightfield.planning import memory
 from lightfield.workflow import ledger, presence, shard_counts
 from lightfield.configuration.capture import LightfieldSettings
-from lightfield.configuration.blend_lock import accept_blend
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
 from lightfield.configuration.config_file import load_config
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS

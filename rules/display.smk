@@ -306,4 +306,4 @@ def print_forecast():
     print(forecast([work_of(job) for job in jobs]))
 
 
-atexit.register(print_forecast)
+at_exit(print_forecast)

@@ -1,4 +1,6 @@
 # The only file that reaches inside Snakemake, for what has no public interface. Each piece says why.
+import atexit
+import contextlib
 import functools
 import inspect
 
@@ -178,6 +180,20 @@ def failed_entries():
 def is_planned_dry_run():
     """Return whether this is a dry run that got as far as a plan with jobs."""
     return workflow.dryrun and workflow.scheduler and len(workflow.dag)
+
+
+# With --directory, Snakemake works in another folder than the one that it started in.
+RUN_FOLDER = Path.cwd()
+
+
+def at_exit(action):
+    """Call ``action`` when the process ends, in the run's folder, which Snakemake has then left."""
+
+    def act():
+        with contextlib.chdir(RUN_FOLDER):
+            action()
+
+    atexit.register(act)
 
 
 def start_of_run():

@@ -154,6 +154,9 @@ def mark_stale_files(name):
         rerun([dataset.inventory])
     if presence.model_changed(dataset):
         rerun([dataset.blend])
+    if dataset.source.blend and dataset.source.sha256 is None:
+        # Its lock file is missing.
+        rerun([dataset.blend_check])
     for path, problem in presence.broken_files(dataset):
         DAMAGED.setdefault(path, (problem, files))
 

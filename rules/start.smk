@@ -94,7 +94,7 @@ def explain_full_disk():
 
 def check_start():
     """Raise `UserError` for a run that cannot work, before the first job."""
-    atexit.register(explain_full_disk)
+    at_exit(explain_full_disk)
     check_device()
     check_memory()
     check_disk_space()
@@ -103,7 +103,7 @@ def check_start():
 
 def check_input(job):
     """Raise `UserError` for a user's file that a job would refuse."""
-    if is_of(job, "check_blend") and not SETTINGS.accept_blend:
+    if is_of(job, "check_blend"):
         blend = Path(scene_of(job.wildcards).source.blend)
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))

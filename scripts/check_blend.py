@@ -1,7 +1,8 @@
-"""Check that a .blend has the SHA-256 that a scene YAML expects.
+"""Check that a .blend has the SHA-256 that is recorded for its scene.
 
-If the scene YAML has no SHA-256, the first use records it beside the YAML in a lock file,
-configs/scenes/<scene>.lock.json. Later files must have the same SHA-256.
+A scene YAML with the address of a download may have its SHA-256. Otherwise, the first use records
+it beside the YAML in a lock file, configs/scenes/<scene>.lock.json. Later files must have the same
+SHA-256. To take another file, delete the lock file.
 """
 
 import argparse

@@ -654,6 +654,11 @@ EXPLAINED = [
         {"blend": "a.blend", "sha256": 7},
         "scene.sha256: is 7; must be a text: put it in quotes",
     ),
+    (
+        "scene",
+        {"blend": "a.blend", "sha256": "0" * 64},
+        "scene.sha256: is only for a file with scene.url; leave it out",
+    ),
     ("scene", {"blend": "a.obj"}, 'scene.blend: is "a.obj"; must be a path that ends in .blend'),
     (
         "scene",
@@ -821,7 +826,6 @@ SETTINGS = [
     ),
     *({"views_per_shard": value} for value in (0, 1.5, "all", "10", True)),
     *({"package_gigabytes": value} for value in (0, -1, "2", float("inf"))),
-    *({"accept_blend": value} for value in ("yes", 1, None)),
     *({"device": value} for value in ("GPU", "gpu", 0, ["cpu"])),
     *({"energy": value} for value in (65, {"cores": 0}, {"cores": "all"}, {"price": 1})),
     *({"rigs": value} for value in ([], "a b", ["a", "a"], 7, {"a": 1})),
@@ -968,6 +972,7 @@ CHOICES = [
     ({"results": "."}, "results: is '.'; must be a folder that is used for nothing else"),
     ({"most_shards": 100}, "most_shards: ", "views_per_shard"),
     ({"shard_minutes": 100}, "shard_minutes: ", "views_per_shard"),
+    ({"accept_blend": True}, "accept_blend: is no longer a key", "<scene>.lock.json"),
     ({"energy": {"watts": -5}}, "energy.watts: is -5; must be a number at least 0"),
     ({"energy": {"watt": 65}}, "energy.watt: unknown key; did you mean watts?"),
     ({"energy": {"cores": 0}}, "energy.cores: is 0; must be auto or a whole number at least 1"),

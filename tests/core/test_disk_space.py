@@ -229,12 +229,13 @@ def test_a_dry_run_names_everything_that_the_run_would_refuse(tmp_path):
     folder = checkout(
         tmp_path,
         huge=HUGE,
-        other=ONE.replace("builder: room", f"blend: other.blend, sha256: '{'0' * 64}'"),
+        other=ONE.replace("builder: room", "blend: other.blend"),
         textured=ONE.replace("builder: room", "blend: textured.blend"),
         theirs="scene: {dataset: theirs}",
     )
     for name in ("other", "textured"):
         (folder / f"{name}.blend").write_bytes(b"a scene")
+    files.write_json(folder / "configs/scenes/other.lock.json", {"sha256": "0" * 64})
     inventory = folder / "work/textured/inventory.json"
     gone = {"path": "textures/gone.png", "bytes": 7, "mtime_ns": 7}
     files.write_json(inventory, {"external_files": [gone]})

@@ -1,6 +1,7 @@
 """Builds of three .blend files as artists leave them, in a folder of the user's own."""
 
 import json
+import re
 
 import forks
 import numpy as np
@@ -57,7 +58,7 @@ TAKEN = {
 }
 
 
-def build(folder, *arguments, accept="accept_blend=false"):
+def build(folder, *arguments):
     command_line = [
         "--snakefile",
         ROOT / "Snakefile",
@@ -69,7 +70,6 @@ def build(folder, *arguments, accept="accept_blend=false"):
         "--config",
         "preset=full",
         f"scenes=[{','.join(SCENES)}]",
-        accept,
     ]
     return forks.run_snakemake(command_line, "/")
 
@@ -182,15 +182,20 @@ def test_a_changed_texture_makes_another_scene(project):
     assert json.loads(path.read_text())["scene"]["fingerprint"] != before
 
 
-def test_an_edited_blend_is_taken_with_a_flag_that_its_error_names(project):
+def test_an_edited_blend_is_taken_without_the_lock_file_that_its_error_names(project):
     folder, _ = project
     edited = folder / "product.blend"
     edited.write_bytes((folder / "furniture.blend").read_bytes())
     proof = "work/product/blend.json"
+    lock = "configs/scenes/product.lock.json"
     result = build(folder, proof)
     assert result.returncode != 0
-    assert "snakemake with --config accept_blend=true takes it as it is now" in result.stderr
-    result = build(folder, proof, accept="accept_blend=true")
+    assert f"; to take the new file, delete {lock}" in result.stderr
+    result = build(folder, proof, "--dry-run")
+    assert result.returncode == 0
+    (refusal,) = re.findall("^would be refused: (.*)$", result.stderr, re.M)
+    assert refusal.endswith(f"; to take the new file, delete {lock}")
+    (folder / lock).unlink()
+    result = build(folder, proof)
     assert result.returncode == 0, result.stdout + result.stderr
-    lock = json.loads((folder / "configs/scenes/product.lock.json").read_text())
-    assert lock["sha256"] == sha256(edited)
+    assert json.loads((folder / lock).read_text())["sha256"] == sha256(edited)

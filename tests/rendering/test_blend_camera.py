@@ -29,7 +29,7 @@ def inventory_of_path(path, frames, depth_of_field=False):
         first, last = frames
         rig = {"type": "blend_camera", "frames": {"first": first, "last": last}, "camera": camera}
     content = {
-        "scene": {"blend": str(path), "sha256": sha256(path)},
+        "scene": {"blend": str(path), "url": "https://example.org/a.blend", "sha256": sha256(path)},
         "render": {"samples": 1, "depth_of_field": depth_of_field},
         "rigs": {"views": rig},
     }

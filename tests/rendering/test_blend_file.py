@@ -10,7 +10,7 @@ from importlib.metadata import version
 import pytest
 from checkouts import checkout, planned, snakemake
 
-from lightfield.configuration import blend_lock, config_file, scene_yaml
+from lightfield.configuration import config_file, scene_yaml
 from lightfield.core import download, names
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
@@ -229,11 +229,12 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
     blend.write_bytes(CONTENT[1:])
     with pytest.raises(UserError) as caught:
         check(monkeypatch, blend)
-    for part in (str(blend), sha256(blend), SUM, str(lock), "--config accept_blend=true"):
+    for part in (str(blend), sha256(blend), SUM, f"to take the new file, delete {lock}"):
         assert part in str(caught.value)
     assert json.loads(lock.read_text())["sha256"] == SUM
-    blend_lock.accept_blend("own")
+    lock.unlink()
     assert check(monkeypatch, blend)["sha256"] == sha256(blend)
+    assert json.loads(lock.read_text())["sha256"] == sha256(blend)
     lock.write_text("{}")
     with pytest.raises(UserError, match=r"own\.lock\.json: sha256: is missing"):
         check(monkeypatch, blend)
@@ -245,16 +246,14 @@ def test_a_built_scene_has_no_file_to_check(monkeypatch, tmp_path):
         check(monkeypatch, tmp_path / "any.blend", "smoke")
 
 
-def test_the_yamls_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
-    blend = scene(more=f", sha256: {SUM}")
+def test_a_downloads_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
+    blend = scene(more=f", url: 'https://example.org/own.blend', sha256: {SUM}")
     blend.write_bytes(CONTENT)
     check(monkeypatch, blend)
     assert not blend.with_name("own.lock.json").exists()
     blend.write_bytes(b"another")
     with pytest.raises(UserError, match=rf"{sha256(blend)}, but .*own\.yaml says {SUM}"):
         check(monkeypatch, blend)
-    with pytest.raises(UserError, match=rf"own\.yaml: scene\.sha256: is {SUM}, but .* there"):
-        blend_lock.accept_blend("own")
 
 
 def test_a_missing_file_gives_the_page_and_the_place(scene):
@@ -347,6 +346,24 @@ def test_another_bpy_renders_a_brought_blend_again(tmp_path, room, monkeypatch):
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: bpy\nVersion: 9.9.9\n")
     monkeypatch.setenv("PYTHONPATH", str(other.parent))
     assert planned(folder, *chosen) == {"check_blend": 1, "inventory": 1, "lightfield": 1}
+
+
+def test_a_deleted_lock_file_is_written_again_and_finished_views_stay(tmp_path, room):
+    text = BLEND_SCENE.format(blend="mine.blend", more="")
+    # No camera is inside an object.
+    text = text.replace("type: plane", "type: plane\n    size: 0.5\n    center: [0, 0, 1.3]")
+    folder = checkout(tmp_path, brought=text)
+    (folder / "mine.blend").write_bytes(room.read_bytes())
+    chosen = ("--until", "render", "--config", "scenes=[brought]", "rigs=all", "preset=full")
+    assert snakemake(folder, *chosen).returncode == 0
+    view = folder / "results/brought/LFPlane/exr/view_0000f.exr"
+    rendered = view.stat().st_mtime_ns
+    lock = folder / "configs/scenes/brought.lock.json"
+    lock.unlink()
+    assert snakemake(folder, *chosen).returncode == 0
+    assert json.loads(lock.read_text())["sha256"] == sha256(folder / "mine.blend")
+    assert view.stat().st_mtime_ns == rendered
+    assert planned(folder, *chosen) == {}
 
 
 LINKED = """

@@ -133,7 +133,12 @@ def of_plenoforge(path, yaml):
     from lightfield.rendering import inventory_file, shard
 
     content = {
-        "scene": {"blend": str(path), "sha256": sha256(path), **yaml.get("scene", {})},
+        "scene": {
+            "blend": str(path),
+            "url": "https://example.org/a.blend",
+            "sha256": sha256(path),
+            **yaml.get("scene", {}),
+        },
         "render": {"samples": blend_scenes.SAMPLES, "seed": 0, **yaml.get("render", {})},
         "rigs": {
             "views": {

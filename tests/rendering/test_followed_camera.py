@@ -64,7 +64,12 @@ def dataset(path, folder, change=None, **scene):
 
     save(path, blend_scenes.studio, change)
     content = {
-        "scene": {"blend": str(path), "sha256": sha256(path), **scene},
+        "scene": {
+            "blend": str(path),
+            "url": "https://example.org/a.blend",
+            "sha256": sha256(path),
+            **scene,
+        },
         "render": {"samples": blend_scenes.SAMPLES, "seed": 0},
         "rigs": {"views": RIG},
     }

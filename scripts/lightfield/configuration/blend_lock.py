@@ -1,11 +1,11 @@
-"""The SHA-256 that a .blend must have: in its scene YAML, or in the lock file beside that."""
+"""The SHA-256 that a .blend must have: that of its download, or the one in its lock file."""
 
 from pathlib import Path
 
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.configuration.scene_yaml import load_scene, scene_path
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import read_json, write_json
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
@@ -30,34 +30,11 @@ def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
     expected, origin = blend_sha256(scene, load_scene(scene).scene)
     if expected in (None, digest):
         return origin if expected is None else None
-    remedy = (
-        "write the new one there"
-        if origin.suffix == ".yaml"
-        else "snakemake with --config accept_blend=true takes it as it is now"
-    )
+    remedy = "write its sha256 there" if origin.suffix == ".yaml" else f"delete {origin}"
     raise UserError(
-        f"{blend}: its sha256 is {digest}, but {origin} says {expected}; if it was edited on "
-        f"purpose, {remedy}"
+        f"{blend}: its sha256 is {digest}, but {origin} says {expected}; to take the new file, "
+        f"{remedy}"
     )
-
-
-def accept_blend(scene: str) -> None:
-    """Record the present SHA-256 of a scene's .blend.
-
-    Raises `UserError` if the scene YAML itself has another SHA-256.
-    """
-    source = load_scene(scene).scene
-    if source.blend is None or not Path(source.blend).is_file():
-        return
-    digest = sha256(Path(source.blend))
-    expected, origin = blend_sha256(scene, source)
-    if source.sha256 and digest != expected:
-        raise UserError(
-            f"{origin}: scene.sha256: is {expected}, but {source.blend} has {digest}; accept_blend "
-            "writes no scene YAML: write it there"
-        )
-    if digest != expected:
-        record_blend(Path(source.blend), digest, origin)
 
 
 def record_blend(blend: Path, digest: str, lock: Path) -> None:

@@ -42,15 +42,6 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-def _switch(value: Any) -> Any:
-    """Return the truth value of `--config key=true`, which Snakemake leaves as text."""
-    if value == "true":
-        return True
-    if value == "false":
-        return False
-    return value
-
-
 # A single word on the command line is a list of one name.
 Names = Annotated[
     list[Name],
@@ -119,6 +110,8 @@ class Configuration(Settings):
     removed_keys: ClassVar[Mapping[str, str]] = {
         "most_shards": _SHARDS_ARE_AUTOMATIC,
         "shard_minutes": _SHARDS_ARE_AUTOMATIC,
+        "accept_blend": "leave it out; to take an edited .blend, delete "
+        "configs/scenes/<scene>.lock.json",
     }
 
     scenes: Names = Field(
@@ -159,11 +152,6 @@ class Configuration(Settings):
         "view, and on a cluster also from the number of simultaneous jobs (--jobs). A dataset that "
         "was begun with auto keeps its jobs.",
         json_schema_extra={"unit": "views"},
-    )
-    accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
-        False,
-        description="Accept each .blend file as it is now, even if its SHA-256 has changed. This "
-        "rewrites the lock file beside the scene YAML.",
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,

@@ -164,8 +164,9 @@ class Origin(Settings):
     sha256: str | None = Field(
         None,
         pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
-        description="SHA-256 that the .blend file must have, as sha256sum prints it. Without this "
-        "key, it is the one recorded at first use.",
+        description="SHA-256 of the file at the address url, as sha256sum prints it. Without this "
+        "key, the first use records the SHA-256 of the .blend in a lock file beside the "
+        "scene YAML.",
     )
     url: Address | None = Field(
         None, description="Address from which the .blend file is downloaded if it is missing."

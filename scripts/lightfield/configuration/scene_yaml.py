@@ -340,6 +340,11 @@ class Scene(Credits):
         for key in ("render", "rigs"):
             if not self.scene.dataset and not getattr(self, key):
                 raise ValueError(f"is missing the key {key}")
+        if self.scene.sha256 and not self.scene.url:
+            raise ValueError(
+                "scene.sha256: is only for a file with scene.url; leave it out, because the lock "
+                "file beside the scene YAML records it"
+            )
         for name, rig in self.rigs.items():
             _check_name(f"rigs.{name}", name, _RIG_NEIGHBOURS)
             self._check_rig(f"rigs.{name}", name, rig)
