@@ -164,7 +164,7 @@ def test_a_single_dataset_notices_a_changed_yaml_and_damage(tmp_path):
     assert not simulated.planned(folder, targets[0])
     path = folder / "configs/scenes/smoke.yaml"
     path.write_text(re.sub(r"samples: \d+", "samples: 3", path.read_text(), count=1))
-    (folder / second.costs).write_text("{")
-    os.utime(folder / second.costs, (simulated.WHEN, simulated.WHEN))
-    expected = {f"{d.folder}/lightfield.json" for d in (first, second)} | {second.costs}
+    (folder / second.inventory).write_text("{")
+    os.utime(folder / second.inventory, (simulated.WHEN, simulated.WHEN))
+    expected = {f"{d.folder}/lightfield.json" for d in (first, second)} | {second.inventory}
     assert expected <= simulated.planned(folder, *targets)

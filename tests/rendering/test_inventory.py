@@ -1,8 +1,6 @@
 """What a scene contains, what pruning leaves out, and that this changes no pixel."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -39,13 +37,6 @@ NOTHING = {
 )
 def test_the_content_decides_what_is_left_out(contains, expected):
     assert pruning.left_out(NOTHING | contains) == expected
-
-
-def test_the_benchmark_of_pruning_imports_bpy_only_in_spawned_processes():
-    # A process spawned by one that has imported bpy does not find it.
-    code = "import sys, pruning; sys.exit('bpy' in sys.modules)"
-    folder = Path(__file__).resolve().parents[2] / "benchmarks"
-    subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
 
 
 @pytest.fixture(scope="module")
