@@ -154,7 +154,7 @@ def _with_other_inputs(job, names):
 
 
 def _line(job):
-    text = json.dumps(job._asdict())
+    text = json.dumps(job._asdict(), separators=(",", ":"))
     return f"{hashlib.sha256(text.encode()).hexdigest()} {text}\n"
 
 
