@@ -150,7 +150,7 @@ def mark_stale_files(name):
     jobs = finished_work()
     rerun(file for file in files if file not in jobs and os.path.lexists(file))
     rerun(presence.outgrown_records(dataset))
-    if presence.inventory_outdated(dataset, ViewStore(STORE) if STORE else None):
+    if presence.external_changed(dataset, ViewStore(STORE) if STORE else None):
         rerun([dataset.inventory])
     if presence.model_changed(dataset):
         rerun([dataset.blend])

@@ -45,7 +45,7 @@ from lightfield.reprojection import lens_map
 from lightfield.validation import splits_check
 from lightfield.workflow import journal, ledger, records, shard_counts, shard_files
 from lightfield.workflow.loading import scene_datasets
-from lightfield.workflow.presence import check_external_files, inventory_outdated
+from lightfield.workflow.presence import check_external_files, external_changed
 
 TIMES = itertools.count(10**18, 10**6)
 # The number of files of each kind. "few" takes seconds, and runs in each run of the tests.
@@ -237,7 +237,7 @@ def inventory(_):
 
 
 def read_scene_inventory(path, dataset):
-    inventory_outdated(dataset, None)
+    external_changed(dataset, None)
     dataset.estimate.memory_bytes(100)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):

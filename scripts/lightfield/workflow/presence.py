@@ -65,7 +65,7 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
     return False
 
 
-def inventory_outdated(dataset: Dataset, store: ViewStore | None) -> bool:
+def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
     """Return whether a file that the user's .blend reads differs from its inventory.
 
     Also return True if a view store has lost such a file.
