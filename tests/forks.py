@@ -370,10 +370,15 @@ def subclasses(base):
 
 
 def is_place(value):
-    """Return whether a module's variable is a path in the checkout, or a package's list of them."""
+    """Return whether a module's variable is a path in the checkout, or a package's list of them.
+
+    The environment may lie in the checkout. All checkouts share it, so that its paths stay.
+    """
     if isinstance(value, list):
         return bool(value) and all(map(is_place, value))
-    return isinstance(value, str | Path) and Path(value).is_relative_to(CHECKOUT)
+    if not isinstance(value, str | Path) or Path(value).is_relative_to(sys.prefix):
+        return False
+    return Path(value).is_relative_to(CHECKOUT)
 
 
 def own_names():
