@@ -32,6 +32,20 @@ publish:
 scene: {dataset: published}
 """
 
+# A sequence, whose frames share an export: all keys of its scene YAML but `scene`.
+SEQUENCE = """
+render: {samples: 4}
+rigs:
+  LFMoving:
+    type: plane
+    cameras: [2, 1]
+    size: 1
+    frames: {first: 1, last: 2}
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+exports:
+  dnerf: {sources: [views], points: 9}
+"""
+
 
 def checkout(folder, **scenes):
     """Copy what Snakemake needs to ``folder``. ``scenes`` are YAML texts for configs/scenes/.

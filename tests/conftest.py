@@ -2,6 +2,7 @@
 
 import compileall
 import fcntl
+import json
 import os
 import resource
 import shutil
@@ -95,6 +96,36 @@ def run_program():
         if check:
             assert result.returncode == 0, result.stderr
         return result
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def reproject_dataset(tmp_path_factory, run_program):
+    """Reproject a dataset's views into ``folder`` by the content of a settings file.
+
+    Return the program's CompletedProcess.
+    """
+
+    def run(dataset, folder, settings, *arguments, **options):
+        # Validation finds files that do not belong to the dataset's folder.
+        file = tmp_path_factory.mktemp("settings") / f"{folder.name}.json"
+        file.write_text(json.dumps(settings))
+        return run_program(
+            "reproject.py",
+            "--settings",
+            file,
+            "--input-cfg",
+            dataset / "lightfield.json",
+            "--input-dir",
+            dataset / "exr",
+            "--output-dir",
+            folder,
+            "--output-cfg",
+            folder / "lightfield.json",
+            *arguments,
+            **options,
+        )
 
     return run
 

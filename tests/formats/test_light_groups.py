@@ -194,29 +194,16 @@ def scene(**more):
 
 
 @pytest.fixture
-def develop(tmp_path, tmp_path_factory, run_program):
+def develop(tmp_path, reproject_dataset):
     """Return a function that develops the dataset in tmp_path/rig in another light."""
 
     def run(name, light, check=True, **settings):
         content = {"format": "exr", "relight": light, **settings}
         # The plan resolves names to lights.
         reprojection = scene(reprojections={name: content}).reprojections[name]
-        path = tmp_path_factory.mktemp("settings") / f"{name}.json"
-        write_json(path, reprojection.settings.as_json())
-        return run_program(
-            "reproject.py",
-            "--settings",
-            path,
-            "--input-cfg",
-            tmp_path / "rig/lightfield.json",
-            "--input-dir",
-            tmp_path / "rig/exr",
-            "--output-dir",
-            tmp_path / "rig" / name,
-            "--output-cfg",
-            tmp_path / "rig" / name / "lightfield.json",
-            check=check,
-        )
+        folder = tmp_path / "rig"
+        content = reprojection.settings.as_json()
+        return reproject_dataset(folder, folder / name, content, check=check)
 
     return run
 
@@ -284,29 +271,14 @@ def sparks(folder, content):
 
 @pytest.mark.parametrize("filter_name", FILTERS)
 @pytest.mark.parametrize("fov", [60, 140])
-def test_reprojected_groups_add_up_with_every_filter(
-    filter_name, fov, tmp_path, tmp_path_factory, run_program
-):
+def test_reprojected_groups_add_up_with_every_filter(filter_name, fov, tmp_path, reproject_dataset):
     folder = tmp_path / "rig"
     sparks(folder, dataset(folder))
     camera = {"lens": "rectilinear", "fov": fov, "resolution": [12, 12]}
     reprojection = {"format": "exr", "camera": camera, "passes": ["light_groups"]}
     content = scene(reprojections={"flat": reprojection | {"filter": filter_name}})
-    path = tmp_path_factory.mktemp("settings") / "flat.json"
-    write_json(path, content.reprojections["flat"].settings.as_json())
-    run_program(
-        "reproject.py",
-        "--settings",
-        path,
-        "--input-cfg",
-        folder / "lightfield.json",
-        "--input-dir",
-        folder / "exr",
-        "--output-dir",
-        folder / "flat",
-        "--output-cfg",
-        folder / "flat/lightfield.json",
-    )
+    settings = content.reprojections["flat"].settings
+    reproject_dataset(folder, folder / "flat", settings.as_json())
     for view in ("view_0000f", "view_0001f"):
         seen = colour(folder, "flat", view)
         groups = [colour(folder / "flat", f"Combined_{name}", view) for name in ("lamp", "sky")]

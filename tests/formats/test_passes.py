@@ -17,7 +17,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import read_json, sha256
 from lightfield.export.source import SourceDataset
 from lightfield.formats import passes
 from lightfield.formats.lightfield import LightField
@@ -411,29 +411,14 @@ def test_validation_checks_each_pass(what, made, tmp_path):
         }
 
 
-def test_reprojected_passes_keep_their_meaning(made, tmp_path, run_program):
+def test_reprojected_passes_keep_their_meaning(made, tmp_path, reproject_dataset):
     """A perspective view reprojected from the fisheye's, compared with the rendered one."""
     names = [name for name in PASSES if name != "motion"]
     source, target = made / "fisheye", tmp_path / "perspective"
     settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
-    write_json(tmp_path / "flat.json", settings | {"formats": ["exr"], "passes": names})
-    run_program(
-        "reproject.py",
-        "--settings",
-        tmp_path / "flat.json",
-        "--input-cfg",
-        source / "lightfield.json",
-        "--input-dir",
-        source / "exr",
-        "--output-dir",
-        target,
-        "--output-cfg",
-        target / "lightfield.json",
-        "--source-record",
-        made / "fisheye.json",
-        "--record",
-        tmp_path / "record.json",
-    )
+    settings |= {"formats": ["exr"], "passes": names}
+    records = ("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json")
+    reproject_dataset(source, target, settings, *records)
     content = LightField.read(target / "lightfield.json")
     assert [render_pass.name for render_pass in content.passes] == names
     files = read_json(tmp_path / "record.json")["files"]

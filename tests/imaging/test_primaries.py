@@ -6,7 +6,6 @@ import OpenImageIO as oiio
 import pytest
 
 from lightfield.configuration.scene_yaml import Reprojection
-from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -48,7 +47,7 @@ HALF = 2**-11
 
 
 @pytest.fixture
-def reproject(tmp_path, run_program):
+def reproject(tmp_path, reproject_dataset):
     """Return a function that reprojects a view of patches. It returns the new image's path."""
     rig = {"type": "lattice", "cameras": [1, 1, 1], "size": 0}
     content = LightField.from_rig(rig, lenses.from_camera(CAMERA), depth=None, frame=1, render={})
@@ -58,20 +57,8 @@ def reproject(tmp_path, run_program):
     images.write_exr(source, dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True)))
 
     def run(name, **settings):
-        file = tmp_path / f"{name}.json"
         reprojection = Reprojection.model_validate(settings)
-        write_json(file, reprojection.settings.as_json())
-        run_program(
-            "reproject.py",
-            "--settings",
-            file,
-            "--input-cfg",
-            tmp_path / "lightfield.json",
-            "--input-dir",
-            tmp_path / "exr",
-            "--output-dir",
-            tmp_path / name,
-        )
+        reproject_dataset(tmp_path, tmp_path / name, reprojection.settings.as_json())
         return tmp_path / name / f"view_0000f.{reprojection.format}"
 
     return run

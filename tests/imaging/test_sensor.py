@@ -283,7 +283,7 @@ def developments(sensor, **more):
 
 
 @pytest.fixture
-def develop(tmp_path, tmp_path_factory, run_program):
+def develop(tmp_path, reproject_dataset):
     """Return a function that develops four fisheye views, and returns the new folder."""
     rig = {key: value for key, value in RIG.items() if key != "camera"}
     render = {"depth_precision": "float"}
@@ -299,22 +299,7 @@ def develop(tmp_path, tmp_path_factory, run_program):
 
     def run(name, reprojection, *arguments, folder=None):
         folder = folder or tmp_path / name
-        file = tmp_path_factory.mktemp("settings") / f"{name}.json"
-        write_json(file, reprojection.settings.as_json())
-        run_program(
-            "reproject.py",
-            "--settings",
-            file,
-            "--input-cfg",
-            tmp_path / "lightfield.json",
-            "--input-dir",
-            tmp_path / "exr",
-            "--output-dir",
-            folder,
-            "--output-cfg",
-            folder / "lightfield.json",
-            *arguments,
-        )
+        reproject_dataset(tmp_path, folder, reprojection.settings.as_json(), *arguments)
         return folder
 
     return run

@@ -16,7 +16,7 @@ import bookkeeping
 import forks
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
-from checkouts import ROOT, checkout, jobs_on, snakemake, with_consumers
+from checkouts import ROOT, SEQUENCE, checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
 from lightfield.core.files import size_and_time
@@ -75,20 +75,7 @@ exports:
   instant_ngp: {{sources: [views]}}
   nerfstudio: {{sources: [views], depth: true}}
 """
-# A sequence, whose frames share an export.
-MOVED = """
-scene: {builder: still_life}
-render: {samples: 4}
-rigs:
-  LFMoving:
-    type: plane
-    cameras: [2, 1]
-    size: 1
-    frames: {first: 1, last: 2}
-    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
-exports:
-  dnerf: {sources: [views], points: 9}
-"""
+MOVED = f"scene: {{builder: still_life}}{SEQUENCE}"
 MODELLED = f"""
 scene: {{model: model.obj}}
 render: {{samples: 4}}

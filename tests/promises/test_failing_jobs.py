@@ -11,7 +11,7 @@ from pathlib import Path
 import forks
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
-from checkouts import ROOT, checkout, with_consumers
+from checkouts import ROOT, SEQUENCE, checkout, with_consumers
 from sphere import write_views
 
 pytestmark = pytest.mark.slow
@@ -37,20 +37,7 @@ exports:
   instant_ngp: {sources: [views]}
   nerfstudio: {sources: [views], depth: true}
 """
-# A sequence of a model, whose frames share an export.
-MODELLED = """
-scene: {model: model.obj}
-render: {samples: 4}
-rigs:
-  LFMoving:
-    type: plane
-    cameras: [2, 1]
-    size: 1
-    frames: {first: 1, last: 2}
-    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
-exports:
-  dnerf: {sources: [views], points: 9}
-"""
+MODELLED = f"scene: {{model: model.obj}}{SEQUENCE}"
 # A family.
 MANY = """
 scene: {builder: room}

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
 from lightfield.export.points import lift
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
@@ -167,15 +166,12 @@ def test_no_exported_point_is_on_the_invisible_ground(rendered):
     assert not in_sun(on_ground, 0.05).any()
 
 
-def test_views_around_it_agree(rendered, run_program, tmp_path):
+def test_views_around_it_agree(rendered, reproject_dataset, tmp_path):
     """A view from below shows nothing of the cube, which the ground hides."""
     folder = tmp_path / "dataset"
     shutil.copytree(rendered, folder)
     camera = {"lens": "equidistant", "fov": 40, "resolution": [SIZE, SIZE]}
-    write_json(tmp_path / "settings.json", {"camera": camera, "formats": ["exr"]})
-    source = ("-i", folder / "exr", "--input-cfg", folder / "lightfield.json")
-    target = ("-o", folder / "fisheye", "--output-cfg", folder / "fisheye/lightfield.json")
-    run_program("reproject.py", *source, *target, "--settings", tmp_path / "settings.json")
+    reproject_dataset(folder, folder / "fisheye", {"camera": camera, "formats": ["exr"]})
     result = validation.validate(folder, ["fisheye"])
     checks = {check.name: check for check in result.checks}
     for name in ("geometry", "passes", "fisheye/geometry", "fisheye/images", "fisheye/source"):

@@ -10,7 +10,6 @@ import pytest
 
 from lightfield.configuration.exports import NerfSynthetic
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core.files import write_json
 from lightfield.export import nerf_synthetic
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
@@ -50,7 +49,7 @@ def dataset(folder, camera=FISHEYE, transparent=True):
 
 
 @pytest.fixture
-def reproject(tmp_path, tmp_path_factory, run_program):
+def reproject(tmp_path, reproject_dataset):
     """Return a function that reprojects the dataset in tmp_path. It returns the new folder."""
 
     def run(name, **settings):
@@ -63,22 +62,7 @@ def reproject(tmp_path, tmp_path_factory, run_program):
             }
         ).reprojections[name]
         folder = tmp_path / name
-        # Validation finds files that do not belong to the dataset's folder.
-        settings = tmp_path_factory.mktemp("settings") / f"{name}.json"
-        write_json(settings, content.settings.as_json())
-        run_program(
-            "reproject.py",
-            "--settings",
-            settings,
-            "--input-cfg",
-            tmp_path / "lightfield.json",
-            "--input-dir",
-            tmp_path / "exr",
-            "--output-dir",
-            folder,
-            "--output-cfg",
-            folder / "lightfield.json",
-        )
+        reproject_dataset(tmp_path, folder, content.settings.as_json())
         return folder
 
     return run
