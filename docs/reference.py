@@ -7,7 +7,6 @@ scripts/schema.py.
 import argparse
 import ast
 import json
-import math
 import re
 import runpy
 import sys
@@ -38,6 +37,7 @@ from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.core.names import ROOT, SEQUENCE_EXPORTS
 from lightfield.core.settings import MEANINGS
+from lightfield.core.units import limit
 from lightfield.formats import sensors
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
@@ -483,13 +483,6 @@ def _default(value: dict[str, Any]) -> str:
     return f"`{_text(default)}`"
 
 
-def _number(value: float) -> str:
-    exponent = math.log10(abs(value)) if value else 0.0
-    if exponent.is_integer() and exponent >= 6:
-        return f"{'-' if value < 0 else ''}1e{exponent:.0f}"
-    return str(value) if isinstance(value, int) else f"{value:.10g}"
-
-
 def _range(value: dict[str, Any]) -> str:
     """Return the range of a number in words. Empty without limits."""
     least = value.get("minimum")
@@ -497,11 +490,11 @@ def _range(value: dict[str, Any]) -> str:
     if "exclusiveMinimum" in value:
         lower = f"above {value['exclusiveMinimum']:.10g}"
     else:
-        lower = "" if least is None else _number(least)
+        lower = "" if least is None else limit(least)
     if "exclusiveMaximum" in value:
         upper = f"below {value['exclusiveMaximum']:.10g}"
     else:
-        upper = "" if most is None else _number(most)
+        upper = "" if most is None else limit(most)
     match (lower, upper):
         case ("", ""):
             return ""

@@ -18,7 +18,7 @@ from pathlib import Path
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
-from lightfield.core import disk_space, leftovers
+from lightfield.core import disk_space, leftovers, units
 from lightfield.workflow.failures import (
     batch_log,
     cause,

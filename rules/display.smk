@@ -2,7 +2,7 @@
 import logging
 import resource
 
-from lightfield.core.progress import duration
+from lightfield.core.units import duration
 from lightfield.workflow.run_display import RunDisplay, Task
 from lightfield.configuration.scene_yaml import SensorReprojection
 from lightfield.planning.unit_costs import JOB_SECONDS, START_UP_SECONDS

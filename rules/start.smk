@@ -29,8 +29,8 @@ def check_memory():
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if RUNS_HERE and 0 <= limit < LEAST_ADDRESS_SPACE:
         raise UserError(
-            f"memory: a process may have {disk_space.gigabytes(limit)} here, and Blender "
-            f"needs at least {disk_space.gigabytes(LEAST_ADDRESS_SPACE)}: raise the limit "
+            f"memory: a process may have {units.size(limit)} here, and Blender "
+            f"needs at least {units.size(LEAST_ADDRESS_SPACE)}: raise the limit "
             "(ulimit -v unlimited)"
         )
 

@@ -7,6 +7,7 @@ has the size of each dataset whose hours are estimated. Without this file, no ho
 import argparse
 from pathlib import Path
 
+from lightfield.core import units
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
@@ -60,7 +61,7 @@ def main() -> None:
     write_json(arguments.output.with_suffix(".json"), content)
     print(
         f"note: {name}: the GPU renders the same picture; it takes "
-        f"{sum(content['hours'].values()):.3g} hours for all datasets at full size"
+        f"{units.duration(3600 * sum(content['hours'].values()))} for all datasets at full size"
     )
 
 

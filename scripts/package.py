@@ -7,6 +7,7 @@ largest size of a part. `scene` has the keys description, licence and credit of 
 import argparse
 from pathlib import Path
 
+from lightfield.core import units
 from lightfield.core.cli import above_zero, check_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -50,7 +51,8 @@ def main() -> None:
     if store:
         # The job declares the first part alone.
         store.put_list(card_path, written[1:])
-    print(f"{arguments.output}: {len(parts)} parts, {sum(p['bytes'] for p in parts) / 1e9:.3g} GB")
+    size = sum(part["bytes"] for part in parts)
+    print(f"{arguments.output}: {units.count(len(parts), 'part')}, {units.size(size)}")
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:

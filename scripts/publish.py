@@ -9,6 +9,7 @@ A settings file is JSON with the same keys as that of package.py.
 import argparse
 from pathlib import Path
 
+from lightfield.core import units
 from lightfield.core.cli import above_zero, check_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.paths import place_in
@@ -39,7 +40,8 @@ def main() -> None:
         arguments.folder, name, settings.scene, arguments.output, settings.most_bytes
     )
     files = published.files
-    print(f"{arguments.output}: {len(files)} files, {sum(f['bytes'] for f in files) / 1e9:.3g} GB")
+    size = sum(file["bytes"] for file in files)
+    print(f"{arguments.output}: {units.count(len(files), 'file')}, {units.size(size)}")
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from checkouts import ROOT
 
 from lightfield.configuration.config_file import load_config, read_config
 from lightfield.core import memory as machine
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
@@ -99,7 +100,7 @@ def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):
     inventory = tmp_path / "inventory.json"
     inventory.write_text(json.dumps({"memory_bytes": machine.available(), "left_out": []}))
     needed = machine.available() + 1000 * 1000 * memory.DENOISED_PIXEL_BYTES
-    message = rf"a\.blend: a view of 1000 × 1000 pixels takes {needed / 1e9:.1f} GB of memory"
+    message = rf"a\.blend: a view of 1000 × 1000 pixels takes {units.size(needed)} of memory"
     with pytest.raises(UserError, match=message):
         shard.render(
             lightfield.changed(render={"denoise": True, "seed": 0}),

@@ -128,12 +128,15 @@ def test_the_table_adds_up_the_probes_measurements():
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
     text = plan.table(datasets, {})
     # 300 views of 36 ± 12/√12 s take 3 h, and of 11 MB 3.3 GB.
-    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h | — | — | 3.3 GB |" in text
+    assert (
+        "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h 00 min | — | — | 3.3 GB |"
+        in text
+    )
     assert (
         "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 12 min | — | — | 88 MB |"
         in text
     )
-    assert "| all | 308 | | | | 3.2 h ± 17 min | — | — | 3.4 GB |" in text
+    assert "| all | 308 | | | | 3 h 12 min ± 17 min | — | — | 3.39 GB |" in text
     assert "Times of one processor core" in text
     assert "time = views × s a view" in text.split("| all |")[1]
     assert "Times of the graphics card." in plan.table(

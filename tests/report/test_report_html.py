@@ -867,10 +867,3 @@ def test_a_page_without_light_groups_relights_nothing(sphere):
 def test_a_number_on_a_page_is_read_as_people_write_it(value, text):
     assert page.cell(value) == text
     assert page.cell(str(value)) == text
-
-
-@pytest.mark.parametrize(
-    ("size", "text"), [(0, "0 bytes"), (1, "1 byte"), (999.6, "1 kB"), (2e15, "2 PB")]
-)
-def test_a_size_on_a_page_has_its_unit(size, text):
-    assert page.measure(size, "peak_bytes") == text

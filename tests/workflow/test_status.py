@@ -93,7 +93,7 @@ def test_the_time_left_follows_from_the_rate_of_the_shards_at_work(dataset, monk
     lines = dataset()
     # Two views were finished in the last ten minutes, and two are left.
     assert lines[1] == (
-        "  rendered: 2 of 4, 0.2 a minute, 10 min 00 s left at the rate of the last 10 min 00 s"
+        "  rendered: 2 of 4, 0.2 a minute, 10 min left at the rate of the last 10 min"
     )
     assert "  shards at work: 0:4" in lines
     assert lines[-1] == lines[1].replace("  rendered: 2 of 4", "all: 2 of 4 views rendered")
@@ -178,7 +178,7 @@ def test_progress_starts_at_once_and_can_be_read_in_a_log(capsys, monkeypatch):
         now[0] += seconds
         render_progress.done()
     assert capsys.readouterr().err.splitlines() == [
-        "render scene/rig 0:12: 1 of 10 views, 120 s each, 18 min 00 s left",
+        "render scene/rig 0:12: 1 of 10 views, 120 s each, 18 min left",
         "render scene/rig 0:12: 2 of 10 views, 20 s each, 2 min 40 s left",
         "render scene/rig 0:12: 3 of 10 views, 20 s each, 2 min 20 s left",
     ]

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 
 # The bytes of a run are estimates. Refuse a run that needs more than SURELY times the free space.
@@ -45,13 +46,6 @@ class Need:
     files: int = 0
 
 
-def gigabytes(size: float) -> str:
-    """Return a number of bytes as a person reads it: ``12.6 GB``."""
-    if size < 5e6:
-        return "less than 0.01 GB" if size else "0 GB"
-    return f"{size / 1e9:,.2f} GB" if size < 1e10 else f"{size / 1e9:,.0f} GB"
-
-
 def _nearest_folder(path: Path) -> Path:
     """Return the path if it exists, or else the nearest parent that does."""
     return next(part for part in (path, *path.absolute().parents) if part.exists())
@@ -80,7 +74,7 @@ def write_problem(path: Path, error: OSError) -> str:
     # Some libraries raise errors without a number, so ask the disk first.
     if cause := obstacle(path):
         return cause
-    free = gigabytes(shutil.disk_usage(_nearest_folder(path)).free)
+    free = units.size(shutil.disk_usage(_nearest_folder(path)).free)
     remedy = REMEDIES.get(error.errno or 0, "look for a quota, or a limit of files' sizes")
     return f"{error.strerror or error}; {free} are free on its disk: {remedy}"
 
@@ -125,8 +119,8 @@ def _space_warning(needs: list[Need]) -> str | None:
             f"writes some {files}: remove some files, choose another disk, or build less"
         )
     text = (
-        f"{folder}: {gigabytes(free)} are free on its disk, and this run writes some "
-        f"{gigabytes(size)}"
+        f"{folder}: {units.size(free)} are free on its disk, and this run writes some "
+        f"{units.size(size)}"
     )
     if size > _SURELY * free:
         raise UserError(f"{text}: free some space, choose another disk, or build less")

@@ -14,7 +14,7 @@ import urllib.request
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.disk_space import gigabytes
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.progress import Progress
@@ -40,7 +40,7 @@ def fetch(url: str, target: Path, expected: str | None, origin: str) -> None:
             break
         if _size(part) <= before:
             raise UserError(
-                f"{url}: {problem}; {gigabytes(_size(part))} are kept in {part}, "
+                f"{url}: {problem}; {units.size(_size(part))} are kept in {part}, "
                 "and the same command goes on from there"
             )
     digest = sha256(part)
@@ -99,7 +99,7 @@ def _receive(answer: Any, part: Path, received: int) -> str | None:
             if total is not None:
                 progress.done()
     if total is not None and _size(part) < total:
-        return f"the transfer broke off at {gigabytes(_size(part))} of {gigabytes(total)}"
+        return f"the transfer broke off at {units.size(_size(part))} of {units.size(total)}"
     return None
 
 

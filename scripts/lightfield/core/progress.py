@@ -5,21 +5,13 @@ import sys
 import time
 from dataclasses import dataclass
 
+from lightfield.core.units import duration
+
 # Seconds between two lines.
 _INTERVAL = 5.0
 
 _BEGIN = re.compile(r".*: (\d+) \w+ to do(?:, (\d+) already done)?")
 _NOW = re.compile(r".*: (\d+) of (\d+) \w+, ([\d.e+-]+) s each")
-
-
-def duration(seconds: float) -> str:
-    """Return a duration as a person reads it: ``42 s``, ``3 min 05 s``, ``2 h 07 min``."""
-    if seconds < 99.5:
-        return f"{seconds:.0f} s"
-    minutes, odd_seconds = divmod(round(seconds), 60)
-    if minutes < 100:
-        return f"{minutes} min {odd_seconds:02d} s"
-    return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 @dataclass(frozen=True)

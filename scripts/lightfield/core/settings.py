@@ -20,6 +20,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 
@@ -223,7 +224,7 @@ def _allowed(error: ErrorDetails) -> str:
         if name in error.get("ctx", {}):
             bound = error["ctx"][name]
             if isinstance(bound, int):
-                return f"be a whole number {comparison} {bound}"
-            return f"be a number {comparison} {bound:.10g}"
+                return f"be a whole number {comparison} {units.limit(bound)}"
+            return f"be a number {comparison} {units.limit(bound)}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

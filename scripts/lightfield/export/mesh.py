@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_text
 from lightfield.geometry.mesh import Box, Floats, Mesh, Placed, Surface, box_around, to_world
@@ -94,8 +95,8 @@ def _write_glb(path: Path, surface: Surface) -> None:
     size = 12 + 8 + len(text) + 8 + length
     if size > _MOST_GLB_BYTES:
         raise UserError(
-            f"mesh.formats: a GLB can hold at most 4.3 GB, and the scene needs {size / 1e9:.1f} "
-            "GB; write ply only, or lower the scene's detail"
+            f"mesh.formats: a GLB can hold at most {units.size(_MOST_GLB_BYTES)}, and "
+            f"the scene needs {units.size(size)}; write ply only, or lower the scene's detail"
         )
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.write(struct.pack("<4sII", b"glTF", 2, size))

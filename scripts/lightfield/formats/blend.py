@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lightfield.core.errors import UserError
+from lightfield.core.units import count
 from lightfield.geometry.lenses.rectilinear import RectilinearSettings
 
 Settings = Mapping[str, Any]
@@ -240,7 +241,7 @@ def _frames(frames: Sequence[float], file_frame: float) -> str:
 
 
 def _samples(samples: int, file_samples: int) -> str:
-    text = f"{samples} {'sample' if samples == 1 else 'samples'} a pixel"
+    text = f"{count(samples, 'sample')} a pixel"
     return (
         f"{text}, the file's"
         if samples == file_samples

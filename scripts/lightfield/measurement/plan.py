@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core import processors
+from lightfield.core import processors, units
 from lightfield.core.files import read_keys, reading
 from lightfield.measurement import metrics
-from lightfield.planning.forecast import size_text, time_text
 from lightfield.planning.sampling import DENOISED, TRACED, standard_error
 
 COLUMNS = (
@@ -91,8 +90,8 @@ class Expected:
         width, height = self.probe["resolution"]
         return (
             f"| {self.name} | {self.views} | {width} × {height} | {self.probe['samples']} "
-            f"| {self.view_seconds:.3g} ± {self.view_error:.1g} | {time_text(self.seconds)} "
-            f"| {_times(self.cheaper_seconds)} | {size_text(self.bytes)} |"
+            f"| {self.view_seconds:.3g} ± {self.view_error:.1g} | {units.duration(self.seconds)} "
+            f"| {_times(self.cheaper_seconds)} | {units.size(self.bytes)} |"
         )
 
 
@@ -154,14 +153,14 @@ def _sums_row(expected: Sequence[Expected]) -> str:
     views = sum(dataset.views for dataset in expected)
     size = sum(dataset.bytes for dataset in expected)
     if 0 < len(on_card(expected)) < len(expected):
-        return f"| all | {views} | | | | — | {_times([None, None])} | {size_text(size)} |"
+        return f"| all | {views} | | | | — | {_times([None, None])} | {units.size(size)} |"
     seconds = sum(dataset.seconds for dataset in expected)
     error = math.hypot(*(dataset.views * dataset.view_error for dataset in expected))
     columns = zip(*(dataset.cheaper_seconds for dataset in expected), strict=True)
     cheaper = [None if None in column else sum(column) for column in columns]
     return (
-        f"| all | {views} | | | | {time_text(seconds)} ± {time_text(error)} "
-        f"| {_times(cheaper)} | {size_text(size)} |"
+        f"| all | {views} | | | | {units.duration(seconds)} ± {units.duration(error)} "
+        f"| {_times(cheaper)} | {units.size(size)} |"
     )
 
 
@@ -182,7 +181,7 @@ def _device_of(expected: Sequence[Expected]) -> str:
         )
     cores = processors.available()
     seconds = sum(dataset.seconds for dataset in expected) / cores
-    return f"Times of one processor core; this machine's {cores} take {time_text(seconds)}."
+    return f"Times of one processor core; this machine's {cores} take {units.duration(seconds)}."
 
 
 def cheaper_parts(
@@ -225,4 +224,4 @@ def cheaper_parts(
 
 
 def _times(values: Sequence[float | None]) -> str:
-    return " | ".join("—" if value is None else time_text(value) for value in values)
+    return " | ".join("—" if value is None else units.duration(value) for value in values)

@@ -6,6 +6,7 @@ Every job reads this file with the rules, so it must import nothing that takes l
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from lightfield.core import units
 from lightfield.planning.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,
@@ -97,8 +98,8 @@ def _table(title: str, groups: Mapping[str, Sequence[Work]]) -> str:
                 name,
                 f"{len(works):,}",
                 f"{views:,}" if views else "",
-                time_text(seconds),
-                size_text(size) if size else "",
+                units.duration(seconds),
+                units.size(size) if size else "",
             )
         )
     return "\n".join(
@@ -124,25 +125,3 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
     pixels = min(size, WINDOW_SIZE) ** 2
     window = renders * _WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
     return START_UP_SECONDS + PROBES * window
-
-
-def time_text(seconds: float) -> str:
-    """Return a time as a person reads it: ``19 s``, ``4 min``, ``2.3 h``, or ``1,153 h``."""
-    if seconds < 100:
-        return f"{_figure(seconds)} s"
-    if seconds < 6000:
-        return f"{_figure(seconds / 60)} min"
-    return f"{_figure(seconds / 3600)} h"
-
-
-def size_text(size: float) -> str:
-    """Return a number of bytes as a person reads it: ``73 kB``, ``5.1 MB``, or ``172 GB``."""
-    for unit, bytes_of_unit in (("kB", 1e3), ("MB", 1e6)):
-        if size < 999.5 * bytes_of_unit:
-            return f"{_figure(size / bytes_of_unit)} {unit}"
-    return f"{_figure(size / 1e9)} GB"
-
-
-def _figure(value: float) -> str:
-    """Return a number with two digits. From 10 on return a whole number with commas."""
-    return f"{value:.2g}" if value < 9.95 else f"{value:,.0f}"

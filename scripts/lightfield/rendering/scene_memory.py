@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.leftovers import temporary_folder
@@ -64,7 +65,7 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
         if result.returncode < 0:
             raise UserError(
                 f"{blend}: its render ends by signal {-result.returncode}: does the scene fit into "
-                f"this machine's {available() / 1e9:.1f} GB of memory?"
+                f"this machine's {units.size(available())} of memory?"
             )
         if result.returncode:
             raise UserError(f"{blend}: {result.stderr.splitlines()[-1].removeprefix('error: ')}")

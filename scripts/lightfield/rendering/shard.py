@@ -21,12 +21,13 @@ import numpy as np
 import psutil
 
 from lightfield.configuration import keys
-from lightfield.core import leftovers, processors
+from lightfield.core import leftovers, processors, units
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
+from lightfield.core.units import duration
 from lightfield.formats import passes
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField, View
@@ -168,8 +169,8 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     needed = memory.needed(scene, lens.width * lens.height, denoise, groups)
     if needed > available():
         raise UserError(
-            f"{blend}: a view of {lens.width} × {lens.height} pixels takes {needed / 1e9:.1f} GB "
-            f"of memory, and this machine has {available() / 1e9:.1f} GB; render it on one that "
+            f"{blend}: a view of {lens.width} × {lens.height} pixels takes {units.size(needed)} "
+            f"of memory, and this machine has {units.size(available())}; render it on one that "
             "has more, or smaller, or make the scene lighter"
         )
 
@@ -220,8 +221,8 @@ def _render_views(
         seconds = rendered.colour.render_seconds
         if is_suspect(seconds, earlier_seconds):
             print(
-                f"warning: {folder}/{view.name}.exr took {seconds:.3g} s, but other views "
-                f"about {median(earlier_seconds):.3g} s; check this view",
+                f"warning: {folder}/{view.name}.exr took {duration(seconds)}, but other views "
+                f"about {duration(median(earlier_seconds))}; check this view",
                 file=sys.stderr,
             )
         earlier_seconds.append(seconds)

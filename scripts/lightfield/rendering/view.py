@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.core import disk_space
+from lightfield.core import disk_space, units
 from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, UserError
 from lightfield.core.leftovers import temporary_folder
 from lightfield.imaging import images
@@ -70,8 +70,8 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
         except UserError as error:
-            free = disk_space.gigabytes(shutil.disk_usage(folder).free)
-            needed = disk_space.gigabytes(size)
+            free = units.size(shutil.disk_usage(folder).free)
+            needed = units.size(size)
             raise UserError(
                 f"{error}; {free} are free there: free some space, or set TMPDIR to a folder with "
                 f"{needed}"

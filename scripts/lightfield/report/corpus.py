@@ -8,6 +8,7 @@ from typing import Any
 
 from lightfield.configuration.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
 from lightfield.configuration.family import RECORD
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
 from lightfield.formats.layout import SUMS
@@ -166,6 +167,6 @@ def summary(content: Mapping[str, Any], folder: Path) -> str:
     numbers = content["statistics"]
     text = (
         f"{folder / PAGE}: {numbers['valid']:,} of {numbers['members']:,} members, "
-        f"{numbers['views']:,} views, {numbers['bytes'] / 1e9:.3g} GB"
+        f"{numbers['views']:,} views, {units.size(numbers['bytes'])}"
     )
     return f"{text}; {numbers['failed']:,} failed" if numbers["failed"] else text

@@ -13,6 +13,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from lightfield.configuration.corpus import PAGE
+from lightfield.core import units
 from lightfield.formats.layout import REPORT
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import page
@@ -41,7 +42,7 @@ def write(folder: Path, content: Mapping[str, Any]) -> None:
         "corpus.html.j2",
         name=content["name"],
         numbers=numbers,
-        size=page.bytes_(numbers["bytes"]),
+        size=units.size(numbers["bytes"]),
         parts=[(part, content["splits"]["valid_members"][part]) for part in PARTS],
         keys=keys,
         distributions=[
@@ -106,7 +107,7 @@ def _drawn(title: str, distribution: Mapping[str, Any]) -> Markup:
     if "histogram" in distribution:
         bars = distribution["histogram"]
         least, median, largest = (
-            page.number(distribution[key]) for key in ("least", "median", "largest")
+            units.number(distribution[key]) for key in ("least", "median", "largest")
         )
         names = [least, f"median {median}", largest]
         label = f"{title}: from {least} to {largest}, median {median}"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core import units
 from lightfield.core.files import absolute_path
 from lightfield.export import transforms
 from lightfield.formats import blend
@@ -199,7 +200,7 @@ def facts(
         "Samples": samples,
         "Depth": DEPTHS.get(lightfield.depth or "", "none"),
         "Pixels without a hit": None if missed is None else f"{100 * missed:.3g} %",
-        "Size of the views": page.bytes_(sum(path.stat().st_size for path in exrs)),
+        "Size of the views": units.size(sum(path.stat().st_size for path in exrs)),
         "Rendered by": bpy and f"Cycles in bpy {bpy}",
     }
     return [(title, text) for title, text in texts.items() if text]

@@ -1,6 +1,5 @@
 """Writes pages from templates. A page is one file, with styles, programs and pictures inside."""
 
-import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -9,8 +8,9 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from lightfield.core import units
 from lightfield.core.files import write_text
-from lightfield.core.progress import duration
+from lightfield.core.units import number
 from lightfield.imaging import images, pictures
 from lightfield.report import scripts
 from lightfield.report.packing import data_uri, webp
@@ -76,34 +76,6 @@ def plot(stem: Path) -> str | None:
     return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
 
 
-def bytes_(value: float) -> str:
-    """Return a number of bytes as text: 12.3 MB."""
-    if value == 1:
-        return "1 byte"
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if value < 999.5:
-            return f"{value:.3g} {unit}"
-        value /= 1000
-    return f"{value:.3g} PB"
-
-
-def seconds(value: float) -> str:
-    """Return a duration as text: 4.22 s, 3 min 20 s, 5 h 12 min."""
-    return f"{value:.3g} s" if value < 99.5 else duration(value)
-
-
-def number(value: float) -> str:
-    """Return a number as text with a few digits, in powers of ten if it is very small or large."""
-    if not math.isfinite(value):
-        return "∞" if value > 0 else "–"
-    if 9999.5 <= abs(value) < 99999.5:
-        return f"{value:.0f}"
-    if value != 0 and not 1e-3 <= abs(value) < 9999.5:
-        mantissa, exponent = f"{value:.2e}".split("e")
-        return f"{mantissa}·10{_superscript(int(exponent))}"
-    return f"{value:z.4g}"
-
-
 def cell(value: Any) -> str:
     """Return a table's cell as text. Shortens numbers, joins lists, and shows None as a dash."""
     if value is None or value == "":
@@ -125,10 +97,10 @@ def cell(value: Any) -> str:
 
 
 _UNITS: dict[str, Callable[[float], str]] = {
-    "seconds": seconds,
-    "bytes": bytes_,
+    "seconds": units.duration,
+    "bytes": units.size,
     "kwh": lambda value: f"{value:.3g} kWh",
-    "gigabytes": lambda value: bytes_(1e9 * value),
+    "gigabytes": lambda value: units.size(1e9 * value),
     "hours": lambda value: f"{number(value)} h",
     "watts": lambda value: f"{value:g} W",
 }
@@ -161,7 +133,3 @@ def title(name: str) -> str:
         parts.pop()
     text = " ".join(_SPELLINGS.get(part, part) for part in parts)
     return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, text)
-
-
-def _superscript(value: int) -> str:
-    return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

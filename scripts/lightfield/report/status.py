@@ -15,7 +15,7 @@ from lightfield.configuration import keys
 from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
-from lightfield.core.progress import duration
+from lightfield.core.units import duration
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.imaging import images

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_problem
 from lightfield.measurement import summaries
@@ -344,6 +345,6 @@ def _bound_used(row: Mapping[str, str]) -> float:
 
 def _milliseconds(text: str | None) -> str | None:
     try:
-        return f"{page.number(1000 * float(text or ''))} ms"
+        return f"{units.number(1000 * float(text or ''))} ms"
     except ValueError:
         return text

@@ -9,6 +9,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
+from lightfield.core.units import count
 from lightfield.core.yaml_files import read_yaml
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
@@ -62,10 +63,9 @@ def run(arguments: argparse.Namespace) -> None:
                 add_to_video(picture)
             holes.append(made.hole_fraction(rays))
             progress.done()
-    made_views = "1 view" if len(holes) == 1 else f"{len(holes)} views"
     print(
-        f"{made_views} of {min(arguments.best, len(views))} each; holes: {np.mean(holes):.3%} of "
-        f"their pixels, at most {max(holes):.3%} of one"
+        f"{count(len(holes), 'view')} of {min(arguments.best, len(views))} each; "
+        f"holes: {np.mean(holes):.3%} of their pixels, at most {max(holes):.3%} of one"
     )
 
 

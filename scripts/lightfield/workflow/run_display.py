@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TextIO
 
 from lightfield.core import progress
-from lightfield.core.progress import duration
+from lightfield.core.units import count, duration
 
 # After this many seconds of work, the run's rate counts.
 _SURE_AFTER = 2.0
@@ -147,7 +147,7 @@ class RunDisplay:
         With Snakemake's ``--until`` a run ends before all tasks have run.
         """
         ended = [task for task in self._tasks.values() if task.ended is not None]
-        jobs = _count(len(self._tasks), "job")
+        jobs = count(len(self._tasks), "job")
         if len(ended) < len(self._tasks):
             jobs = f"{len(ended)} of {jobs}"
         text = f"{jobs} in {duration(time.time() - self._began)}"
@@ -217,10 +217,10 @@ class RunDisplay:
             tasks = [task for task in self._tasks.values() if task.phase == phase]
             made = sum(task.views_made for task in tasks)
             has_views = any(task.views for task in tasks)
-            count = _count(made, "view") if has_views else _count(len(tasks), "job")
+            done = count(made, "view") if has_views else count(len(tasks), "job")
             began = min(task.began or self._began for task in tasks)
             ended = max(task.ended or began for task in tasks)
-            self._say(f"{phase}: {count} in {duration(ended - began)}")
+            self._say(f"{phase}: {done} in {duration(ended - began)}")
 
     def _draw(self, now: float) -> None:
         if self._terminal:
@@ -234,7 +234,7 @@ class RunDisplay:
     def line(self, now: float) -> str:
         """Return the line of progress at ``now``, in seconds since 1970."""
         tasks = self._tasks.values()
-        parts = [f"{len(tasks) - len(self._open)} of {_count(len(tasks), 'job')}"]
+        parts = [f"{len(tasks) - len(self._open)} of {count(len(tasks), 'job')}"]
         views = sum(task.views for task in tasks)
         if views:
             parts.append(f"{sum(task.views_done for task in tasks)} of {views} views")
@@ -291,7 +291,3 @@ class RunDisplay:
 def _expected_seconds(tasks: Iterable[Task]) -> float:
     """Return the estimated CPU seconds of tasks, without the work of earlier runs."""
     return sum((task.seconds or 0.0) * (1 - task.already / (task.total or 1)) for task in tasks)
-
-
-def _count(count: int, name: str) -> str:
-    return f"{count} {name}" + ("" if count == 1 else "s")

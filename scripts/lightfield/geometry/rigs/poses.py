@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
-from lightfield.core.disk_space import gigabytes
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_problem, read_text
 from lightfield.core.settings import FARTHEST, pattern
@@ -124,8 +124,9 @@ def _read_poses(path: Path) -> PosesFile:
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     if status.st_size > LARGEST_FILE:
-        size = gigabytes(status.st_size)
-        raise UserError(f"{path}: has {size}; must be at most {gigabytes(LARGEST_FILE)}")
+        raise UserError(
+            f"{path}: has {units.size(status.st_size)}; must be at most {units.size(LARGEST_FILE)}"
+        )
     return _read_checked(path, status.st_mtime_ns)
 
 
