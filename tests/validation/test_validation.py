@@ -1505,7 +1505,7 @@ def test_stray_files_are_moved_before_they_make_a_dataset_invalid(
     before = len(list((folder / "exr").iterdir()))
     (folder / "report").mkdir()
     for name in ("index.html", "panorama.png"):
-        (folder / "report" / name).write_text("of an older program")
+        (folder / "report" / name).write_text("drawn")
     assert not check(validate(folder), "files").passed
     assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == before + 2
     assert [path.name for path in (folder / "report").iterdir()] == ["index.html"]

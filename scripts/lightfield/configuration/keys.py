@@ -33,7 +33,7 @@ _SURFACES_VERSION = 2
 _PART_VERSION = 1
 # The same for the views of a user's .blend.
 _BLEND_VERSION = 1
-# The same for those of them with a pass of numbers, which once replaced what shaders read.
+# The same for those of them with a pass of numbers.
 _NUMBERS_VERSION = 1
 # The same for mattes of a user's .blend.
 _MATTES_VERSION = 1

@@ -309,8 +309,6 @@ def load(path: Path | str) -> LensMap:
         if description.pop("checksum") != _checksum(description, arrays):
             raise ValueError("it is damaged: its checksum does not hold")
         arrays.setdefault("coordinates", arrays["centers"])
-        # Files of earlier versions also have the magnification.
-        arrays.pop("magnification", None)
         return LensMap(
             settings=description["settings"],
             summary=description["summary"],
@@ -320,7 +318,10 @@ def load(path: Path | str) -> LensMap:
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except (EOFError, SyntaxError, TokenError, *DAMAGE) as error:
-        raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
+        raise UserError(
+            f"{path}: is not a lens map that can be read: {error}; delete it, and the next run "
+            "makes it again"
+        ) from None
 
 
 def _checksum(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> int:

@@ -290,8 +290,8 @@ def remove_strays(
     """Move files that do not belong to the dataset into ``folder``. Return their number.
 
     Such files are views of a rig that had more cameras, former reprojections and exports, and
-    figures that an older program drew. Moves nothing if a lightfield.json or an export cannot be
-    read. ``export_lists`` is that of `of_exports`.
+    files in the report's folder that no report has. Moves nothing if a lightfield.json or an export
+    cannot be read. ``export_lists`` is that of `of_exports`.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
