@@ -216,9 +216,7 @@ def peak_kib(process: int) -> int:
 def simulate() -> None:
     """Write all files of a finished build: views of one pixel, and correct records."""
     (dataset,) = chosen()
-    lightfield = LightField.from_rig(
-        dataset.rig, dataset.rig.camera.make(), **dataset.origin(dataset.render)
-    )
+    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin)
     lightfield.write(f"{dataset.folder}/lightfield.json")
     folder = Path(dataset.folder, "exr")
     folder.mkdir()

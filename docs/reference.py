@@ -38,7 +38,7 @@ from lightfield.core.files import write_text
 from lightfield.core.names import ROOT, SEQUENCE_EXPORTS
 from lightfield.core.settings import MEANINGS
 from lightfield.core.units import limit
-from lightfield.formats import sensors
+from lightfield.formats import render_block, sensors
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
@@ -151,8 +151,8 @@ KEY_PAGES: dict[str, Page] = {
         "`target_error` is required.",
         [
             Section("render", render_settings.Render),
-            Section("render: target_error", render_settings.TargetError),
-            Section("render: camera_motion", render_settings.CameraMotion),
+            Section("render: target_error", render_block.TargetError),
+            Section("render: camera_motion", render_block.CameraMotion),
         ],
     ),
     "rig-keys.md": Page(

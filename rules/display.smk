@@ -102,10 +102,12 @@ def estimated_seconds(job):
     wildcards = job.wildcards
     if is_of(job, "calibrate"):
         dataset = first_dataset(wildcards.scene)
-        target, most = map(dataset.render.get, ("target_error", "most_samples"))
-        if target is None:
+        render = dataset.render
+        if render.target_error is None:
             return 0.0
-        return calibration_seconds(target, min(dataset.rig.camera.resolution), most)
+        return calibration_seconds(
+            render.target_error, min(dataset.rig.camera.resolution), render.most_samples
+        )
     if phase_of(job) in UNKNOWN_PHASES:
         return None
     if is_of(job, "build_members"):

@@ -45,7 +45,7 @@ def main() -> None:
     from lightfield.measurement import calibration, trials
 
     lightfield = LightField.read(arguments.lightfield)
-    if "target_error" not in lightfield.render:
+    if lightfield.render.target_error is None:
         raise UserError(f"{arguments.lightfield}: render: is missing the key target_error")
     maker = trials.Trials.of(arguments, lightfield)
     record, seconds = calibration.calibrate(
@@ -55,7 +55,7 @@ def main() -> None:
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
     print(summary(absolute_path(arguments.lightfield).parent.name, record))
-    warning = problem(record, lightfield.render.get("most_samples"))
+    warning = problem(record, lightfield.render.most_samples)
     if warning:
         print(f"warning: render.target_error: {warning}", file=sys.stderr)
 

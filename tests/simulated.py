@@ -61,9 +61,7 @@ def planned(folder: Path, *arguments: str) -> set[str]:
 
 def _views(folder: Path, dataset: Dataset) -> None:
     """Write the views and their records. The views differ in colour."""
-    lightfield = LightField.from_rig(
-        dataset.rig, dataset.rig.camera.make(), **dataset.origin(dataset.render)
-    )
+    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin)
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
         lens = (reprojection.camera or dataset.rig.camera).make()

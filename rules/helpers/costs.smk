@@ -14,9 +14,10 @@ def full_size(dataset):
     """
     full = full_datasets(dataset.scene_name)[dataset.rig_folder]
     size = {"views": full.view_count, "resolution": full.rig.camera.resolution}
-    for key in ("samples", "denoise"):
-        if full.render.get(key) is not None:
-            size[key] = full.render[key]
+    if full.render.samples is not None:
+        size["samples"] = full.render.samples
+    if full.render.given_denoise is not None:
+        size["denoise"] = full.render.given_denoise
     return size
 
 

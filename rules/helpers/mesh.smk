@@ -7,7 +7,7 @@ def mesh_settings(dataset):
         sys.exit(
             f"error: {dataset.folder}/{MESH}: the scene YAML asks for no mesh of it"
         )
-    passes = dataset.render.get("passes", ())
+    passes = dataset.render.passes or ()
     settings = MeshSettings.of(
         formats=dataset.mesh.formats,
         frame=dataset.source.frame,

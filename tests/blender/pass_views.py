@@ -272,7 +272,7 @@ def main(folder: Path) -> None:
         content = lightfield(name, passes=["normal", "object", "instance"])
         render(f"instances_{name}", content)
         np.save(folder / f"instances_{name}.npy", cast_instances(content))
-    bare = content.changed(render={k: v for k, v in content.render.items() if k != "passes"})
+    bare = content.changed(render=content.render.without_passes.to_json())
     render("instances_plain", bare, "0:1")
     read_matte(folder / "perspective/cryptomatte/view_0000f.exr", "wall", folder / "matte.exr")
 

@@ -154,7 +154,7 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
         ("right", "LFSphere", 642),
         ("right", "LFCuboid", 1400),
     ]
-    assert full[0].render["seed"] == 0
+    assert full[0].render.seed == 0
     assert full[0].depth == "z"
     assert full[1].depth == "distance"
     assert list(full[0].reprojections) == ["perspective"]
@@ -168,8 +168,8 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert small[0].rig.camera.resolution == (100, 100)
     assert small[1].rig.camera.resolution == (100, 50)
     assert small[0].reprojections["perspective"].camera.resolution == (100, 100)
-    assert small[0].render["samples"] == 8
-    assert small[0].render["denoise"] is True
+    assert small[0].render.samples == 8
+    assert small[0].render.denoise is True
     with pytest.raises(UserError, match=r"right\.yaml: rigs\.LFSphere: a rig of type sphere can"):
         scene_datasets("right", limits=Preset(views=1))
 

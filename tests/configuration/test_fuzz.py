@@ -35,6 +35,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats import published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
+from lightfield.formats.render_block import RenderBlock
 from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import lenses
 from lightfield.geometry.rigs import from_settings
@@ -380,7 +381,7 @@ def calibration(_):
 
 
 def read_calibration(path, dataset):
-    calibrated({"target_error": 0.01, "seed": 0}, path)
+    calibrated(RenderBlock(target_error=0.01, seed=0), path)
     dataset.estimate.view_seconds  # noqa: B018
 
 

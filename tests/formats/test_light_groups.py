@@ -372,7 +372,7 @@ def write_scene(folder, monkeypatch, reprojections=None, **render):
 
 
 def test_a_preset_does_not_denoise_light_groups(tmp_path, monkeypatch):
-    assert write_scene(tmp_path, monkeypatch).render["denoise"] is False
+    assert write_scene(tmp_path, monkeypatch).render.denoise is False
 
 
 def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch):

@@ -133,12 +133,12 @@ def test_the_kind_of_depth_follows_from_the_key_and_the_lens(
 
 def test_a_copy_can_have_another_lens_other_views_and_other_keys(tmp_path: Path) -> None:
     first = read(tmp_path, content(render={"samples": 4}, frame=2, scene={"name": "x"}))
-    assert (first.render, first.frame, first.scene) == ({"samples": 4}, 2, {"name": "x"})
+    assert (first.render.samples, first.frame, first.scene) == (4, 2, {"name": "x"})
     changed = first.changed(lens=WIDE, views=first.views[1:], render={"samples": 8})
     assert changed.lens.to_lightfield() == WIDE.to_lightfield()
     assert (changed.depth, changed.path) == ("distance", first.path)
     assert [view.name for view in changed.views] == ["view_0001f"]
-    assert (changed.render, changed.frame) == ({"samples": 8}, 2)
+    assert (changed.render.samples, changed.frame) == (8, 2)
     assert (first.lens.width, first.depth, len(first.views)) == (64, "z", 2)
     assert changed.folder == tmp_path
     assert len(first.changed(views=[]).matrices) == 0
@@ -164,6 +164,10 @@ BROKEN = {
     "no view": (content(frames=[]), "frames: is empty"),
     "a text for settings": (content(render="cycles"), "render: must be a mapping"),
     "no list of passes": (content(passes=3), "passes: must be of normal, object"),
+    "a text for a number": (
+        content(render={"samples": "64", "transparent": True}),
+        'render: samples: is "64"; must be a whole number',
+    ),
     "a pass that there is not": (content(render={"passes": ["x"]}), "passes: must be of normal"),
     "frame is not a mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }

@@ -9,6 +9,7 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PARTS_OF_LIGHT
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses
 from lightfield.measurement import advice, calibration, error_vs_time, strata, trials
 from lightfield.measurement.experiment import Experiment
@@ -76,7 +77,7 @@ def experiment_of(maker, size, windows, reference_samples):
 
 def advice_of(maker, windows, reference_samples):
     experiment = experiment_of(maker, 32, windows, reference_samples)
-    return advice.measure(experiment, RENDER, INVENTORY, "room")
+    return advice.measure(experiment, RenderBlock(**RENDER), INVENTORY, "room")
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +104,7 @@ def test_a_reference_has_at_least_the_samples_that_are_asked_for(asked, rendered
 
     content = error_vs_time.measure(
         Recorded(),
-        RENDER,
+        RenderBlock(**RENDER),
         size=32,
         windows=1,
         octaves=1,
@@ -121,10 +122,10 @@ class SimulatedProbes(Simulated):
 
 def test_path_tracing_is_as_cheap_as_itself_below_the_references_own_error():
     """Only plain path tracing reaches the target, because the simulated denoiser is biased."""
-    render = {**RENDER, "target_error": 1e-5}
+    render = RenderBlock(**RENDER, target_error=1e-5)
     record, _ = calibration.calibrate(SimulatedProbes(), render, 32, 2)
     assert record["choice"]["denoise"] is False
-    assert record["references"]["own_error"][0] > 10 * render["target_error"]
+    assert record["references"]["own_error"][0] > 10 * render.target_error
     assert record["times_fewer_samples"] == pytest.approx(1, abs=0.5)
 
 

@@ -128,8 +128,8 @@ def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
     monkeypatch.setattr("lightfield.configuration.scene_yaml.SCENES", tmp_path)
     for preset in (None, Preset(denoise=True, samples=8)):
         (dataset,) = scene_datasets("aimed", limits=preset)
-        assert dataset.render["target_error"] == 0.02
-        assert dataset.render["denoise"] is False
+        assert dataset.render.target_error == 0.02
+        assert dataset.render.denoise is False
 
 
 @pytest.mark.slow
@@ -255,6 +255,6 @@ def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: 0.05"))
     full = scene_datasets("aimed")[0].render
-    assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & set(full)
+    assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & full.to_json().keys()
     preview = scene_datasets("aimed", "preview", LIMITS)[0].render
-    assert (preview["most_samples"], preview["denoise"]) == (12, True)
+    assert (preview.most_samples, preview.denoise) == (12, True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lightfield.formats.lightfield import LightField
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses
 from lightfield.measurement import gpu_check
 from lightfield.measurement.trials import Trial
@@ -95,7 +96,7 @@ def test_pictures_without_noise_are_compared_exactly(trials):
 def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": {"views": 10, "resolution": [2000, 1000]}}
     maker = Simulated(lenses.from_camera(CAMERA))
-    content = gpu_check.check(maker, "gpu", {"samples": 256}, full)
+    content = gpu_check.check(maker, "gpu", RenderBlock(samples=256), full)
     assert content["devices"] == ["CPU", "GPU"]
     assert content["core_seconds"] == pytest.approx(1)
     assert content["gpu_seconds"] == pytest.approx(0.1)

@@ -398,8 +398,8 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     rig = {**LINE, "cameras": [2, 1]}
     lightfield = write_dataset(tmp_path, rig).with_flow()
     lens, shown = lightfield.lens, ["normal", "object", "cryptomatte", "motion", "albedo", "flow"]
-    render = {**lightfield.render, "passes": shown[:-1]}
-    lightfield.changed(render=render).write(tmp_path / "lightfield.json")
+    render = lightfield.render.changed(passes=shown[:-1])
+    lightfield.changed(render=render.to_json()).write(tmp_path / "lightfield.json")
     left = (np.indices((lens.height, lens.width))[1] < lens.width / 2).astype(float)
     # All other values are 0.
     holds = {
@@ -438,7 +438,8 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
 
 def test_a_scene_at_rest_has_a_white_picture_of_motion(tmp_path):
     lightfield = write_dataset(tmp_path, LINE)
-    lightfield = lightfield.changed(render={**lightfield.render, "passes": ["motion"]})
+    render = lightfield.render.changed(passes=["motion"])
+    lightfield = lightfield.changed(render=render.to_json())
     view, motion = lightfield.views[0], PASSES["motion"]
     noise = np.full((lightfield.lens.height, lightfield.lens.width), 1e-5, np.float32)
     images.write_exr(motion.path(tmp_path, view.name), dict.fromkeys(motion.channels, noise))
@@ -780,8 +781,8 @@ def lit(tmp_path_factory):
     """The page of views whose colour is the sum of two light groups, and their lightfield.json."""
     folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
-    render = {**lightfield.render, "light_groups": {"lamp": ["Lamp"], "World": ["World"]}}
-    lightfield = lightfield.changed(render=render)
+    groups = {"lamp": ["Lamp"], "World": ["World"]}
+    lightfield = lightfield.changed(render=lightfield.render.changed(light_groups=groups).to_json())
     lightfield.write(folder / "lightfield.json")
     for view in lightfield.views:
         colour = images.read_image(folder / "exr" / f"{view.name}.exr").colour

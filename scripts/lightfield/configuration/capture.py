@@ -10,13 +10,14 @@ from pydantic import Field, PlainSerializer
 from lightfield.configuration import blend_lock, scene_source
 from lightfield.configuration.keys import scene_fingerprint
 from lightfield.configuration.scene_source import FILE, SceneSource
-from lightfield.configuration.setting_types import AtLeastOne
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
+from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import OMNIDIRECTIONAL
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
@@ -39,7 +40,7 @@ class Capture:
 
     scene_name: str
     source: SceneSource
-    render: dict[str, Any]
+    render: RenderBlock
     rig: Rig
     external_files: Sequence[tuple[str, str | None]] = ()
     model_fingerprint: str | None = None
@@ -61,15 +62,15 @@ class Capture:
             facts = content["blend"]
             external_files = [(file["path"], file["sha256"]) for file in content["external_files"]]
             frame: float = facts["frame"] if self.source.frame == FILE else self.frame
-            render = dict(self.render)
+            render = self.render
             rig = self.rig
-            if render.get("samples") == FILE:
-                most = render.pop("most_samples", facts["samples"])
-                render["samples"] = min(facts["samples"], most)
+            if render.samples == FILE:
+                most = render.most_samples or facts["samples"]
+                render = render.changed(samples=min(facts["samples"], most), most_samples=None)
             if blend.is_shutter_reset(facts, render):
                 # Earlier versions rendered these views otherwise: they need another key.
-                render["shutter"] = "centred"
-            if render.get("depth_of_field"):
+                render = render.changed(shutter="centred")
+            if render.depth_of_field:
                 blend.camera_of(facts)
             if isinstance(rig, BlendCamera):
                 blend.camera_of(facts)
@@ -107,7 +108,7 @@ class Capture:
         """
         if self.rig.is_omnidirectional:
             return None
-        match self.render["depth"]:
+        match self.render.depth:
             case "none":
                 return None
             case "auto":
@@ -126,11 +127,9 @@ class Capture:
             return self.model_fingerprint
         return scene_fingerprint(self.source, self.external_files)
 
-    def origin(self, render: dict[str, Any]) -> dict[str, Any]:
-        """Return the keys of lightfield.json that say what is rendered, and how.
-
-        ``render`` is its block `render`.
-        """
+    @property
+    def origin(self) -> dict[str, Any]:
+        """The keys of lightfield.json that say what is rendered, and how."""
         origin: dict[str, Any] = {"depth": self.depth}
         if self.rig.stereo and self.rig.is_omnidirectional:
             origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
@@ -145,7 +144,7 @@ class Capture:
             ),
             "fingerprint": self.fingerprint,
         }
-        origin["render"] = render
+        origin["render"] = self.render.to_json()
         return origin
 
     @property
@@ -187,7 +186,7 @@ class LightfieldSettings(Settings):
     source: Annotated[SceneSource, PlainSerializer(_source_as_written)] = Field(
         description="The block `scene` of the scene YAML."
     )
-    render: dict[str, Any] = Field(
+    render: Annotated[RenderBlock, PlainSerializer(RenderBlock.to_json)] = Field(
         description="The block `render` of the scene YAML, within the limits of the preset."
     )
     rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)] = Field(
@@ -220,7 +219,7 @@ class LightfieldSettings(Settings):
         return cls.of(
             scene=capture.scene_name,
             source=_source_as_written(_without_locked_sha256(capture)),
-            render=capture.render,
+            render=capture.render.to_json(),
             rig=rig,
             panorama_width=panorama_width,
             **keys,

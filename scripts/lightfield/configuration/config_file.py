@@ -7,15 +7,15 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, model_validator
 
-from lightfield.configuration.setting_types import (
+from lightfield.core.errors import UserError
+from lightfield.core.names import ROOT
+from lightfield.core.setting_types import (
     AtLeastOne,
     Auto,
     DenoisePrefilter,
     Folder,
     unique_names,
 )
-from lightfield.core.errors import UserError
-from lightfield.core.names import ROOT
 from lightfield.core.settings import Name, Settings, checked, pattern
 from lightfield.core.yaml_files import read_yaml
 

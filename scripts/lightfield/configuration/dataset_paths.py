@@ -69,7 +69,7 @@ class DatasetPaths(Description):
     @property
     def lightfield_inventory(self) -> str | list[str]:
         """The inventory on which lightfield.json depends: also for the names of light groups."""
-        return self.inventory if self.render.get("light_groups") else self.blend_inventory
+        return self.inventory if self.render.light_groups else self.blend_inventory
 
     @property
     def trials(self) -> str:
@@ -79,7 +79,7 @@ class DatasetPaths(Description):
     @property
     def calibration(self) -> str | list[str]:
         """The settings chosen for the scene's target error under the preset, if it has one."""
-        if "target_error" not in self.render:
+        if self.render.target_error is None:
             return []
         return f"{self.work_root}/{self.scene_folder}/calibration.json"
 
@@ -114,8 +114,8 @@ class DatasetPaths(Description):
     @property
     def image_folders(self) -> list[str]:
         """The folders in ``folder`` that hold views, their passes and reprojections."""
-        folders = ["exr", *(view_pass.name for view_pass in passes.selected(self.render))]
-        if self.render.get("light_groups"):
+        folders = ["exr", *(view_pass.name for view_pass in self.render.selected_passes)]
+        if self.render.light_groups:
             # Only lightfield.json names all of them.
             present = Path(self.folder).glob(f"{passes.GROUP_PREFIX}*")
             folders = list(dict.fromkeys([*folders, *sorted(path.name for path in present)]))

@@ -25,8 +25,8 @@ from lightfield.configuration.scene_source import (
     check_model,
 )
 from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.configuration.setting_types import AtLeastOne
 from lightfield.core.names import builders
+from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings, read_settings
 from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame

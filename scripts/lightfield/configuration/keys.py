@@ -117,7 +117,7 @@ def render_key(lightfield: LightField, view: View) -> str:
     key = [_RENDER_VERSION, version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
         key.append(_SURFACES_VERSION)
-    if renders_part(lightfield) and lightfield.render["denoise"]:
+    if renders_part(lightfield) and lightfield.render.denoise:
         key.append(["part", _PART_VERSION])
     if _is_of_blend(lightfield):
         key.append(["blend", _BLEND_VERSION])

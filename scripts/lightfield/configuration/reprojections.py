@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 from typing_extensions import TypeAliasType
 
-from lightfield.configuration.setting_types import Primaries
+from lightfield.core.setting_types import Primaries
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens

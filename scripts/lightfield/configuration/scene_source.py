@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from lightfield.configuration.setting_types import QUOTED
 from lightfield.core.names import LIGHTS, MODELS, SOFTBOXES, UP, builders
+from lightfield.core.setting_types import QUOTED
 from lightfield.core.settings import AS_WRITTEN, Address, Settings, pattern
 from lightfield.geometry.rigs.rig import Frame
 

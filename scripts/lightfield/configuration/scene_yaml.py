@@ -28,9 +28,9 @@ from lightfield.configuration.reprojections import (
     face_problem,
 )
 from lightfield.configuration.scene_source import FILE, SceneSource
-from lightfield.configuration.setting_types import Auto, Primaries, unique_names
 from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, ROOT, VIEWS
+from lightfield.core.setting_types import Auto, Primaries, unique_names
 from lightfield.core.settings import Name, Settings, checked, suggestion
 from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
 from lightfield.formats import light_groups, published

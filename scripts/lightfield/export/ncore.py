@@ -97,9 +97,8 @@ def _row_times(source: SourceDataset) -> tuple[float, float] | None:
 
     Raises `UserError` if resampling mixed the rows.
     """
-    motion = source.rendered.content.get("render", {}).get("camera_motion") or {}
-    rolling = motion.get("rolling", 1)
-    if rolling == 1:
+    motion = source.rendered.known_render.camera_motion
+    if motion is None or motion.rolling in (None, 1):
         return None
     rotation = source.lightfield.content.get("reprojection", {}).get("rotation", ())
     if source.lens != source.rendered.lens or any(rotation):
@@ -107,7 +106,7 @@ def _row_times(source: SourceDataset) -> tuple[float, float] | None:
             f"{source.lightfield.path}: reprojection: mixes the rows of a rolling shutter, and "
             "NCore needs their times; export the rendered views"
         )
-    times = row_times(source.lens.height, rolling)
+    times = row_times(source.lens.height, motion.rolling)
     return float(times[0]), float(times[-1])
 
 

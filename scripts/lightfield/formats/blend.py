@@ -9,6 +9,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.units import count
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.lenses.rectilinear import RectilinearSettings
 
 Settings = Mapping[str, Any]
@@ -67,12 +68,17 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
     return settings.model_copy(update={"principal_point": point})
 
 
-def is_blurred(blend: Settings, render: Settings) -> bool:
+def has_motion_blur(blend: Settings, render: RenderBlock) -> bool:
+    """Return whether moving objects are blurred."""
+    return bool(blend["motion_blur"] if render.motion_blur is None else render.motion_blur)
+
+
+def is_blurred(blend: Settings, render: RenderBlock) -> bool:
     """Return whether views are blurred by the motion of objects or of the camera."""
-    return bool(render.get("motion_blur", blend["motion_blur"]) or "camera_motion" in render)
+    return has_motion_blur(blend, render) or render.camera_motion is not None
 
 
-def is_shutter_reset(blend: Settings, render: Settings) -> bool:
+def is_shutter_reset(blend: Settings, render: RenderBlock) -> bool:
     """Return whether views are blurred at other times than a render of the .blend itself."""
     if not is_blurred(blend, render):
         return False
@@ -81,7 +87,7 @@ def is_shutter_reset(blend: Settings, render: Settings) -> bool:
         blend["shutter_position"] != "CENTER"
         or blend["shutter_curve"]
         or blend["rolling_shutter"]
-        or ("camera_motion" in render and old != new)
+        or (render.camera_motion is not None and old != new)
     )
 
 
@@ -99,7 +105,7 @@ def followed_camera(blend: Settings, choice: str | None) -> str | None:
 def usage_notes(
     inventory: Settings,
     frames: Sequence[float],
-    render: Settings,
+    render: RenderBlock,
     uses_camera: bool,
     followed: str | None,
 ) -> list[str]:
@@ -122,7 +128,7 @@ def usage_notes(
     ]
 
 
-def _scene(blend: Settings, frames: Sequence[float], render: Settings) -> Iterator[str]:
+def _scene(blend: Settings, frames: Sequence[float], render: RenderBlock) -> Iterator[str]:
     """Yield notes on the rendered scene, frames, view layers, and samples."""
     layers = blend["layers"]
     if len(blend["scenes"]) > 1:
@@ -138,9 +144,9 @@ def _scene(blend: Settings, frames: Sequence[float], render: Settings) -> Iterat
     if blend["engine"] != "CYCLES":
         made_for = _ENGINES.get(blend["engine"], blend["engine"])
         yield f"made for {made_for}, rendered with Cycles"
-    if isinstance(render.get("samples"), int):
-        yield _samples(render["samples"], blend["samples"])
-    elif "samples" in render:
+    if isinstance(render.samples, int):
+        yield _samples(render.samples, blend["samples"])
+    elif render.samples is not None:
         yield _samples(blend["samples"], blend["samples"])
 
 
@@ -165,20 +171,20 @@ def _followers(followers: Mapping[str, Sequence[str]], followed: str | None) -> 
         yield f"{listed} {'follow' if len(names) > 1 else 'follows'} {camera}"
 
 
-def _switches(blend: Settings, render: Settings) -> Iterator[str]:
+def _switches(blend: Settings, render: RenderBlock) -> Iterator[str]:
     """Yield notes on switches that are on in the dataset or in the .blend."""
     focus = bool(blend["camera"] and blend["camera"]["lens"]["depth_of_field"])
     for name, is_on, is_on_in_blend in (
-        ("adaptive sampling", bool(render.get("adaptive_threshold")), blend["adaptive_sampling"]),
-        ("denoising", bool(render.get("denoise")), blend["denoising"]),
-        ("depth of field", bool(render.get("depth_of_field")), focus),
-        ("motion blur", render.get("motion_blur", blend["motion_blur"]), blend["motion_blur"]),
+        ("adaptive sampling", bool(render.adaptive_threshold), blend["adaptive_sampling"]),
+        ("denoising", render.denoise, blend["denoising"]),
+        ("depth of field", bool(render.depth_of_field), focus),
+        ("motion blur", has_motion_blur(blend, render), blend["motion_blur"]),
     ):
         if is_on or is_on_in_blend:
             yield f"{name} {'ON' if is_on else 'off'}"
 
 
-def _exposure(blend: Settings, render: Settings) -> Iterator[str]:
+def _exposure(blend: Settings, render: RenderBlock) -> Iterator[str]:
     """Yield notes on the .blend's exposure, if anything is blurred by motion."""
     if not is_blurred(blend, render):
         return
@@ -204,9 +210,9 @@ def _display(blend: Settings) -> Iterator[str]:
         yield "view curves ignored"
 
 
-def _film(blend: Settings, render: Settings) -> Iterator[str]:
+def _film(blend: Settings, render: RenderBlock) -> Iterator[str]:
     """Yield notes on the .blend's film, units and scripts."""
-    if render.get("transparent"):
+    if render.transparent:
         yield "film transparent ON"
     elif blend["film_transparent"]:
         yield "film transparent on, ignored"

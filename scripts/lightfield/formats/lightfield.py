@@ -27,6 +27,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.formats import passes
 from lightfield.formats.passes import PASSES, Pass
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses, rotations
 from lightfield.geometry.exposure import pose_at
 from lightfield.geometry.flow import neighbours
@@ -234,12 +235,13 @@ class LightField:
 
     def with_exposure(self) -> "LightField":
         """Return a copy whose views have the poses at the start and the end of their exposures."""
-        motion = self.render["camera_motion"]
+        motion = self.render.camera_motion
+        assert motion
         views = []
         for view in self.views:
             matrices = {}
             for name, time in (("start", -0.5), ("end", 0.5)):
-                pose = pose_at(view.matrix, motion["travel"], motion["turn"], time)
+                pose = pose_at(view.matrix, motion.travel, motion.turn, time)
                 matrices[name] = (np.round(pose, 12) + 0.0).tolist()
             views.append(replace(view, others={**view.others, EXPOSURE: matrices}))
         return self.changed(views=views)
@@ -269,16 +271,22 @@ class LightField:
         scene: Mapping[str, Any] = self._key("scene")
         return scene
 
+    @cached_property
+    def render(self) -> RenderBlock:
+        """How it was rendered. Raises `UserError` if this is missing or wrong."""
+        return RenderBlock.read(self._key("render"), f"{self.path}: render")
+
     @property
-    def render(self) -> Mapping[str, Any]:
-        """How it was rendered: the scene YAML's ``render`` block."""
-        render: Mapping[str, Any] = self._key("render")
-        return render
+    def known_render(self) -> RenderBlock:
+        """How it was rendered, as far as the file says. SILVR's files say nothing."""
+        return self.render if "render" in self.content else RenderBlock()
 
     @property
     def passes(self) -> list[Pass]:
         """What the views have beside colour and depth. A reprojection may have fewer passes."""
-        return passes.selected(self.content if "passes" in self.content else self._render)
+        if "passes" in self.content:
+            return [passes.by_name(name) for name in self.content["passes"]]
+        return self.known_render.selected_passes
 
     @property
     def light_groups(self) -> list[str]:
@@ -300,7 +308,7 @@ class LightField:
     @property
     def transparent(self) -> bool:
         """Whether the views' channel A is how much of a pixel the scene covers."""
-        return bool(self._render.get("transparent"))
+        return bool(self.known_render.transparent)
 
     def require_rig(self, rig: "rigs.Rig") -> None:
         """Raise `UserError` if the file and a rig differ in the number of views."""
@@ -316,10 +324,6 @@ class LightField:
                 f"{self.path}: {OMNIDIRECTIONAL}: its views have no centre; no other lens sees "
                 "what they see, and no other program reads their poses"
             )
-
-    @property
-    def _render(self) -> Mapping[str, Any]:
-        return self.render if "render" in self.content else {}
 
     def _key(self, key: str, kind: Any = Mapping, kind_name: str = "a mapping") -> Any:
         """Return the value of a key. Raises `UserError` if it is missing or of another kind."""

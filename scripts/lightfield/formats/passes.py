@@ -7,9 +7,9 @@ validation and reprojection all use this table.
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from lightfield.formats import light_groups
 
@@ -209,21 +209,6 @@ PARTS_OF_LIGHT = (
 )
 
 
-def selected(settings: Mapping[str, Any]) -> list[Pass]:
-    """Return the passes that ``settings`` select by the keys ``passes`` and ``light_groups``.
-
-    A lightfield.json has all groups. A scene YAML may lack names: see `light_groups.names_in`.
-    """
-    groups = settings.get("light_groups")
-    chosen = [by_name(name) for name in settings.get("passes", ())]
-    for group in light_groups.names_in(groups) or ():
-        # A transparent view's colour leaves out the world, but Cycles' pass does not.
-        members = groups[group] if isinstance(groups, Mapping) else ()
-        shows_world = not settings.get("transparent") or light_groups.WORLD not in members
-        chosen.append(replace(of_group(group), without=None if shows_world else "Environment"))
-    return chosen
-
-
 def by_name(name: str) -> Pass:
     """Return the pass of this name. Raises KeyError if there is none, or if it is no text."""
     if not isinstance(name, str):
@@ -241,11 +226,6 @@ def group_pass(group: str) -> str:
 def is_group(view_pass: Pass) -> bool:
     """Return whether a pass is that of a light group."""
     return view_pass.name.startswith(GROUP_PREFIX)
-
-
-def without(render: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block without passes and light groups."""
-    return {key: value for key, value in render.items() if key not in ("passes", "light_groups")}
 
 
 def in_order(names: list[str], *others: str) -> list[str]:

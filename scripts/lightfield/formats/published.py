@@ -11,6 +11,7 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import NAME, LightField, View
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.rigs import Poses
 
 # What an import uses of a lightfield.json, beside the poses.
@@ -62,18 +63,19 @@ def _split(views: Sequence[View]) -> dict[str, Any]:
     return {"split": names} if is_split else {}
 
 
-def render(rig: Poses) -> dict[str, Any]:
+def render(rig: Poses) -> RenderBlock:
     """Return the ``render`` block of a rig's views: the meaning of their channels Z and A."""
     lightfield = LightField.read(rig.file)
-    alpha = {"transparent": True} if lightfield.transparent else {}
-    return {"depth": lightfield.depth or "none", **alpha}
+    return RenderBlock.of(
+        depth=lightfield.depth or "none", transparent=lightfield.transparent or None
+    )
 
 
 def unused_keys(rig: Poses) -> list[str]:
     """Return the keys of a rig's lightfield.json that an import does not use."""
     lightfield = LightField.read(rig.file)
     keys = lightfield.content.keys() - _USED_KEYS
-    if "render" in keys and lightfield.render.keys() <= _USED_KEYS_OF_RENDER:
+    if "render" in keys and lightfield.content["render"].keys() <= _USED_KEYS_OF_RENDER:
         keys.remove("render")
     of_frames = {key for view in lightfield.views for key in view.others} - _USED_KEYS_OF_FRAMES
     return sorted(keys) + [f"frames.{key}" for key in sorted(of_frames)]

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics
 from lightfield.measurement.calibration import effort_for
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
@@ -157,7 +158,7 @@ def changes_to_try(sampling: Mapping[str, Any], on_cpu: bool) -> list[Change]:
 
 
 def measure(
-    experiment: Experiment, render: Mapping[str, Any], inventory: Mapping[str, Any], name: str
+    experiment: Experiment, render: RenderBlock, inventory: Mapping[str, Any], name: str
 ) -> dict[str, Any]:
     """Try changes that could be cheaper than a scene's ``render`` settings.
 
@@ -165,7 +166,8 @@ def measure(
     progress lines.
     """
     title = f"{name}: trials"
-    changes = changes_to_try({**inventory["sampling"], **render}, experiment.device == "CPU")
+    sampling = {**inventory["sampling"], **render.to_json()}
+    changes = changes_to_try(sampling, experiment.device == "CPU")
     unchanged = [method for methods in _UNCHANGED.values() for method in methods]
     experiment.run([*unchanged, *(change.method for change in changes)], SEEDS, title)
     measured = [(change, savings(experiment, change)) for change in changes]
@@ -178,7 +180,7 @@ def measure(
         "seeds": len(SEEDS),
         "device": experiment.device,
         "strata": experiment.areas,
-        "own": {key: render[key] for key in ("samples", "denoise")},
+        "own": {"samples": render.samples, "denoise": render.denoise},
         "unchanged": {
             of: [_unchanged_figures(experiment, method) for method in methods]
             for of, methods in _UNCHANGED.items()

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
+from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.trials import Trials, Window, nearest_view
@@ -277,20 +278,21 @@ class Search:
 
 
 def calibrate(
-    maker: Trials, render: Mapping[str, Any], size: int, count: int
+    maker: Trials, render: RenderBlock, size: int, count: int
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
 
     Returns the choice with its evidence, which is the same each time. Also returns the seconds that
     each method took, which vary. Seconds are those of one core, or of the GPU, for a megapixel.
     """
-    target = render["target_error"]
+    target = render.target_error
+    assert target is not None
     windows = maker.windows(size, count)
     unseen_windows = _held_out_windows(maker, windows)
     # The pilot renders first, because it sets up Cycles for the parts of light.
     classes = strata.classes_of(maker, [*windows, *unseen_windows])
     bench = Bench(maker, windows, _PROBE_SEED, target)
-    search = Search(bench.measure, target, render.get("most_samples"), render.get("denoise"))
+    search = Search(bench.measure, target, render.most_samples, render.given_denoise)
     choice = search.choose()
     held_out = Bench(
         maker, unseen_windows, _HELD_OUT_SEED, target, bench.experiment.references[0].exposure

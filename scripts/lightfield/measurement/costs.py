@@ -13,8 +13,8 @@ from typing import Any, Literal
 from pydantic import Field
 
 from lightfield.configuration.config_file import Energy
-from lightfield.configuration.setting_types import AtLeastOne
 from lightfield.core.paths import files_below
+from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
@@ -349,15 +349,16 @@ class Scale:
         """Return the scale of a full dataset over this one."""
         render = lightfield.render
         lens = lightfield.lens
-        samples = full["samples"] or render["samples"]
+        assert isinstance(render.samples, int)
+        samples = full["samples"] or render.samples
         # If a target error decides, both are unknown until then.
-        denoise = render["denoise"] if full["denoise"] is None else full["denoise"]
+        denoise = render.denoise if full["denoise"] is None else full["denoise"]
         effort = cost_in_samples(samples, denoise)
         return cls(
             views=full["views"],
             samples=samples,
             pixels=math.prod(full["resolution"]) / (lens.width * lens.height),
-            effort=effort / cost_in_samples(render["samples"], render["denoise"]),
+            effort=effort / cost_in_samples(render.samples, render.denoise),
         )
 
 
@@ -435,12 +436,12 @@ def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) 
     """Describe the basis of an extrapolation from ``count`` views, and how far it reaches."""
     lens = lightfield.lens
     render = lightfield.render
-    denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render["denoise"] else ""
+    denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render.denoise else ""
     views = "view" if count == 1 else "views"
     device = "the processor" if by_processor else "a graphics card: hours are the machine's"
     text = (
         f"path tracing of {count} {views}: {lens.width} × {lens.height} pixels, "
-        f"{render['samples']} samples{denoising}; in proportion to pixels and samples; "
+        f"{render.samples} samples{denoising}; in proportion to pixels and samples; "
         f"on {device}; all else as measured, the part that every view needs in proportion to "
         "views and pixels"
     )

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import write_csv, write_json, write_text
+from lightfield.formats.render_block import RenderBlock
 from lightfield.imaging import plots
 from lightfield.measurement import advice, metrics, strata
 from lightfield.measurement.experiment import (
@@ -121,7 +122,7 @@ class Point:
 
 def measure(
     maker: Trials,
-    render: Mapping[str, Any],
+    render: RenderBlock,
     *,
     size: int,
     windows: int,
@@ -174,7 +175,7 @@ def measure(
     }
 
 
-def _all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[Method]:
+def _all_methods(render: RenderBlock, octaves: int, guiding: bool) -> list[Method]:
     """Return all methods to measure. The scene's own settings come last."""
     counts = [2**octave for octave in range(octaves + 1)]
     methods: list[Method] = []
@@ -186,7 +187,11 @@ def _all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list
     # In all other methods guiding stays as the .blend has it, which is usually off.
     if guiding:
         methods += [Method(_GUIDED, {"samples": n, "guiding": True}) for n in counts]
-    own_settings = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
+    own_settings = {
+        "samples": render.samples,
+        "adaptive_threshold": render.adaptive_threshold,
+        "denoise": render.denoise,
+    }
     return [*methods, Method(OWN, own_settings)]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.core.settings import Settings
+from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics
 from lightfield.measurement.costs import FullSize
 from lightfield.measurement.trials import Trial, Trials
@@ -121,7 +122,7 @@ def _blocks(pixels: NDArray[Any], block: int) -> Any:
 
 
 def check(
-    maker: Trials, device: str, render: Mapping[str, Any], full: Mapping[str, Mapping[str, Any]]
+    maker: Trials, device: str, render: RenderBlock, full: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
@@ -151,13 +152,9 @@ def check(
         "size": [small.width, small.height],
         "core_seconds": core * 1e6,
         "gpu_seconds": gpu * 1e6,
-        "samples": render["samples"],
+        "samples": render.samples,
         "hours": {
-            name: dataset["views"]
-            * math.prod(dataset["resolution"])
-            * render["samples"]
-            * gpu
-            / 3600
+            name: dataset["views"] * math.prod(dataset["resolution"]) * render.samples * gpu / 3600
             for name, dataset in full.items()
         },
     }

@@ -25,11 +25,12 @@ from lightfield.core.errors import UserError
 from lightfield.formats import passes
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.planning.sampling import PLAIN, calibrated, without_target
+from lightfield.planning.sampling import PLAIN, calibrated
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
@@ -114,10 +115,10 @@ class Trials:
     ) -> None:
         self.lens = lightfield.lens
         # Each trial sets its own samples, so a target error does not matter.
-        render = passes.without(without_target(lightfield.render))
+        render = lightfield.render.uncalibrated.without_passes
         if parts:
-            render["passes"] = [*passes.PARTS_OF_LIGHT, "material"]
-        self.lightfield = lightfield.changed(render=render)
+            render = render.changed(passes=[*passes.PARTS_OF_LIGHT, "material"])
+        self.lightfield = lightfield.changed(render=render.to_json())
         self._blend = blend
         self._inventory = inventory
         self._device = device
@@ -171,15 +172,17 @@ class Trials:
 
     def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
         """Render a window with the render settings changed by ``sampling``."""
-        settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
+        settings = self.lightfield.render.changed(**{**PLAIN, **sampling, "seed": seed})
         place = [window.x, window.y, window.width, window.height]
-        keyed = self.lightfield.changed(render=settings, device=self._renders_on, window=place)
+        keyed = self.lightfield.changed(
+            render=settings.to_json(), device=self._renders_on, window=place
+        )
         key = keys.render_key(keyed, window.view)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
             self._render(window, settings, path, key)
         image = images.read_image(path)
-        part_names = (*passes.PARTS_OF_LIGHT, *SURFACES) if "passes" in settings else ()
+        part_names = (*passes.PARTS_OF_LIGHT, *SURFACES) if settings.passes else ()
         return Trial(
             colour=image.colour,
             depth=image.channels.get("Z"),
@@ -242,7 +245,7 @@ class Trials:
             from lightfield.rendering import cycles
         return cycles.device_name(self._device)
 
-    def _render(self, window: Window, settings: Mapping[str, Any], path: Path, key: str) -> None:
+    def _render(self, window: Window, settings: RenderBlock, path: Path, key: str) -> None:
         with processors.only(self._threads):
             from lightfield.rendering import cycles
             from lightfield.rendering.colour_pass import render_colour
@@ -251,9 +254,9 @@ class Trials:
         if not self._started:
             self._start(settings)
         # Restore the .blend's settings that an earlier trial changed.
-        cycles.set_sampling({**self.inventory["sampling"], **settings})
+        cycles.set_sampling(RenderBlock(**{**self.inventory["sampling"], **settings.to_json()}))
         cycles.set_window(window.x, window.y, window.width, window.height)
-        seed = keys.view_seed(settings["seed"], window.view.name)
+        seed = keys.view_seed(settings.seed, window.view.name)
         raw = render_colour(window.view.matrix, seed, self.lightfield.passes)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
@@ -286,19 +289,19 @@ class Trials:
             channels[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
         return channels
 
-    def _start(self, settings: Mapping[str, Any]) -> None:
+    def _start(self, settings: RenderBlock) -> None:
         from lightfield.rendering import colour_pass, cycles
 
         self._on = cycles.set_up(
             self._blend,
             self.inventory,
-            self.lightfield.changed(render=settings),
+            self.lightfield.changed(render=settings.to_json()),
             self._device,
             self._threads,
         )
         colour_pass.watch_samples()
         # The first render also loads shared data, so it does not count.
-        cycles.set_sampling({**settings, "samples": 1, "denoise": True})
+        cycles.set_sampling(settings.changed(samples=1, denoise=True))
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
         colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
         self._started = True
@@ -313,8 +316,8 @@ def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
     lightfield = LightField.read(arguments.lightfield)
     if arguments.calibration:
         render = calibrated(lightfield.render, arguments.calibration)
-        lightfield = lightfield.changed(render=render)
-    elif "samples" not in lightfield.render:
+        lightfield = lightfield.changed(render=render.to_json())
+    elif lightfield.render.samples is None:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
             "give --calibration, the file that scripts/calibrate.py wrote for it"

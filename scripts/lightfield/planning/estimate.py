@@ -9,7 +9,6 @@ from statistics import fmean
 
 from lightfield.configuration.dataset_paths import DatasetPaths
 from lightfield.configuration.reprojections import LIGHT_GROUPS
-from lightfield.configuration.scene_source import FILE
 from lightfield.configuration.scene_yaml import Reprojection, SensorReprojection
 from lightfield.core.files import DAMAGE
 from lightfield.formats import light_groups, passes
@@ -63,7 +62,7 @@ class Estimate:
     @property
     def _sample_seconds(self) -> float:
         """Seconds that one core takes for a sample of a pixel."""
-        is_moving = bool(self.dataset.render.get("camera_motion"))
+        is_moving = self.dataset.render.camera_motion is not None
         return SECONDS_PER_SAMPLE * (1 + CAMERA_MOTION_PART if is_moving else 1)
 
     @cached_property
@@ -74,10 +73,10 @@ class Estimate:
         render = self.dataset.render
         pixel_bytes = 6 * (1 + self.light_group_count)
         pixel_bytes += sum(
-            each.bytes for each in passes.selected(render) if not passes.is_group(each)
+            each.bytes for each in render.selected_passes if not passes.is_group(each)
         )
         if self.dataset.depth:
-            pixel_bytes += {"float": 4, "rounded": 3, "half": 2}[render["depth_precision"]]
+            pixel_bytes += {"float": 4, "rounded": 3, "half": 2}[render.depth_precision]
         return self.dataset.pixels * pixel_bytes * COMPRESSED
 
     @property
@@ -103,7 +102,7 @@ class Estimate:
     @cached_property
     def light_group_count(self) -> int:
         """The number of light groups, by the scene YAML or the inventory, or as a guess."""
-        setting = self.dataset.render.get("light_groups")
+        setting = self.dataset.render.light_groups
         if setting is None:
             return 0
         names = light_groups.names_in(setting)
@@ -143,8 +142,8 @@ class Estimate:
         if inventory.is_file():
             scene = _scene_memory(inventory, inventory.stat().st_mtime_ns)
         # Before the calibration, assume that it will choose to denoise.
-        denoise = self.dataset.render.get("denoise", True)
-        return memory.needed(scene, pixels, denoise, self.light_group_count)
+        denoise = self.dataset.render.given_denoise
+        return memory.needed(scene, pixels, denoise is not False, self.light_group_count)
 
     @property
     def view_memory_bytes(self) -> int:
@@ -212,14 +211,15 @@ class Estimate:
 
         The bounds of shards depend on it, and must depend only on the configuration.
         """
-        samples = self.dataset.render.get("samples", FILE)
-        limit = self.dataset.render.get("most_samples", _GUESSED_SAMPLES)
-        return min(limit, _GUESSED_SAMPLES) if samples == FILE else int(samples)
+        render = self.dataset.render
+        if isinstance(render.samples, int):
+            return render.samples
+        return min(render.most_samples or _GUESSED_SAMPLES, _GUESSED_SAMPLES)
 
     @property
     def _cost_samples(self) -> float:
         """A pixel's cost in samples, with denoising, by the calibration if it has run."""
-        denoising = DENOISING_SAMPLES if self.dataset.render.get("denoise") else 0
+        denoising = DENOISING_SAMPLES if self.dataset.render.denoise else 0
         if not isinstance(self.dataset.calibration, str):
             return self._planned_samples + denoising
         try:
@@ -252,7 +252,7 @@ class Estimate:
             return None
         try:
             probe = json.loads(path.read_bytes())
-            samples = dataset.render.get("samples", probe["samples"])
+            samples = dataset.render.samples or probe["samples"]
             planned = [list(dataset.rig.camera.resolution), samples]
             if probe["device"] == "CPU" and planned == [probe["resolution"], probe["samples"]]:
                 seconds = fmean(probe["view_seconds"])

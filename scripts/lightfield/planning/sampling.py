@@ -2,15 +2,12 @@
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from lightfield.core.files import read_keys, reading
+from lightfield.formats.render_block import RenderBlock
 from lightfield.planning.unit_costs import DENOISING_SAMPLES
-
-# Keys of a `render` block that only its calibration reads: the target error, and a preset's limits.
-_UNCALIBRATED = ("target_error", "most_samples", "denoise")
 
 # A calibration renders this many windows of views, and as many held-out ones.
 PROBES = 16
@@ -39,20 +36,14 @@ def cost_in_samples(samples: float, denoise: bool) -> float:
     return samples + DENOISING_SAMPLES * denoise
 
 
-def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
+def calibrated(render: RenderBlock, path: Path) -> RenderBlock:
     """Return a ``render`` block with calibrate.py's choice for its target error.
 
     Raises `UserError` if the file at ``path`` is not a calibration.
     """
     record = read_keys(path, "calibrate.py", "target_error", "choice")
     with reading(path, "calibration"):
-        target = {"target_error": record["target_error"]}
-        return {**without_target(render), **target, **record["choice"]}
-
-
-def without_target(render: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block without the keys that only its calibration reads."""
-    return {key: value for key, value in render.items() if key not in _UNCALIBRATED}
+        return render.uncalibrated.changed(target_error=record["target_error"], **record["choice"])
 
 
 def standard_error(values: Sequence[float]) -> float:

@@ -12,6 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import AOV_PREFIX, GROUP_PREFIX, Pass
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import (
     animation,
@@ -76,7 +77,7 @@ def set_up(
     # A marker may choose the artist's camera at this frame. Remove all markers' cameras afterwards.
     frames.go_to(lightfield.frame)
     ids.assign({"object" if kind == "instance" else kind for kind in numbered})
-    focused = scene.camera if lightfield.render.get("depth_of_field") else None
+    focused = scene.camera if lightfield.render.depth_of_field else None
     file_camera = scene.camera
     if file_camera and lightfield.content.get("scene", {}).get("followed_camera") == FILE:
         followed_camera.freeze(file_camera)
@@ -89,7 +90,7 @@ def set_up(
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
     surfaces.set_up(view_layer(scene), passes)
-    if groups := lightfield.render.get("light_groups"):
+    if groups := lightfield.render.emitters_of_groups:
         light_groups.set_up(view_layer(scene), groups)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
@@ -112,7 +113,7 @@ def set_up(
     if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
-    moving_camera.set_up(lightfield.render.get("camera_motion"))
+    moving_camera.set_up(lightfield.render.camera_motion)
     return str(scene.cycles.device)
 
 
@@ -123,8 +124,8 @@ def _hide_empty_point_clouds() -> None:
             obj.hide_render = True
 
 
-def _set_quality(settings: Mapping[str, Any]) -> None:
-    """Apply a scene YAML's ``render`` block. All else stays as in the .blend."""
+def _set_quality(settings: RenderBlock) -> None:
+    """Apply a dataset's ``render`` block. All else stays as in the .blend."""
     set_sampling(settings)
     cycles = bpy.context.scene.cycles
     cycles.use_animated_seed = False
@@ -137,11 +138,11 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     # Culling would leave other objects out of each view, and out of its reflections and shadows.
     cycles.use_camera_cull = False
     cycles.use_distance_cull = False
-    if "filter_width" in settings:
-        cycles.filter_width = settings["filter_width"]
+    if settings.filter_width is not None:
+        cycles.filter_width = settings.filter_width
     motion_blur.centre()
-    if "motion_blur" in settings:
-        motion_blur.turn(settings["motion_blur"])
+    if settings.motion_blur is not None:
+        motion_blur.turn(settings.motion_blur)
 
 
 def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
@@ -204,23 +205,24 @@ def pass_property(layer: Any, name: str) -> tuple[Any, str]:
     return owner, f"use_pass_{short}"
 
 
-def set_sampling(settings: Mapping[str, Any]) -> None:
-    """Set sampling and denoising, by the keys of a ``render`` block."""
+def set_sampling(settings: RenderBlock) -> None:
+    """Set sampling and denoising, by a ``render`` block."""
     cycles = bpy.context.scene.cycles
-    cycles.samples = settings["samples"]
-    cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
-    cycles.adaptive_threshold = settings["adaptive_threshold"]
-    cycles.use_denoising = settings["denoise"]
+    cycles.samples = settings.samples
+    cycles.use_adaptive_sampling = settings.adaptive_threshold > 0
+    cycles.adaptive_threshold = settings.adaptive_threshold
+    cycles.use_denoising = settings.denoise
     # The scene decides. A view layer may leave denoising out on its own.
     view_layer(bpy.context.scene).cycles.use_denoising = True
     cycles.denoiser = "OPENIMAGEDENOISE"
     # Denoise with albedo and normals, which are denoised themselves first.
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
-    cycles.denoising_prefilter = settings.get("denoise_prefilter", "accurate").upper()
-    cycles.denoising_quality = settings.get("denoise_quality", "high").upper()
+    cycles.denoising_prefilter = (settings.denoise_prefilter or "accurate").upper()
+    cycles.denoising_quality = (settings.denoise_quality or "high").upper()
     for name, attribute in SAMPLING.items():
-        if name in settings:
-            setattr(cycles, attribute, settings[name])
+        value = getattr(settings, name)
+        if value is not None:
+            setattr(cycles, attribute, value)
 
 
 def sampling() -> dict[str, Any]:

@@ -1,38 +1,38 @@
 """Places the camera for the next view: still, or moving while the shutter is open."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import bpy
 import mathutils
 import numpy as np
 
+from lightfield.formats.render_block import CameraMotion
 from lightfield.geometry.exposure import pose_at
 from lightfield.rendering import frames, motion_blur
 
 Array = np.ndarray[Any, Any]
 
 # The motion of the current light field's camera. Empty if it stands still.
-_motion: dict[str, Any] = {}
+_motions: list[CameraMotion] = []
 
 
-def set_up(motion: Mapping[str, Any] | None) -> None:
-    """Blur the following views by the camera's ``motion``, the block of a scene YAML.
+def set_up(motion: CameraMotion | None) -> None:
+    """Blur the following views by the camera's ``motion``.
 
     Objects are blurred only if they were before. Cycles must be set up for all else.
     """
-    _motion.clear()
+    _motions.clear()
     if motion is None:
         return
-    _motion.update(motion)
+    _motions.append(motion)
     scene = bpy.context.scene
     if not motion_blur.is_on():
         for obj in bpy.data.objects:
             obj.cycles.use_motion_blur = obj == scene.camera
     motion_blur.turn(True)
-    if "rolling" in motion:
+    if motion.rolling is not None:
         scene.cycles.rolling_shutter_type = "TOP"
-        scene.cycles.rolling_shutter_duration = motion["rolling"]
+        scene.cycles.rolling_shutter_duration = motion.rolling
     scene.camera.rotation_mode = "QUATERNION"
 
 
@@ -43,17 +43,17 @@ def place_camera(world_matrix: Array) -> None:
     """
     scene = bpy.context.scene
     camera = scene.camera
-    if not _motion:
+    if not _motions:
         camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
         return
     middle = np.asarray(world_matrix, np.float64)
-    travel, turn = _motion["travel"], _motion["turn"]
+    (motion,) = _motions
     render = scene.render
     # Blender remaps frames before it reads keys.
     shutter = render.motion_blur_shutter * render.frame_map_old / render.frame_map_new
     # The keys have the same frames for each view, so they replace those of the view before.
     for time in (-0.5, 0.0, 0.5):
-        pose = mathutils.Matrix(pose_at(middle, travel, turn, time).tolist())
+        pose = mathutils.Matrix(pose_at(middle, motion.travel, motion.turn, time).tolist())
         rotation = pose.to_quaternion()
         if time > -0.5:
             rotation.make_compatible(camera.rotation_quaternion)

@@ -40,7 +40,7 @@ def measure(
     return {
         "views": len(views),
         "resolution": [lens.width, lens.height],
-        "samples": lightfield.render["samples"],
+        "samples": lightfield.render.samples,
         "device": run.start["device"],
         "view_seconds": [view[time_key] * factor for view in run.later_views],
         "view_bytes": [size * factor for size in sizes],

@@ -70,7 +70,7 @@ def render(
     Raises `UserError` if the scene cannot be opened, if the ``device`` is missing, or if a file
     cannot be written.
     """
-    images.check_codec(lightfield.render.get("compression", "zip"))
+    images.check_codec(lightfield.render.compression or "zip")
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
     shard_journal = Journal(journal)
@@ -163,7 +163,7 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     The inventory has the measured memory of the scene.
     """
     lens = lightfield.lens
-    denoise = lightfield.render["denoise"]
+    denoise = lightfield.render.denoise
     scene = inventory.get("memory_bytes", 0)
     groups = len(lightfield.light_groups)
     needed = memory.needed(scene, lens.width * lens.height, denoise, groups)
@@ -285,7 +285,7 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     if has_geometry:
         geometry = render_geometry(view.matrix, "motion" in names, "instance" in names, catches)
     geometry_seconds = time.perf_counter() - began
-    seed = keys.view_seed(lightfield.render["seed"], view.name)
+    seed = keys.view_seed(lightfield.render.seed, view.name)
     colour = render_colour(view.matrix, seed, view_passes, lightfield.transparent)
     unshown_pixels = None
     if catches:
@@ -308,10 +308,10 @@ class _ViewFiles:
         self.depth_rays = depth_rays(lightfield)
         if lightfield.transparent:
             self.pixels_without_ray = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0])
-        self.compression = lightfield.render.get("compression", "zip")
+        self.compression = lightfield.render.compression or "zip"
         self.attributes = {
             images.BPY_ATTRIBUTE: version("bpy"),
-            images.MACHINE_ATTRIBUTE: machine(lightfield.render["denoise"]),
+            images.MACHINE_ATTRIBUTE: machine(lightfield.render.denoise),
         }
 
     def write(self, view: View, rendered: _Rendered) -> None:
@@ -412,4 +412,4 @@ def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | Non
         z = depth.distance_from_z(z, rays)
     # Outside the image circle there is no ray, and a pixel without a ray hits nothing.
     z = np.where(np.isnan(z), np.inf, z)
-    return depth.with_precision(z, lightfield.render["depth_precision"])
+    return depth.with_precision(z, lightfield.render.depth_precision)

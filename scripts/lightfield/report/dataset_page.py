@@ -182,10 +182,10 @@ def facts(
     parts = [view.split for view in lightfield.views]
     counts = [f"{parts.count(part)} {part}" for part in dict.fromkeys(parts) if part]
     # Imported views have no known samples.
-    samples = f"{render['samples']} per pixel" if "samples" in render else None
-    if render.get("adaptive_threshold"):
+    samples = f"{render.samples} per pixel" if render.samples else None
+    if render.adaptive_threshold:
         samples = f"up to {samples}, adaptive"
-    if render.get("denoise"):
+    if render.denoise:
         samples = f"{samples}, denoised"
     exrs = list((folder / IMAGES).glob("*.exr"))
     first = folder / IMAGES / f"{lightfield.views[0].name}.exr"

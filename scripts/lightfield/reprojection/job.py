@@ -155,9 +155,7 @@ class Job:
     @property
     def depth_precision(self) -> str:
         """The precision of the source's float depth, by its lightfield.json."""
-        # Other programs' lightfield.json has no such key.
-        render = self.lightfield.content.get("render", {})
-        return str(render.get("depth_precision", "float"))
+        return self.lightfield.known_render.depth_precision
 
     @cached_property
     def _numbers(self) -> dict[str, int]:

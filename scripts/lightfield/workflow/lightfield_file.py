@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
-from lightfield.formats import light_groups, passes, published
+from lightfield.formats import light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
+from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 
 
@@ -33,37 +33,38 @@ def from_settings(
         capture = capture.of_model(model)
     elif capture.source.model:
         raise UserError("--model: is missing; scripts/import_model.py writes it")
-    render = capture.render
     if settings.panorama_width:
-        capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
-        render = passes.without(render)
-    else:
-        render = _with_groups(render, inventory)
+        capture = replace(
+            capture,
+            rig=panorama_rig(capture.rig, settings.panorama_width),
+            render=capture.render.without_passes,
+        )
+    elif capture.render.light_groups is not None:
+        capture = replace(capture, render=_with_groups(capture.render, inventory))
     if isinstance(capture.rig, rigs.Random):
         if places is None:
             raise UserError("--places: is missing; scripts/free_places.py writes it")
         capture = replace(capture, rig=capture.rig.placed(places))
-    keys = capture.origin(render)
+    keys = capture.origin
     # Imported views were rendered on another machine.
     if capture.imported:
         assert isinstance(capture.rig, rigs.Poses)
         if unused_keys := published.unused_keys(capture.rig):
             print(f"note: {capture.rig.file}: is imported without {', '.join(unused_keys)}")
     else:
-        keys[MACHINE] = machine.describe(render["denoise"])
+        keys[MACHINE] = machine.describe(capture.render.denoise)
     lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
     if settings.flow:
         lightfield = lightfield.with_flow()
-    if "camera_motion" in lightfield.render:
+    if capture.render.camera_motion:
         lightfield = lightfield.with_exposure()
     return lightfield
 
 
-def _with_groups(render: dict[str, Any], inventory: Path | None) -> dict[str, Any]:
+def _with_groups(render: RenderBlock, inventory: Path | None) -> RenderBlock:
     """Return a ``render`` block with the emitters of each light group, by the scene's inventory."""
-    if "light_groups" not in render:
-        return render
+    assert render.light_groups is not None
     if inventory is None:
         raise UserError("--inventory: is missing; scripts/inventory.py names the light groups")
     emitters = read_inventory(inventory, "emitters")["emitters"]
-    return {**render, "light_groups": light_groups.resolved(render["light_groups"], emitters)}
+    return render.changed(light_groups=light_groups.resolved(render.light_groups, emitters))

@@ -9,11 +9,12 @@ from lightfield.configuration.config_file import Configuration, Preset
 from lightfield.configuration.description import Cluster
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
-from lightfield.configuration.render_settings import CHOSEN, Render, TargetError
+from lightfield.configuration.render_settings import CHOSEN, Render
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
 from lightfield.core.names import VIEWS
 from lightfield.formats import published
+from lightfield.formats.render_block import RenderBlock, TargetError
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
@@ -280,7 +281,7 @@ def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
     return rig
 
 
-def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str, Any]:
+def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> RenderBlock:
     """Return the ``render`` block under a preset's ``limits``.
 
     With a ``target_error``, the calibration will choose samples, threshold and denoising. The
@@ -308,7 +309,7 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
         content["target_error"] = render.target_error.value
         if render.target_error.denoise == "never":
             content["denoise"] = False
-    return content
+    return RenderBlock(**content)
 
 
 def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
