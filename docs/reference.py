@@ -33,6 +33,7 @@ from lightfield.configuration import (
 )
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.json_schema import Generator
+from lightfield.core import flags
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.core.names import ROOT, SEQUENCE_EXPORTS
@@ -45,6 +46,9 @@ from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
 from lightfield.measurement.costs import CostSettings, FullSize
 from lightfield.measurement.gpu_check import GpuCheckSettings
+from lightfield.stages import rig as rig_stages
+from lightfield.stages import scene as scene_stages
+from lightfield.stages.registry import BY_NAME
 
 PROGRAMS = ROOT / "scripts"
 NOTE = "<!-- Written by docs/reference.py. Change the models or the programs instead. -->"
@@ -124,7 +128,7 @@ KEY_PAGES: dict[str, Page] = {
             # The other programs' settings files fill a page of their own.
             Section(
                 "The settings file of import_model.py",
-                job_settings.ImportSettings,
+                scene_stages.ImportSettings,
                 scene_source.ModelOptions,
             ),
         ],
@@ -236,9 +240,9 @@ KEY_PAGES: dict[str, Page] = {
         "config.yaml. Snakemake writes these files in its plan, and the programs read them with "
         "`--settings`. You can also write one by hand.",
         [
-            Section("build_scene.py", job_settings.BuildSettings),
+            Section("build_scene.py", scene_stages.BuildSettings),
             Section("make_lightfield.py", LightfieldSettings),
-            Section("free_places.py", job_settings.FreePlacesSettings),
+            Section("free_places.py", rig_stages.FreePlacesSettings),
             Section("surface.py", job_settings.MeshSettings),
             Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
@@ -565,7 +569,11 @@ def parser_of(program: Path) -> argparse.ArgumentParser:
 def section_of_program(name: str) -> list[str]:
     """Return the lines about one program."""
     file = PROGRAMS / f"{name}.py"
-    parser = parser_of(file)
+    if name in BY_NAME:
+        description = ast.get_docstring(ast.parse(file.read_text()))
+        parser = flags.parser_of(BY_NAME[name], description)
+    else:
+        parser = parser_of(file)
     text = (parser.description or ast.get_docstring(ast.parse(file.read_text())) or "").strip()
     lines = [f"## {file.name}", ""]
     for paragraph in text.split("\n\n"):
@@ -586,7 +594,8 @@ def row_of(action: argparse.Action) -> str:
     flags = ", ".join(f"`{flag}`" for flag in action.option_strings)
     is_required = action.required and action.nargs not in ("?", "*")
     default = "required" if is_required else "–"
-    value = action.default
+    given = re.search(r" \(default: ([^)]*)\)$", action.help or "")
+    value = given[1] if action.default == argparse.SUPPRESS and given else action.default
     has_default = isinstance(value, str | int | float | Path) and value is not False
     if not is_required and has_default and value != argparse.SUPPRESS:
         shown = value.relative_to(ROOT) if _is_inside(value) else value

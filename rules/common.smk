@@ -38,10 +38,7 @@ from lightfield.configuration.description import Cluster
 from lightfield.configuration.exports import MANIFEST, InstantNgp, export_settings_of
 from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.configuration.job_settings import (
-    BuildSettings,
     FiguresSettings,
-    FreePlacesSettings,
-    ImportSettings,
     Measurement,
     MeshSettings,
     PackSettings,
@@ -50,6 +47,8 @@ from lightfield.configuration.job_settings import (
     SynthesisSettings,
     ValidationSettings,
 )
+from lightfield.stages.rig import FreePlacesSettings
+from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.loading import (
     chosen_families,
     family_folder,

@@ -13,9 +13,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.configuration.job_settings import ImportSettings
 from lightfield.rendering import blend_file, cycles, model
 from lightfield.rendering.quiet import quiet
+from lightfield.stages.scene import ImportSettings
 from scenes.library.scene import Scene
 from scenes.library.shapes import box, transform
 

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import sys
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.metadata import version
@@ -14,6 +13,8 @@ from lightfield.configuration import config_file, scene_yaml
 from lightfield.core import download, names
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
+from lightfield.core.stage import NoSettings
+from lightfield.stages.scene import CheckBlend
 from lightfield.workflow.loading import load_datasets, scene_datasets
 from lightfield.workflow.presence import check_presence
 
@@ -206,54 +207,50 @@ def scene(tmp_path, monkeypatch):
     return write
 
 
-def check(monkeypatch, blend, scene="own"):
-    import check_blend
-
+def check(blend, scene="own"):
     output = blend.with_suffix(".json")
     output.unlink(missing_ok=True)
-    arguments = ["check_blend.py", "--scene", scene, "--blend", blend, "--output", output]
-    monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
-    check_blend.main()
+    CheckBlend(settings=NoSettings(), scene=scene, blend=blend, output=output).run()
     return json.loads(output.read_text())
 
 
-def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monkeypatch):
+def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene):
     blend = scene()
     blend.write_bytes(CONTENT)
     assert scene_datasets("own")[0].source.sha256 is None
-    assert check(monkeypatch, blend)["sha256"] == SUM
+    assert check(blend)["sha256"] == SUM
     lock = blend.with_name("own.lock.json")
     assert json.loads(lock.read_text())["sha256"] == SUM
     assert scene_datasets("own")[0].source.sha256 == SUM
-    check(monkeypatch, blend)
+    check(blend)
     blend.write_bytes(CONTENT[1:])
     with pytest.raises(UserError) as caught:
-        check(monkeypatch, blend)
+        check(blend)
     for part in (str(blend), sha256(blend), SUM, f"to take the new file, delete {lock}"):
         assert part in str(caught.value)
     assert json.loads(lock.read_text())["sha256"] == SUM
     lock.unlink()
-    assert check(monkeypatch, blend)["sha256"] == sha256(blend)
+    assert check(blend)["sha256"] == sha256(blend)
     assert json.loads(lock.read_text())["sha256"] == sha256(blend)
     lock.write_text("{}")
     with pytest.raises(UserError, match=r"own\.lock\.json: sha256: is missing"):
-        check(monkeypatch, blend)
+        check(blend)
 
 
-def test_a_built_scene_has_no_file_to_check(monkeypatch, tmp_path):
+def test_a_built_scene_has_no_file_to_check(tmp_path):
     (tmp_path / "any.blend").write_bytes(CONTENT)
     with pytest.raises(UserError, match=r"--scene smoke: does not use a \.blend"):
-        check(monkeypatch, tmp_path / "any.blend", "smoke")
+        check(tmp_path / "any.blend", "smoke")
 
 
-def test_a_downloads_checksum_is_checked_and_needs_no_lock(scene, monkeypatch):
+def test_a_downloads_checksum_is_checked_and_needs_no_lock(scene):
     blend = scene(more=f", url: 'https://example.org/own.blend', sha256: {SUM}")
     blend.write_bytes(CONTENT)
-    check(monkeypatch, blend)
+    check(blend)
     assert not blend.with_name("own.lock.json").exists()
     blend.write_bytes(b"another")
     with pytest.raises(UserError, match=rf"{sha256(blend)}, but .*own\.yaml says {SUM}"):
-        check(monkeypatch, blend)
+        check(blend)
 
 
 def test_a_missing_file_gives_the_page_and_the_place(scene):

@@ -17,7 +17,7 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
-from lightfield.workflow import lightfield_file
+from lightfield.rendering import lightfield_file
 from lightfield.workflow.loading import datasets_of
 
 CASES = [

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from conftest import SCRIPTS
 
-from lightfield.configuration.job_settings import ImportSettings
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
+from lightfield.stages.scene import ImportSettings
 
 
 def chunk(kind, content):

@@ -165,8 +165,8 @@ def test_an_animated_model_is_measured_at_its_frame(renders, name):
 def imported(path, **settings):
     """Import a model into the open scene, and return its record."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
+    from lightfield.stages.scene import ImportSettings
 
     return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
 
@@ -387,8 +387,8 @@ BROKEN = [
 def refusal(path, folder, **settings):
     """Return the message with which the import of a model is refused."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
+    from lightfield.stages.scene import ImportSettings
 
     with pytest.raises(UserError) as caught:
         model.make_scene(ImportSettings(model=str(path), **settings), folder)
@@ -444,8 +444,8 @@ def test_a_missing_texture_is_named(renders, tmp_path, name):
 
 
 def test_a_missing_texture_may_be_allowed(renders, tmp_path):
-    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
+    from lightfield.stages.scene import ImportSettings
 
     shutil.copy(renders.folder / "shape.obj", tmp_path)
     settings = ImportSettings(model=str(tmp_path / "shape.obj"), allow_missing=True)
@@ -467,8 +467,8 @@ def test_metres_beyond_blenders_precision_are_refused(tmp_path):
     "name", ["a b'c.obj", "stühle—椅.obj", "$(id).OBJ", "-rf.obj", "a" * 200 + ".obj"]
 )
 def test_odd_names_of_files_are_imported(tmp_path, name):
-    from lightfield.configuration.job_settings import ImportSettings
     from lightfield.rendering import model
+    from lightfield.stages.scene import ImportSettings
 
     settings = ImportSettings(model=str(written(tmp_path / name, TRIANGLE)))
     assert model.make_scene(settings, tmp_path)["external_files"][0]["path"] == name

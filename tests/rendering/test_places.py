@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from lightfield.configuration import keys
-from lightfield.configuration.job_settings import BuildSettings
 from lightfield.configuration.keys import scene_fingerprint
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core import names
+from lightfield.stages.scene import BuildSettings
 from scenes.barbershop.plan import SIZES
 from scenes.library.variation import Draw
 

@@ -5,109 +5,21 @@ file with --settings. The settings of light fields are in `lightfield.configurat
 Reprojections and exports have modules of their own.
 """
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, PlainSerializer, model_validator
+from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.family import Draw, Member
-from lightfield.configuration.keys import import_version
 from lightfield.configuration.scene_source import (
     FILE,
-    MODEL_KEYS,
-    ModelOptions,
-    ModelPath,
-    Parameters,
-    SceneSource,
-    SharedFolder,
-    check_model,
 )
 from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.core.names import builders
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings, read_settings
-from lightfield.geometry.rigs import AnyRig, Random, as_written
+from lightfield.geometry.rigs import AnyRig, as_written
 from lightfield.geometry.rigs.rig import Frame
-
-
-def _known_builder(name: str) -> str:
-    if name not in builders():
-        raise ValueError(f"must be one of {', '.join(builders())}")
-    return name
-
-
-def _places_as_written(rig: Random) -> dict[str, Any]:
-    """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
-    return {key: value for key, value in as_written(rig).items() if key not in _CAMERA_KEYS}
-
-
-# The keys of a rig that say what a camera sees and what its view is for.
-_CAMERA_KEYS = ("camera", "split")
-
-
-class BuildSettings(Settings):
-    """The settings of scripts/build_scene.py."""
-
-    builder: Annotated[str, AfterValidator(_known_builder)] = Field(
-        description="Name of the builder, which is a folder in scripts/scenes/."
-    )
-    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
-    fingerprint: str | None = Field(
-        None, description="Hash of the builder's code. If it changes, the scene is built again."
-    )
-
-
-class ImportSettings(ModelOptions):
-    """The settings of scripts/import_model.py."""
-
-    model: ModelPath = Field(description="Path of the model file.")
-    frame: Frame = Field(
-        1, description="Frame of the animation at which the size of the model is measured."
-    )
-    allow_missing: bool = Field(
-        False, description="Import the model even if files that it names are missing."
-    )
-    shared_folder: SharedFolder | None = Field(
-        None, description="Folder with files that the model may name, beside its own folder."
-    )
-    version: int | None = Field(
-        None, description="Version of the importer. If it changes, the model is imported again."
-    )
-    bpy: str | None = Field(
-        None, description="Version of Blender. If it changes, the job runs again."
-    )
-
-    @classmethod
-    def of_source(cls, source: SceneSource) -> Self:
-        """Return the settings that import the model of a scene's ``source``."""
-        keys = {"model", "frame", "allow_missing", "shared_folder", *MODEL_KEYS}
-        return cls(
-            **source.model_dump(include=keys, exclude_none=True),
-            version=import_version(source.light),
-            bpy=version("bpy"),
-        )
-
-    @model_validator(mode="after")
-    def _up_is_unknown(self) -> Self:
-        check_model(self.model, self.up)
-        return self
-
-
-class FreePlacesSettings(Settings):
-    """The settings of scripts/free_places.py."""
-
-    rig: Annotated[Random, PlainSerializer(_places_as_written)] = Field(
-        description="The rig's block in the scene YAML, without camera and split."
-    )
-    frame: Frame | Literal["file"] = Field(
-        1, description=f"Frame to load. {FILE}: the .blend's own."
-    )
-    scene_name: str | None = Field(None, description="As in the scene YAML.")
-    view_layers: Literal["all"] | list[str] | None = Field(
-        None, description="As in the scene YAML."
-    )
 
 
 class MeshSettings(Settings):

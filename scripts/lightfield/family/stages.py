@@ -15,33 +15,24 @@ from lightfield import export
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
 from lightfield.configuration.family import SOURCES
-from lightfield.configuration.job_settings import (
-    BatchSettings,
-    BuildSettings,
-    FreePlacesSettings,
-    ImportSettings,
-)
+from lightfield.configuration.job_settings import BatchSettings
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.names import VIEWS
+from lightfield.core.stage import NoSettings
 from lightfield.export import MANIFESTS, instant_ngp
 from lightfield.formats.layout import SUMS, write_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
-from lightfield.rendering import (
-    built_scene,
-    camera_files,
-    inventory_file,
-    model,
-    shard,
-)
+from lightfield.rendering import inventory_file, shard
 from lightfield.reprojection import flags, pipeline
 from lightfield.reprojection.job import Job
+from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
+from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
 from lightfield.validation.validate import validate
-from lightfield.workflow import lightfield_file
 from lightfield.workflow.dataset import Dataset
 
 
@@ -108,13 +99,16 @@ class Stages:
         if source.builder:
             with self._stage("build_scene"):
                 settings = BuildSettings(builder=source.builder, parameters=source.parameters)
-                built_scene.write(settings, self.blend)
+                BuildScene(settings=settings, output=self.blend).run()
         else:
             assert self.model_record
             with self._stage("import_model"):
-                sources = self.model_record.with_name(SOURCES)
-                options = ImportSettings.of_source(source)
-                model.write(options, self.blend, self.model_record, sources)
+                ImportModel(
+                    settings=ImportSettings.of_source(source),
+                    output=self.blend,
+                    record=self.model_record,
+                    sources=self.model_record.with_name(SOURCES),
+                ).run()
         with self._stage("inventory"):
             inventory_file.write_of_datasets(
                 self.blend, self.written, self.datasets, self.inventory, measures_memory=False
@@ -122,25 +116,28 @@ class Stages:
 
     def _place_cameras(self, dataset: Dataset) -> None:
         places = Path(str(dataset.places)) if dataset.places else None
+        lightfield = Path(dataset.folder, "lightfield.json")
         if places:
             with self._stage("free_places"):
                 settings = FreePlacesSettings.of(rig=dataset.rig, frame=dataset.source.frame)
-                camera_files.write_places(self.blend, settings, None, places)
+                FreePlaces(settings=settings, blend=self.blend, output=places).run()
         with self._stage("lightfield"):
             capture = LightfieldSettings.of_capture(dataset)
             capture = capture.model_copy(update={"scene": self.name})
-            inventory = self.inventory if dataset.lightfield_inventory else None
-            lightfield = lightfield_file.from_settings(
-                capture, inventory, self.model_record, places
-            )
-            lightfield.write(Path(dataset.folder, "lightfield.json"))
+            MakeLightfield(
+                settings=capture,
+                inventory=self.inventory if dataset.lightfield_inventory else None,
+                model=self.model_record,
+                places=places,
+                output=lightfield,
+            ).run()
         with self._stage("check_cameras"):
-            camera_files.write_clearance(
-                self.blend,
-                Path(dataset.folder, "lightfield.json"),
-                None,
-                Path(str(dataset.cameras)),
-            )
+            CheckCameras(
+                settings=NoSettings(),
+                blend=self.blend,
+                lightfield=lightfield,
+                output=Path(str(dataset.cameras)),
+            ).run()
 
     def _render(self, dataset: Dataset) -> None:
         with self._stage("render"):

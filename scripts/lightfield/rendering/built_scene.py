@@ -1,17 +1,16 @@
 """Builds a scene with one of the builders in scripts/scenes/."""
 
 import importlib
-from pathlib import Path
 
-from lightfield.configuration.job_settings import BuildSettings
 from lightfield.core.files import atomic_path
 from lightfield.rendering import blend_file
+from lightfield.stages.scene import BuildScene
 
 
-def write(settings: BuildSettings, output: Path) -> None:
-    """Build the scene of the settings, and save it as the .blend ``output``."""
-    builder = importlib.import_module(f"scenes.{settings.builder}")
+def build(job: BuildScene) -> None:
+    """Build the scene of the settings, and save it as a .blend."""
+    builder = importlib.import_module(f"scenes.{job.settings.builder}")
     blend_file.new_scene()
-    builder.build(settings.parameters.model_dump())
-    with atomic_path(output) as temporary:
+    builder.build(job.settings.parameters.model_dump())
+    with atomic_path(job.output) as temporary:
         blend_file.save_scene(temporary)

@@ -1,4 +1,4 @@
-"""Writes the inventory of a .blend: scripts/inventory.py's work."""
+"""Writes the inventory of a .blend: what it contains, and what its rendering can leave out."""
 
 import os.path
 import sys
@@ -26,19 +26,20 @@ from lightfield.rendering import (
     simulations,
 )
 from lightfield.rendering.inventory import FEATURES, inventory
+from lightfield.stages.scene import Inventory
 from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import rendered_frames, scene_datasets
 from lightfield.workflow.view_store import ViewStore
 
 
-def write(path: Path, scene: str | None, output: Path) -> None:
-    """Write the inventory of the .blend at ``path``, and print warnings and a summary.
+def make(job: Inventory) -> None:
+    """Write the inventory of a .blend, and print warnings and a summary.
 
-    ``scene`` names a file in configs/scenes/ that uses it. Raises `UserError` for a scene that
-    cannot be rendered.
+    Raises `UserError` for a scene that cannot be rendered.
     """
-    written = scene_yaml.load_scene(scene) if scene else None
-    write_of_datasets(path, written, scene_datasets(scene) if scene else [], output)
+    written = scene_yaml.load_scene(job.scene) if job.scene else None
+    datasets = scene_datasets(job.scene) if job.scene else []
+    write_of_datasets(job.blend, written, datasets, job.output)
 
 
 def write_of_datasets(
@@ -48,7 +49,7 @@ def write_of_datasets(
     output: Path,
     measures_memory: bool = True,
 ) -> None:
-    """Write the inventory of the .blend of some ``datasets``, as `write` does.
+    """Write the inventory of the .blend of some ``datasets``, as `make` does.
 
     ``written`` is their scene YAML. The measurement of memory starts a process of its own. Without
     it, the inventory does not say how much the scene takes.

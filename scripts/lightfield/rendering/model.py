@@ -13,10 +13,9 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from lightfield.configuration.job_settings import ImportSettings
 from lightfield.configuration.keys import model_fingerprint
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, listed, write_json
+from lightfield.core.files import atomic_path, keep_apart, listed, write_json
 from lightfield.core.names import UP
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging.images import is_readable
@@ -25,6 +24,7 @@ from lightfield.rendering.model_references import Reference, printable, refuse_o
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
+from lightfield.stages.scene import ImportModel, ImportSettings
 
 # Of each importer, what is not its default. Cameras and lamps are removed in any case.
 _OPTIONS: dict[str, dict[str, Any]] = {
@@ -55,22 +55,20 @@ _TOLERANCE = 0.01
 Box = NDArray[np.float64]
 
 
-def write(
-    settings: ImportSettings, output: Path, record: Path, sources: Path | None = None
-) -> dict[str, Any]:
-    """Make a scene of a model, save it as a .blend, and write and return the import's record.
+def import_model(job: ImportModel) -> None:
+    """Make a scene of a model, save it as a .blend, and write the record of the import.
 
-    ``sources`` is a JSON to write as soon as the files that the model names are known. It lists
-    them also if the model is refused, as when one is missing. Raises `UserError` as `make_scene`
-    does.
+    Raises `UserError` as `make_scene` does.
     """
-    content = make_scene(settings, output.parent, sources)
-    with atomic_path(output) as temporary:
+    model = job.settings.model
+    keep_apart("--record", job.record, Path(model))
+    content = make_scene(job.settings, job.output.parent, job.sources)
+    with atomic_path(job.output) as temporary:
         blend_file.save_scene(temporary)
-    write_json(record, content)
+    write_json(job.record, content)
     if content["left_out"]:
-        print(f"note: {settings.model}: left out: {'; '.join(content['left_out'])}")
-    return content
+        print(f"note: {model}: left out: {'; '.join(content['left_out'])}")
+    print(f"{model}: {summary(content)}")
 
 
 def make_scene(
@@ -78,9 +76,11 @@ def make_scene(
 ) -> dict[str, Any]:
     """Make a scene of a model in the open file. Return the record of the import.
 
-    ``folder`` is where the .blend will be. ``sources`` is that of `write`. The record has the
-    ``fingerprint``, the files that the model was read from as ``external_files``, the parts that
-    are ``left_out``, and its ``box`` in metres.
+    ``folder`` is where the .blend will be. ``sources`` is a JSON to write as soon as the files that
+    the model names are known, also if the model is refused, as when one is missing.
+
+    The record has the ``fingerprint``, the files that the model was read from as
+    ``external_files``, the parts that are ``left_out``, and its ``box`` in metres.
 
     Raises `UserError` for a model that is broken, empty, lacks files or parts, or names files
     outside its folder.

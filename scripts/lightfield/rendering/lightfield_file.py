@@ -1,4 +1,4 @@
-"""Makes a dataset's light field from its settings: the work of scripts/make_lightfield.py."""
+"""Makes a dataset's light field from its settings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +11,17 @@ from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
+from lightfield.planning.sampling import calibrated
+from lightfield.stages.rig import MakeLightfield
+
+
+def write(job: MakeLightfield) -> None:
+    """Write the light field of a job's settings. Raises `UserError` if it lacks a file."""
+    settings = job.settings
+    if job.calibration:
+        render = calibrated(settings.render, job.calibration)
+        settings = settings.model_copy(update={"render": render})
+    from_settings(settings, job.inventory, job.model, job.places).write(job.output)
 
 
 def from_settings(

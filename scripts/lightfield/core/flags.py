@@ -1,0 +1,181 @@
+"""The program of a stage: its flags follow from the fields of the stage and of its settings.
+
+A field may have these keys in its ``json_schema_extra``: ``short``, a list of short flags;
+``metavar``; ``positional``; and ``commas``, for a list in one word.
+"""
+
+import argparse
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, TypeAdapter
+from pydantic.fields import FieldInfo
+
+from lightfield.core import cli
+from lightfield.core.errors import UserError
+from lightfield.core.settings import checked, read_settings
+from lightfield.core.stage import ByHand, NoSettings, Stage
+
+
+def program(stage: type[Stage[Any]], description: str | None) -> None:
+    """Run a stage on the command line's arguments, as a program that ends with an exit status."""
+    cli.run(lambda: parsed(stage, description).run())
+
+
+def parsed(
+    stage: type[Stage[Any]], description: str | None, words: Sequence[str] | None = None
+) -> Stage[Any]:
+    """Return the job that the ``words`` of a command line describe.
+
+    Raises `UserError` for a value that is not allowed. argparse ends the process for a wrong flag.
+    """
+    given = vars(parser_of(stage, description).parse_args(words))
+    own = {name: given.pop(name) for name in stage.model_fields if name in given}
+    own["settings"] = _settings(stage, own, given)
+    job: Stage[Any] = _checked(stage, own)
+    return job
+
+
+def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.ArgumentParser:
+    """Return the parser of a stage's program. It leaves out flags that are not given."""
+    parser = argparse.ArgumentParser(
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        argument_default=argparse.SUPPRESS,
+    )
+    model = stage.model_fields["settings"].annotation
+    if model is not NoSettings:
+        parser.add_argument(
+            "--settings",
+            type=Path,
+            metavar="JSON",
+            required=stage.by_hand is None,
+            help="settings file",
+        )
+    for name, field in stage.model_fields.items():
+        if name != "settings":
+            _add(parser, name, field, may_be_required=True)
+    if stage.by_hand:
+        group = parser.add_argument_group("Instead of --settings")
+        for name, field, _ in _flags_of(stage.by_hand):
+            _add(group, name, field, may_be_required=False)
+    return parser
+
+
+def _settings(stage: type[Stage[Any]], own: dict[str, Any], flags: dict[str, Any]) -> Any:
+    """Return a job's settings: those of the file, or those that ``flags`` give."""
+    model = stage.settings_model(**own)
+    if "settings" in own:
+        for name in flags:
+            raise UserError(f"--settings: excludes {_flag(name)}; write it into the file")
+        return read_settings(model, own["settings"])
+    content: dict[str, Any] = {}
+    for name, field, outer in _flags_of(stage.by_hand) if stage.by_hand else ():
+        if name in flags:
+            (content.setdefault(outer, {}) if outer else content)[name] = flags[name]
+        elif field.is_required():
+            raise UserError(f"{_flag(name)}: is missing; or give --settings")
+    if stage.by_hand and issubclass(stage.by_hand, ByHand):
+        return _checked(stage.by_hand, content).settings()
+    return _checked(model, content)
+
+
+def _checked(model: type[BaseModel], content: Mapping[str, Any]) -> Any:
+    """Return what flags give as a model. Raises `UserError` that names the wrong flag."""
+    try:
+        return checked(TypeAdapter(model), content, "")
+    except UserError as error:
+        path, _, problem = str(error).removeprefix(": ").partition(": ")
+        raise UserError(f"{_flag(path.rpartition('.')[2])}: {problem}") from None
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _flags_of(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo, str | None]]:
+    """Yield name and field of each flag that stands for a key of settings.
+
+    The third value is the key of the block that has the key. None for a key of the settings
+    themselves.
+    """
+    for name, field in model.model_fields.items():
+        kind = _without_none(field.annotation)
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            for inner_name, inner_field in kind.model_fields.items():
+                yield inner_name, inner_field, name
+        elif _extra(field).get("role") != "cause":
+            yield name, field, None
+
+
+def _add(parser: Any, name: str, field: FieldInfo, may_be_required: bool) -> None:
+    """Add the flag of a field to a parser, or to a group of it."""
+    extra = _extra(field)
+    keywords: dict[str, Any] = {"help": help_of(field), **_values(field, extra)}
+    if "metavar" in extra:
+        keywords["metavar"] = extra["metavar"]
+    if extra.get("positional"):
+        parser.add_argument(name, **keywords)
+        return
+    if may_be_required and field.is_required():
+        keywords["required"] = True
+    parser.add_argument(*extra.get("short", ()), _flag(name), **keywords)
+
+
+def help_of(field: FieldInfo) -> str:
+    """Return the help of a field, with its default if that says something."""
+    text = (field.description or "").rstrip(".")
+    default = default_of(field)
+    if default is not None and "default:" not in text:
+        text += f" (default: {default})"
+    return text.replace("%", "%%")
+
+
+def default_of(field: FieldInfo) -> str | None:
+    """Return the default of a field as text. None if it has none, or one that says nothing."""
+    default = field.default
+    if isinstance(default, bool) or not isinstance(default, str | int | float) or default == "":
+        return None
+    return f"{default:g}" if isinstance(default, float) else str(default)
+
+
+def _extra(field: FieldInfo) -> Mapping[str, Any]:
+    extra = field.json_schema_extra
+    return extra if isinstance(extra, dict) else {}
+
+
+def _values(field: FieldInfo, extra: Mapping[str, Any]) -> dict[str, Any]:
+    """Return how argparse reads the values of a field."""
+    kind = _without_none(field.annotation)
+    if kind is bool:
+        return {"action": "store_true"}
+    if allowed := extra.get("enum"):
+        return {"choices": list(allowed)}
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return {"choices": list(inner)}
+    if origin is list and extra.get("commas"):
+        return {"type": lambda text: text.split(",")}
+    if origin is list:
+        return {"nargs": "+", **_one(inner[0])}
+    if origin is tuple:
+        return {"nargs": len(inner), **_one(inner[0])}
+    return {"type": kind}
+
+
+def _one(kind: Any) -> dict[str, Any]:
+    """Return how argparse reads one value of several."""
+    kind = _without_none(kind)
+    return {"choices": list(get_args(kind))} if get_origin(kind) is Literal else {"type": kind}
+
+
+def _without_none(kind: Any) -> Any:
+    """Return a type without its limits and without None."""
+    if get_origin(kind) is Annotated:
+        return _without_none(get_args(kind)[0])
+    if get_origin(kind) in (Union, types.UnionType):
+        kinds = [each for each in get_args(kind) if each is not type(None)]
+        return _without_none(kinds[0])
+    return kind

@@ -1,0 +1,114 @@
+"""A stage of a build as one typed object: its settings, and the files that it reads and writes.
+
+A stage is a class. It has a field for each file that it `reads` or `writes`, and for each `option`
+of a run, such as the number of threads. Its settings decide what it writes, and its options do not.
+
+    class BuildScene(Stage[BuildSettings]):
+        name = "build_scene"
+        function = "lightfield.rendering.built_scene:build"
+        by_hand = BuildSettings
+
+        output: Path = writes(".blend to write")
+
+From the class follow the program with its flags (`lightfield.core.flags`), the page of the
+reference, the settings file that a rule hands it, and the same stage of a family's member.
+"""
+
+import importlib
+from abc import abstractmethod
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from lightfield.core.settings import Settings
+
+
+class NoSettings(Settings):
+    """The settings of a stage whose files say everything."""
+
+
+StageSettings = TypeVar("StageSettings", bound=Settings)
+
+
+class ByHand(BaseModel):
+    """Flags that replace a settings file. For settings whose own keys make no good flags."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @abstractmethod
+    def settings(self) -> Settings:
+        """Return the settings that the flags mean."""
+
+
+class Stage(BaseModel, Generic[StageSettings]):
+    """A job of a stage: `run` does it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    # The name of the program in scripts/.
+    name: ClassVar[str]
+    # Does the work: "module:function". It takes the stage. Imported only then, because a program's
+    # --help need not wait for it.
+    function: ClassVar[str]
+    # A higher number makes everybody's results again.
+    version: ClassVar[int] = 1
+    # The model whose fields are flags in place of a settings file.
+    by_hand: ClassVar[type[Settings] | type[ByHand] | None] = None
+
+    settings: StageSettings
+
+    def run(self) -> Any:
+        """Do the work. Raises `UserError` if it cannot be done."""
+        module, _, name = self.function.partition(":")
+        return getattr(importlib.import_module(module), name)(self)
+
+    @classmethod
+    def settings_model(cls, **_: Any) -> type[Settings]:
+        """Return the model of the settings. It may depend on the stage's options."""
+        return cls.model_fields["settings"].annotation  # type: ignore[return-value]
+
+
+def reads(text: str, default: Any = ..., **flag: Any) -> Any:
+    """Return a field for a file or folder that a stage reads. ``text`` says what it is.
+
+    ``flag`` says how it looks on a command line: see `lightfield.core.flags`.
+    """
+    return _field("read", text, default, flag)
+
+
+def writes(text: str, default: Any = ..., **flag: Any) -> Any:
+    """Return a field for a file or folder that a stage writes, as `reads` does."""
+    return _field("written", text, default, flag)
+
+
+def option(text: str, default: Any = ..., **flag: Any) -> Any:
+    """Return a field for what does not change what a stage writes, as `reads` does."""
+    return _field("option", text, default, flag)
+
+
+def cause(text: str) -> Any:
+    """Return a field of settings that no program reads: if its value changes, the stage reruns."""
+    return _field("cause", text, None, {})
+
+
+def _field(role: str, text: str, default: Any, flag: dict[str, Any]) -> Any:
+    return Field(default, description=text, json_schema_extra={"role": role, **flag})
+
+
+def fields_of(stage: type[Stage[Any]], role: str) -> list[str]:
+    """Return the names of a stage's fields that have this role: read, written or option."""
+    return [
+        name
+        for name, field in stage.model_fields.items()
+        if isinstance(field.json_schema_extra, dict) and field.json_schema_extra["role"] == role
+    ]
+
+
+def paths_of(job: Stage[Any], role: str) -> list[Path]:
+    """Return the paths that a job reads or writes."""
+    paths: list[Path] = []
+    for name in fields_of(type(job), role):
+        value = getattr(job, name)
+        paths += value if isinstance(value, list) else [value] if value is not None else []
+    return paths

@@ -1,0 +1,18 @@
+"""The list of all stages."""
+
+from typing import Any
+
+from lightfield.core.stage import Stage
+from lightfield.stages import rig, scene
+
+STAGES: list[type[Stage[Any]]] = [
+    scene.BuildScene,
+    scene.ImportModel,
+    scene.FetchBlend,
+    scene.CheckBlend,
+    scene.Inventory,
+    rig.MakeLightfield,
+    rig.FreePlaces,
+    rig.CheckCameras,
+]
+BY_NAME = {stage.name: stage for stage in STAGES}
