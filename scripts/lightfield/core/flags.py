@@ -78,7 +78,7 @@ def _settings(stage: type[Stage[Any]], own: dict[str, Any], flags: dict[str, Any
         elif field.is_required():
             raise UserError(f"{_flag(name)}: is missing; or give --settings")
     if stage.by_hand and issubclass(stage.by_hand, ByHand):
-        return _checked(stage.by_hand, content).settings()
+        return _checked(stage.by_hand, content).settings(own)
     return _checked(model, content)
 
 

@@ -16,6 +16,7 @@ reference, the settings file that a rule hands it, and the same stage of a famil
 
 import importlib
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -37,8 +38,11 @@ class ByHand(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @abstractmethod
-    def settings(self) -> Settings:
-        """Return the settings that the flags mean."""
+    def settings(self, given: Mapping[str, Any]) -> Settings:
+        """Return the settings that the flags mean.
+
+        ``given`` are the stage's own fields that the command line gives, such as its files.
+        """
 
 
 class Stage(BaseModel, Generic[StageSettings]):

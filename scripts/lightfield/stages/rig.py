@@ -1,5 +1,6 @@
 """The stages that place a rig's cameras, check them, and write the light field."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -59,7 +60,7 @@ class SceneAndRig(ByHand):
         None,
     )
 
-    def settings(self) -> LightfieldSettings:
+    def settings(self, given: Mapping[str, Any]) -> LightfieldSettings:
         from lightfield.workflow.loading import rig_dataset
 
         dataset = rig_dataset(self.scene, self.rig)
