@@ -15,7 +15,7 @@ from lightfield.formats.layout import ImageSet
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation.cameras import camera_of
-from lightfield.validation.development import toned
+from lightfield.validation.reprojected import toned
 from oracles.exported_cameras import SetExport
 from oracles.exported_depth import converted
 from oracles.readers.contents import FLOAT32, Picture

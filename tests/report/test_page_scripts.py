@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.report import page, scripts
+from lightfield.report import page
 
 MODULES = sorted(page.TEMPLATES.glob("*/*.js"))
 # The scripts of a dataset's page share a scope. Other pages have one of their own.
@@ -38,14 +38,14 @@ def test_every_imported_name_is_exported(module):
 
 def test_every_module_is_in_the_page():
     entries = [page.TEMPLATES / f"{name}/main.js" for name in OF_DATASET + OTHERS]
-    assert {module for entry in entries for module in scripts.modules(entry)} == set(MODULES)
+    assert {module for entry in entries for module in page.script_modules(entry)} == set(MODULES)
 
 
 def test_a_module_follows_what_it_imports_and_holds_its_shaders(tmp_path: Path):
     (tmp_path / "main.js").write_text('import { one } from "./one.js";\nsay(one, text);\n')
     (tmp_path / "one.js").write_text('import text from "./a.glsl";\nexport const one = 1;\n')
     (tmp_path / "a.glsl").write_text('say "this";\n')
-    script = scripts.joined(scripts.modules(tmp_path / "main.js"))
+    script = page.joined_script(page.script_modules(tmp_path / "main.js"))
     assert script.splitlines()[1:3] == [r'const text = "say \"this\";\n";', "const one = 1;"]
     assert "say(one, text);" in script.splitlines()[-1]
     assert "import" not in script

@@ -22,7 +22,6 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
-from lightfield.report import lights as light_pictures
 from lightfield.report.packing import webp
 
 PICTURES = ("overview", "contact_sheet")
@@ -70,7 +69,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         _sensor_folder(folder, lightfield),
     )
     middle = lightfield.views[middle_view(rig)]
-    lights = light_pictures.collect(folder, lightfield, middle, packed.data["exposure"])
+    lights = pass_pictures.light_groups(folder, lightfield, middle, packed.data["exposure"])
     if lights:
         packed.data["lights"] = lights
     report = folder / REPORT

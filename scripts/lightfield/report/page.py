@@ -1,5 +1,11 @@
-"""Writes pages from templates. A page is one file, with styles, programs and pictures inside."""
+"""Writes pages from templates. A page is one file, with styles, programs and pictures inside.
 
+Scripts and shaders are files of their own in the templates, so that editors understand them. A
+browser that opens a page from a disk loads no module beside it. So a page has its modules joined.
+"""
+
+import json
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -12,7 +18,6 @@ from lightfield.core import units
 from lightfield.core.files import write_text
 from lightfield.core.units import number
 from lightfield.imaging import images, pictures
-from lightfield.report import scripts
 from lightfield.report.packing import data_uri, webp
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -20,6 +25,9 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 # A plot stays sharp as SVG. A plot of thousands of points is smaller as PNG.
 _LARGEST_SVG = 300_000
 _PHOTO_QUALITY = 84
+# import { a, b } from "./module.js";   import shader from "./shaders/name.glsl";
+_IMPORT = re.compile(r'^import (?P<names>[^;]+) from "(?P<path>[^"]+)";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=async|const|function)", re.MULTILINE)
 
 
 def write(output: Path, template: str, **content: Any) -> None:
@@ -39,21 +47,58 @@ def environment() -> jinja2.Environment:
     )
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files: they need no escaping.
-    page_modules = scripts.modules(TEMPLATES / "page/main.js")
-    walk_modules = scripts.modules(TEMPLATES / "walk/main.js")
-    relight_modules = scripts.modules(TEMPLATES / "relight/main.js")
+    page_modules = script_modules(TEMPLATES / "page/main.js")
+    walk_modules = script_modules(TEMPLATES / "walk/main.js")
+    relight_modules = script_modules(TEMPLATES / "relight/main.js")
     # A page has the modules that they share only once.
     only_of_walk = [module for module in walk_modules if module not in page_modules]
     only_of_relight = [module for module in relight_modules if module not in page_modules]
     environment.globals |= {
-        "corpus_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "corpus/main.js"))),
-        "index_js": Markup(scripts.joined(scripts.modules(TEMPLATES / "index/main.js"))),
+        "corpus_js": Markup(joined_script(script_modules(TEMPLATES / "corpus/main.js"))),
+        "index_js": Markup(joined_script(script_modules(TEMPLATES / "index/main.js"))),
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
-        "page_js": Markup(scripts.joined(page_modules)),
-        "walk_js": Markup(scripts.joined(only_of_walk)),
-        "relight_js": Markup(scripts.joined(only_of_relight)),
+        "page_js": Markup(joined_script(page_modules)),
+        "walk_js": Markup(joined_script(only_of_walk)),
+        "relight_js": Markup(joined_script(only_of_relight)),
     }
     return environment
+
+
+def script_modules(entry: Path) -> list[Path]:
+    """Return ``entry`` and all modules that it imports. Each comes after its own imports."""
+    ordered: list[Path] = []
+    visited: set[Path] = set()
+
+    def visit(module: Path) -> None:
+        if module in visited:
+            return
+        visited.add(module)
+        for statement in _IMPORT.finditer(module.read_text("utf-8")):
+            imported = (module.parent / statement["path"]).resolve()
+            if imported.suffix == ".js":
+                visit(imported)
+        ordered.append(module)
+
+    visit(entry.resolve())
+    return ordered
+
+
+def joined_script(ordered: list[Path]) -> str:
+    """Return one script that does what these modules do.
+
+    The modules share one scope: a name must not have two meanings.
+    """
+    return '"use strict";\n' + "\n".join(_as_script(module) for module in ordered)
+
+
+def _as_script(module: Path) -> str:
+    def inlined(statement: re.Match[str]) -> str:
+        imported = module.parent / statement["path"]
+        if imported.suffix == ".js":
+            return ""
+        return f"const {statement['names']} = {json.dumps(imported.read_text('utf-8'))};\n"
+
+    return _EXPORT.sub("", _IMPORT.sub(inlined, module.read_text("utf-8")))
 
 
 def photo(path: Path, widest: int) -> str | None:

@@ -1,22 +1,27 @@
-"""Makes a picture of each pass of a view."""
+"""Makes a picture of each pass of a view, and packs its light groups."""
 
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import hsv_to_rgb
 
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField, View
-from lightfield.formats.passes import FLOW, Pass, is_group
+from lightfield.formats.passes import FLOW, Pass, is_group, of_group
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.tonemap import to_8_bit
-from lightfield.report.packing import webp
+from lightfield.report.packing import light_scale, pack_light, webp
 
 # The longer side of a picture in pixels, at most.
 SIDE = 320
+# The same for a light group. Smaller for more than _MANY_GROUPS.
+_GROUP_SIDE = 256
+_SMALLER_GROUP_SIDE = 128
+_MANY_GROUPS = 16
 # A motion of fewer pixels counts as none.
 _STILL = 0.01
 # Steps of the golden ratio give neighbouring numbers very different hues.
@@ -42,6 +47,39 @@ def collect(
         planes = [channels[channel][::step, ::step] for channel in view_pass.channels]
         picture = _picture(view_pass, np.stack(planes, axis=-1), exposure)
         yield view_pass.name, view_pass.meaning, webp(picture)
+
+
+def light_groups(
+    folder: Path, lightfield: LightField, view: View, exposure: float
+) -> dict[str, Any] | None:
+    """Pack a view's light groups, so that a page can relight it. None if none can be read.
+
+    ``exposure`` in stops is that of the page.
+    """
+    names = lightfield.light_groups
+    side = _GROUP_SIDE if len(names) <= _MANY_GROUPS else _SMALLER_GROUP_SIDE
+    small = lightfield.lens.fitted(side)
+    groups = []
+    for name in names:
+        try:
+            colour = images.read_image(of_group(name).path(folder, view.name), "RGB").colour
+        except UserError:
+            continue  # Validation reports it.
+        colour = np.nan_to_num(colour, posinf=0, neginf=0)
+        if colour.shape[:2] != (small.height, small.width):
+            colour = pictures.shrunk(colour, small.width, small.height)
+        scale = light_scale(colour)
+        # Without loss: the sum of many groups would show what each has lost.
+        picture = webp(pack_light(colour, scale))
+        groups.append({"name": name, "scale": scale, "light": picture})
+    if not groups:
+        return None
+    return {
+        "view": view.name,
+        "size": [small.width, small.height],
+        "exposure": exposure,
+        "groups": groups,
+    }
 
 
 def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:

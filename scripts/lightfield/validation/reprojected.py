@@ -9,6 +9,7 @@ be taken for another.
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from lightfield.formats.layout import ImageSet
 from lightfield.geometry.depth import stored_distance
 from lightfield.imaging.images import Image
 from lightfield.imaging.tonemap import encode_srgb
-from lightfield.validation.development import toned
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -133,6 +133,17 @@ def _developed(light: Floats, target: ImageSet, is_encoded: bool) -> Floats:
     settings = target.lightfield.content["reprojection"]
     shown = toned(light, settings.get("exposure", 0), settings.get("reinhard", 1))
     return np.asarray(encode_srgb(shown) if is_encoded else shown, np.float64)
+
+
+def toned(light: NDArray[Any], exposure: float, white: float) -> Floats:
+    """Return ``light`` (...) after an exposure in stops and a tone curve. Both grow with light.
+
+    A ``white`` of 1 changes nothing. Negative light becomes 0. Source: Reinhard et al. 2002,
+    equation 4. Apart from the code that the reprojection uses.
+    """
+    with np.errstate(all="ignore"):
+        brighter = np.maximum(light, 0) * np.exp2(exposure)
+        return np.asarray(brighter * (1 + brighter / white / white) / (1 + brighter), np.float64)
 
 
 def _depth_faults(

@@ -9,6 +9,7 @@ The result is a list of checks. Each has passed, failed, or does not apply. A ch
 apply says why.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -25,7 +26,8 @@ from lightfield.core.progress import Progress
 from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import File, ImageSet, Manifest
-from lightfield.validation import files, geometry, machines, pixels, splits_check
+from lightfield.formats.lightfield import MACHINE, LightField
+from lightfield.validation import files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
@@ -180,8 +182,28 @@ def _check_set(
     return [
         *pixels.checks(image_set, facts, volumes),
         geometry.check(image_set, patches, lambda questions: parallel_map(_answer, questions)),
-        *machines.check(image_set.lightfield, [fact.machine for fact in facts.values()]),
+        *_machines_checks(image_set.lightfield, [fact.machine for fact in facts.values()]),
     ]
+
+
+def _machines_checks(lightfield: LightField, machines: Iterable[str | None]) -> list[Check]:
+    """Count the views by the machine in their headers. Return no check if no header names one.
+
+    Warns about several machines, and about a machine that lightfield.json does not name. Such views
+    are right, but another build would not have the same bytes.
+    """
+    counts = Counter(sorted(machine for machine in machines if machine))
+    if not counts:
+        return []
+    detail = ", ".join(f"{count} on {machine}" for machine, count in counts.items())
+    first_machine = str(lightfield.content.get(MACHINE, ""))
+    # A GPU's name precedes the name of its machine.
+    unnamed_machines = [machine for machine in counts if not machine.endswith(first_machine)]
+    warnings = []
+    if len(counts) > 1 or unnamed_machines:
+        addition = f"; lightfield.json names {first_machine}" if unnamed_machines else ""
+        warnings = [f"views of unlike machines may differ in last digits: {detail}{addition}"]
+    return [Check("machines", True, detail, warnings=warnings, figures=dict(counts))]
 
 
 def _check_files(
