@@ -38,6 +38,9 @@ class MakePot(Stage[PotSettings]):
     output: Path = writes("pot to write", short=["-o"])
     colour: Literal["red", "grey"] = option("its colour", "grey")
     size: tuple[float, float] | None = option("its sides", None)
+    feet: Literal[3, 4] = option("how many feet it has", 3)
+    marks: list[str] | None = option("marks on it", None, may_be_empty=True)
+    bands: list[tuple[str, int]] = option("bands around it", [], metavar=("COLOUR", "WIDTH"))
 
 
 def make(*words):
@@ -56,6 +59,15 @@ def test_flags_become_the_fields_of_the_stage_and_the_keys_of_its_settings():
     assert paths_of(pot, "written") == [Path("c")]
 
 
+def test_a_flag_of_a_list_may_be_empty_or_given_again():
+    assert make("a", "-o", "c", "--clay", "red").marks is None
+    assert make("a", "-o", "c", "--clay", "red", "--marks").marks == []
+    words = ["--marks", "x", "y", "--marks", "z", "--bands", "red", "2", "--bands", "grey", "3"]
+    pot = make("a", "-o", "c", "--clay", "red", "--feet", "4", *words)
+    assert (pot.feet, pot.marks, pot.bands) == (4, ["x", "y", "z"], [("red", 2), ("grey", 3)])
+    assert "--bands COLOUR WIDTH" in parser_of(MakePot, None).format_help()
+
+
 def test_a_settings_file_replaces_its_flags(tmp_path):
     file = tmp_path / "pot.json"
     file.write_text(json.dumps({"clay": "white", "version": 3}))
@@ -70,6 +82,11 @@ def test_a_settings_file_replaces_its_flags(tmp_path):
     [
         (["--glow", "2"], "--clay: is missing; or give --settings"),
         (["--clay", "red", "--glow", "0"], "--glow: is 0.0; must be a number above 0"),
+        (["--clay", "red", "--size", "1", "nan"], "--size: is NaN; must be a finite number"),
+        (
+            ["--clay", "red", "--bands", "red", "wide"],
+            '--bands: is "wide"; must be a whole number',
+        ),
     ],
 )
 def test_a_wrong_value_is_named_by_its_flag(words, message):

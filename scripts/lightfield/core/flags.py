@@ -1,7 +1,9 @@
 """The program of a stage: its flags follow from the fields of the stage and of its settings.
 
 A field may have these keys in its ``json_schema_extra``: ``short``, a list of short flags;
-``metavar``; ``positional``; and ``commas``, for a list in one word.
+``metavar``; ``positional``; ``commas``, for a list in one word; and ``may_be_empty``, for a list
+that a flag without values makes empty. A flag of a list may be given again, for more values. A list
+of tuples takes one tuple each time.
 """
 
 import argparse
@@ -88,7 +90,9 @@ def _checked(model: type[BaseModel], content: Mapping[str, Any]) -> Any:
         return checked(TypeAdapter(model), content, "")
     except UserError as error:
         path, _, problem = str(error).removeprefix(": ").partition(": ")
-        raise UserError(f"{_flag(path.rpartition('.')[2])}: {problem}") from None
+        # The place in a list, such as [1], follows the name.
+        names = [part for part in path.split(".") if not part.startswith("[")]
+        raise UserError(f"{_flag(names[-1])}: {problem}") from None
 
 
 def _flag(name: str) -> str:
@@ -154,21 +158,26 @@ def _values(field: FieldInfo, extra: Mapping[str, Any]) -> dict[str, Any]:
     if allowed := extra.get("enum"):
         return {"choices": list(allowed)}
     origin, inner = get_origin(kind), get_args(kind)
-    if origin is Literal:
-        return {"choices": list(inner)}
     if origin is list and extra.get("commas"):
         return {"type": lambda text: text.split(",")}
+    if origin is list and get_origin(inner[0]) is tuple:
+        # The model converts the values, which may have different types.
+        return {"action": "append", "nargs": len(get_args(inner[0]))}
     if origin is list:
-        return {"nargs": "+", **_one(inner[0])}
+        count = "*" if extra.get("may_be_empty") else "+"
+        return {"action": "extend", "nargs": count, **_one(inner[0])}
     if origin is tuple:
         return {"nargs": len(inner), **_one(inner[0])}
-    return {"type": kind}
+    return _one(kind)
 
 
 def _one(kind: Any) -> dict[str, Any]:
-    """Return how argparse reads one value of several."""
+    """Return how argparse reads one value."""
     kind = _without_none(kind)
-    return {"choices": list(get_args(kind))} if get_origin(kind) is Literal else {"type": kind}
+    if get_origin(kind) is Literal:
+        choices = get_args(kind)
+        return {"choices": list(choices), "type": type(choices[0])}
+    return {"type": kind}
 
 
 def _without_none(kind: Any) -> Any:

@@ -205,7 +205,7 @@ def _allowed(error: ErrorDetails) -> str:
             return f"have the key {error['loc'][-1]}"
         case "model_type" | "model_attributes_type" | "dict_type":
             return "be a mapping of keys to values"
-        case "int_type" | "int_from_float":
+        case "int_type" | "int_from_float" | "int_parsing":
             return "be a whole number"
         case "float_type" | "float_parsing":
             return "be a number"

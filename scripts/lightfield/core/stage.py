@@ -35,7 +35,7 @@ StageSettings = TypeVar("StageSettings", bound=Settings)
 class ByHand(BaseModel):
     """Flags that replace a settings file. For settings whose own keys make no good flags."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, allow_inf_nan=False)
 
     @abstractmethod
     def settings(self, given: Mapping[str, Any]) -> Settings:
@@ -48,7 +48,7 @@ class ByHand(BaseModel):
 class Stage(BaseModel, Generic[StageSettings]):
     """A job of a stage: `run` does it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, allow_inf_nan=False)
 
     # The name of the program in scripts/.
     name: ClassVar[str]
