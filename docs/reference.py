@@ -195,7 +195,7 @@ KEY_PAGES: dict[str, Page] = {
         "The keys of a reprojection",
         "An entry of `reprojections` in a scene YAML makes versions of the views: through another "
         "lens, or as other files. Its name is the name of their folder.",
-        [Section("A reprojection", scene_yaml.Reprojection)],
+        [Section("A reprojection", reprojections.ReprojectionEntry)],
     ),
     "sensor-keys.md": Page(
         "The keys of `sensor`",
@@ -244,7 +244,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("make_lightfield.py", LightfieldSettings),
             Section("free_places.py", rig_stages.FreePlacesSettings),
             Section("surface.py", job_settings.MeshSettings),
-            Section("reproject.py and lens_map.py", reprojections.ReprojectionSettings),
+            Section("reproject.py and lens_map.py", reprojections.Reprojection),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
             Section("validate_sequence.py", job_settings.SequenceValidationSettings),

@@ -4,7 +4,6 @@ import resource
 
 from lightfield.core.units import duration
 from lightfield.workflow.run_display import RunDisplay, Task
-from lightfield.configuration.scene_yaml import SensorReprojection
 from lightfield.planning.unit_costs import JOB_SECONDS, START_UP_SECONDS
 from lightfield.planning.forecast import (
     SENSOR_PHASE,
@@ -76,7 +75,8 @@ def is_of_sensor(job):
     """Return whether a job makes views as a sensor sees them."""
     if "reprojection" not in job.wildcards.keys():
         return False
-    return isinstance(reprojection_of(job.wildcards), SensorReprojection)
+    reprojection = reprojection_of(job.wildcards)
+    return bool(reprojection and reprojection.sensor)
 
 
 def phase_of(job):

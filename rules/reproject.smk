@@ -5,10 +5,10 @@ include: "helpers/reproject.smk"
 
 
 lens_map_settings = reprojection_settings_of(
-    "lens_map", lambda settings: settings.lens_map_settings
+    "lens_map", lambda reprojection: reprojection.lens_map_settings
 )
 reproject_settings = reprojection_settings_of(
-    "reproject", lambda settings: settings.as_json()
+    "reproject", lambda reprojection: reprojection.as_json()
 )
 
 

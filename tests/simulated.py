@@ -65,7 +65,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
         lens = (reprojection.camera or dataset.rig.camera).make()
-        made = lightfield.changed(lens, reprojection=reprojection.settings.published)
+        made = lightfield.changed(lens, reprojection=reprojection.published)
         made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"

@@ -11,11 +11,11 @@ def lens_maps_of(wildcards):
 def reprojection_settings_of(stage, content):
     """Return the input function for a reprojection's settings file.
 
-    ``content`` is a function that returns the file's content from the reprojection's settings.
+    ``content`` is a function that returns the file's content from the reprojection.
     """
 
     def input_function(wildcards):
-        settings = content(reprojection_of(wildcards).settings)
+        settings = content(reprojection_of(wildcards))
         name = f"{wildcards.reprojection}/{stage}"
         return dataset_settings(dataset_of(wildcards), name, settings)
 

@@ -193,7 +193,7 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
     # Keys that the preset does not write stay.
     cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))
     assert "sensor_size" not in str(as_written(cuboid.placed_rig))
-    assert "sensor_size" not in sphere.reprojections["perspective"].settings.as_json()["camera"]
+    assert "sensor_size" not in sphere.reprojections["perspective"].as_json()["camera"]
 
 
 def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
@@ -202,7 +202,7 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     dataset = scene_datasets("right", limits=config_file.Preset(resolution=32, views=20))[0]
-    assert dataset.reprojections["faces"].settings.as_json() == {
+    assert dataset.reprojections["faces"].as_json() == {
         "camera": {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
         "cube_map": True,
         "rotation": [0, 0, 0],

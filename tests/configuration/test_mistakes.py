@@ -14,7 +14,7 @@ from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
 from lightfield.configuration import config_file, scene_yaml
 from lightfield.configuration.exports import ExportSettings, settings_of
 from lightfield.configuration.job_settings import MeshSettings
-from lightfield.configuration.reprojections import ReprojectionSettings
+from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.core.settings import read_settings
@@ -25,7 +25,7 @@ from lightfield.workflow.loading import load_datasets
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 SETTINGS = {
-    "reproject.json": ReprojectionSettings,
+    "reproject.json": Reprojection,
     "mesh.json": MeshSettings,
     "colmap.json": ExportSettings[settings_of("colmap")],
     "instant_ngp.json": ExportSettings[settings_of("instant_ngp")],

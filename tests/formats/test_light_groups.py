@@ -200,9 +200,9 @@ def develop(tmp_path, reproject_dataset):
     def run(name, light, check=True, **settings):
         content = {"format": "exr", "relight": light, **settings}
         # The plan resolves names to lights.
-        reprojection = scene(reprojections={name: content}).reprojections[name]
+        reprojection = scene(reprojections={name: content}).developments[name]
         folder = tmp_path / "rig"
-        content = reprojection.settings.as_json()
+        content = reprojection.as_json()
         return reproject_dataset(folder, folder / name, content, check=check)
 
     return run
@@ -277,7 +277,7 @@ def test_reprojected_groups_add_up_with_every_filter(filter_name, fov, tmp_path,
     camera = {"lens": "rectilinear", "fov": fov, "resolution": [12, 12]}
     reprojection = {"format": "exr", "camera": camera, "passes": ["light_groups"]}
     content = scene(reprojections={"flat": reprojection | {"filter": filter_name}})
-    settings = content.reprojections["flat"].settings
+    settings = content.developments["flat"]
     reproject_dataset(folder, folder / "flat", settings.as_json())
     for view in ("view_0000f", "view_0001f"):
         seen = colour(folder, "flat", view)
@@ -307,8 +307,11 @@ def test_each_entry_of_relight_is_a_development_of_its_own():
         reprojections={"flat": {"relight": "night", "exposure": 1}},
     )
     assert [*content.reprojections] == ["flat", "night", "olat"]
-    lights = [content.light_of(content.reprojections[name]) for name in content.reprojections]
-    assert lights == [{"lamp": 0}, {"lamp": 0}, "each"]
+    assert [each.relight for each in content.developments.values()] == [
+        {"lamp": 0},
+        {"lamp": 0},
+        "each",
+    ]
     assert content.reprojections["night"].format == "exr"
 
 
@@ -321,7 +324,7 @@ def test_names_are_those_of_the_groups():
 def test_settings_without_light_groups_are_as_before():
     plain = scene(render={"samples": 1}, reprojections={"flat": {}})
     assert "light_groups" not in plain.render.model_dump(exclude_none=True)
-    settings = plain.reprojections["flat"].settings
+    settings = plain.developments["flat"]
     assert "relight" not in settings.as_json() and "relight" not in settings.development
 
 

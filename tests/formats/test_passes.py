@@ -507,9 +507,9 @@ def test_impossible_passes_are_refused(wrong, problem):
 def test_passes_keep_the_tables_order_and_their_absence_changes_nothing():
     content = Scene.model_validate(scene(passes=["emission", "normal"], again=["normal"]))
     assert content.render.passes == ["normal", "emission"]
-    assert content.reprojections["other"].settings.passes == ["normal"]
+    assert content.developments["other"].passes == ["normal"]
     bare = Scene.model_validate(scene())
     assert "passes" not in bare.render.model_dump(exclude_none=True)
-    assert bare.reprojections["other"].settings.passes == []
+    assert bare.developments["other"].passes == []
     bare = RenderBlock(**RENDER).without_passes
     assert bare.to_json().keys() == RENDER.keys() - {"passes"}

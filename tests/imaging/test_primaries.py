@@ -5,7 +5,7 @@ import OpenEXR
 import OpenImageIO as oiio
 import pytest
 
-from lightfield.configuration.scene_yaml import Reprojection
+from lightfield.configuration.reprojections import ReprojectionEntry
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -57,9 +57,9 @@ def reproject(tmp_path, reproject_dataset):
     images.write_exr(source, dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True)))
 
     def run(name, **settings):
-        reprojection = Reprojection.model_validate(settings)
-        reproject_dataset(tmp_path, tmp_path / name, reprojection.settings.as_json())
-        return tmp_path / name / f"view_0000f.{reprojection.format}"
+        reprojection = ReprojectionEntry.model_validate(settings).resolved(None)
+        reproject_dataset(tmp_path, tmp_path / name, reprojection.as_json())
+        return tmp_path / name / f"view_0000f{reprojection.suffix}"
 
     return run
 

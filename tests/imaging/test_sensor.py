@@ -299,7 +299,7 @@ def develop(tmp_path, reproject_dataset):
 
     def run(name, reprojection, *arguments, folder=None):
         folder = folder or tmp_path / name
-        reproject_dataset(tmp_path, folder, reprojection.settings.as_json(), *arguments)
+        reproject_dataset(tmp_path, folder, reprojection.as_json(), *arguments)
         return folder
 
     return run
@@ -369,9 +369,9 @@ def test_a_sensor_leaves_the_other_jobs_as_they_are():
     flat = {"flat": {"camera": PERSPECTIVE}}
     alone = Scene.model_validate({**SCENE, "reprojections": flat}).developments
     beside = developments({**NOISY, "sources": ["flat"]}, reprojections=flat)
-    assert beside["flat"].settings.as_json() == alone["flat"].settings.as_json()
-    assert "sensor" not in alone["flat"].settings.as_json()
-    assert "sensor" not in alone["flat"].settings.published
+    assert beside["flat"].as_json() == alone["flat"].as_json()
+    assert "sensor" not in alone["flat"].as_json()
+    assert "sensor" not in alone["flat"].published
 
 
 def test_the_sensor_sees_a_sources_lens_and_rigs():
@@ -380,6 +380,6 @@ def test_the_sensor_sees_a_sources_lens_and_rigs():
     sensed = made["flat_sensor"]
     assert sensed.camera == made["flat"].camera
     assert sensed.rigs == ["one"]
-    assert sensed.settings.bits == 16
+    assert sensed.bits == 16
     with pytest.raises(ValidationError, match="name is taken by sensor"):
         developments({**NOISY, "sources": ["flat"]}, reprojections={**flat, "flat_sensor": {}})

@@ -60,9 +60,9 @@ def reproject(tmp_path, reproject_dataset):
                 "rigs": {"one": {"type": "lattice", "cameras": [1, 1, 1], "camera": FISHEYE}},
                 "reprojections": {name: settings},
             }
-        ).reprojections[name]
+        ).developments[name]
         folder = tmp_path / name
-        reproject_dataset(tmp_path, folder, content.settings.as_json())
+        reproject_dataset(tmp_path, folder, content.as_json())
         return folder
 
     return run
@@ -164,13 +164,13 @@ def scene(**reprojection):
 
 
 def test_a_bracket_is_a_folder_for_each_exposure():
-    reprojections = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).reprojections
+    reprojections = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).developments
     assert {name: each.exposure for name, each in reprojections.items()} == {
         "png_ev-2": -2.0,
         "png_ev0.5": 0.5,
         "png_ev2": 2.0,
     }
-    assert not any("camera" in each.settings.as_json() for each in reprojections.values())
+    assert not any("camera" in each.as_json() for each in reprojections.values())
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ class DatasetPaths(Description):
             folders.append(passes.FLOW.name)
         folders += self.reprojections
         for name, reprojection in self.reprojections.items():
-            for pass_name in reprojection.passes or ():
+            for pass_name in reprojection.passes:
                 if pass_name == LIGHT_GROUPS:
                     groups = [each for each in folders if each.startswith(passes.GROUP_PREFIX)]
                     folders += [f"{name}/{group}" for group in groups]

@@ -9,6 +9,7 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.exports import Exports
+from lightfield.configuration.reprojections import Reprojection
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Description(Capture):
     preset: str
     rig_name: str
     rig_folder: str
-    reprojections: dict[str, scene_yaml.Reprojection]
+    reprojections: dict[str, Reprojection]
     flow: scene_yaml.Flow | None
     mesh: scene_yaml.MeshFiles | None
     exports: Exports

@@ -1,16 +1,19 @@
 """The settings of a reprojection, in a scene YAML and in the programs' settings files.
 
-A scene YAML's entry of `reprojections` becomes `ReprojectionSettings`. The plan writes them to a
-settings file, which scripts/reproject.py and scripts/lens_map.py read with --settings.
+`ReprojectionEntry` is an entry of `reprojections` in a scene YAML. It becomes a `Reprojection`. The
+plan writes this to a settings file, which scripts/reproject.py and scripts/lens_map.py read with
+--settings.
 """
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import TypeAliasType
 
 from lightfield.core.setting_types import Primaries
-from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.core.settings import Name, Settings, Vector, as_list
+from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
@@ -21,8 +24,8 @@ MOST_SAMPLES = 64
 LIGHT_GROUPS = "light_groups"
 """Among the passes of a reprojection: those of all light groups."""
 
-_LENS_MAP_KEYS = {"camera", "cube_map", "rotation", "filter", "samples"}
-"""The settings on which a lens map depends."""
+OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
+"""The settings that say how views are resampled, on which a lens map depends."""
 
 # A group's factor, or its factors of red, green and blue.
 _Strength = Annotated[float, Field(ge=0, le=1e6)]
@@ -92,8 +95,14 @@ class ReprojectionOptions(Settings):
         return self.camera.make()
 
 
-class ReprojectionSettings(ReprojectionOptions):
-    """The settings of scripts/reproject.py. scripts/lens_map.py needs only `_LENS_MAP_KEYS`."""
+class Reprojection(ReprojectionOptions):
+    """Versions of the views through another lens, or as other files, with every name resolved.
+
+    These are the settings of scripts/reproject.py. scripts/lens_map.py needs only `OPTICS`.
+    ``rigs`` are the rigs whose views are reprojected. None means all. They are in no settings file.
+    """
+
+    rigs: SkipJsonSchema[list[str] | None] = Field(None, exclude=True)
 
     formats: list[Literal["exr", "png"]] = Field(
         [], description="Formats of the images to write. EXR also holds depth."
@@ -133,9 +142,19 @@ class ReprojectionSettings(ReprojectionOptions):
         return self
 
     @property
+    def suffix(self) -> str:
+        """The suffix of the images' names."""
+        return f".{self.formats[0]}"
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether images have depth, if the views do."""
+        return "exr" in self.formats
+
+    @property
     def lens_map_settings(self) -> dict[str, Any]:
         """The content of a lens map's settings file."""
-        return self.as_json(_LENS_MAP_KEYS)
+        return self.as_json({*OPTICS})
 
     @property
     def development(self) -> dict[str, Any]:
@@ -166,6 +185,95 @@ class ReprojectionSettings(ReprojectionOptions):
             "samples": self.samples,
             **self.development,
         }
+
+
+# A reprojection may have all passes of light groups, too.
+_PassNames = Annotated[
+    list[Annotated[str, Field(json_schema_extra={"enum": [*PASSES, LIGHT_GROUPS]})]],
+    AfterValidator(lambda names: in_order(names, LIGHT_GROUPS)),
+]
+
+
+class ReprojectionEntry(ReprojectionOptions):
+    """Versions of the views through another lens, or as other files."""
+
+    rigs: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="Rigs whose views are reprojected. Without this key, all rigs.",
+    )
+    format: Literal["png", "exr"] = Field(
+        "png", description="Format of the images. Only EXR has depth."
+    )
+    exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
+        0,
+        description="Exposure of the images. A list makes a folder for each of its values, such as "
+        "png_ev-2 and png_ev0.",
+        json_schema_extra={"unit": "stops"},
+    )
+    passes: _PassNames | None = Field(
+        None,
+        description="Passes of render.passes that are also reprojected, as EXR. light_groups: the "
+        "passes of all light groups.",
+    )
+    relight: Name | Light | None = Field(
+        None,
+        description="Light of the images, if it is not the rendered one: the name of an entry of "
+        "relight, or strengths as in such an entry.",
+    )
+    primaries: Primaries | None = Field(
+        None,
+        description="Colour space of EXR images, which the files name in their attribute "
+        "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",
+    )
+
+    @model_validator(mode="after")
+    def _has_use(self) -> Self:
+        for name in OPTICS:
+            if self.camera is None and name in self.model_fields_set:
+                raise ValueError(f"{name}: needs camera; without one, nothing is resampled")
+        if self.format == "exr" and self.bits != 8:
+            raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
+        if self.format == "png" and self.primaries:
+            raise ValueError("primaries: is only for format exr; a PNG is sRGB")
+        lights = [
+            name
+            for name in self.passes or ()
+            if name == LIGHT_GROUPS or PASSES[name].kind == "light"
+        ]
+        if self.primaries == "acescg" and lights:
+            raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")
+        return self
+
+    def resolved(self, light: Light | None) -> Reprojection:
+        """Return the reprojection of this entry. ``light`` has the strengths that it names."""
+        # `bracketed` has made an entry for each exposure.
+        assert not isinstance(self.exposure, list)
+        options = {name: getattr(self, name) for name in ReprojectionOptions.model_fields}
+        return Reprojection.of(
+            **options,
+            rigs=self.rigs,
+            formats=[self.format],
+            exposure=self.exposure,
+            passes=self.passes,
+            relight=light,
+            primaries=self.primaries,
+        )
+
+
+def bracketed(reprojections: dict[str, ReprojectionEntry]) -> dict[str, ReprojectionEntry]:
+    """Replace each reprojection of several exposures by one for each, named by its stops."""
+    bracketed: dict[str, ReprojectionEntry] = {}
+    for name, reprojection in reprojections.items():
+        if not isinstance(reprojection.exposure, list):
+            bracketed[name] = reprojection
+            continue
+        for stops in reprojection.exposure:
+            key = f"{name}_ev{stops:g}"
+            if key in bracketed or key in reprojections:
+                raise ValueError(f"{name}.exposure: must not name {key} twice")
+            bracketed[key] = reprojection.model_copy(update={"exposure": stops})
+    return bracketed
 
 
 def face_problem(camera: CameraSettings) -> str | None:

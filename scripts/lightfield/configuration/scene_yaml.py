@@ -21,21 +21,22 @@ from lightfield.configuration.publication import PUBLISHED_FOLDER, SPDX, Publica
 from lightfield.configuration.render_settings import Render
 from lightfield.configuration.reprojections import (
     LIGHT_GROUPS,
+    OPTICS,
     Light,
-    ReprojectionOptions,
-    ReprojectionSettings,
-    Stops,
+    Reprojection,
+    ReprojectionEntry,
+    bracketed,
     face_problem,
 )
 from lightfield.configuration.scene_source import FILE, SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, ROOT, VIEWS
-from lightfield.core.setting_types import Auto, Primaries, unique_names
+from lightfield.core.setting_types import Auto, unique_names
 from lightfield.core.settings import Name, Settings, checked, suggestion
 from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
 from lightfield.formats import light_groups, published
-from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES, in_order
-from lightfield.formats.sensors import Sensor, SensorSettings
+from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
+from lightfield.formats.sensors import Sensor
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -70,98 +71,6 @@ _BLENDER_LIMITS = {
 # Planning more frames or views than these would take hours.
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
-# A reprojection may have all passes of light groups, too.
-_ReprojectedPassNames = Annotated[
-    list[Annotated[str, Field(json_schema_extra={"enum": [*PASSES, LIGHT_GROUPS]})]],
-    AfterValidator(lambda names: in_order(names, LIGHT_GROUPS)),
-]
-
-
-class Reprojection(ReprojectionOptions):
-    """Versions of the views through another lens, or as other files."""
-
-    rigs: list[str] | None = Field(
-        None,
-        min_length=1,
-        description="Rigs whose views are reprojected. Without this key, all rigs.",
-    )
-    format: Literal["png", "exr"] = Field(
-        "png", description="Format of the images. Only EXR has depth."
-    )
-    exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
-        0,
-        description="Exposure of the images. A list makes a folder for each of its values, such as "
-        "png_ev-2 and png_ev0.",
-        json_schema_extra={"unit": "stops"},
-    )
-    passes: _ReprojectedPassNames | None = Field(
-        None,
-        description="Passes of render.passes that are also reprojected, as EXR. light_groups: the "
-        "passes of all light groups.",
-    )
-    relight: Name | Light | None = Field(
-        None,
-        description="Light of the images, if it is not the rendered one: the name of an entry of "
-        "relight, or strengths as in such an entry.",
-    )
-    primaries: Primaries | None = Field(
-        None,
-        description="Colour space of EXR images, which the files name in their attribute "
-        "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",
-    )
-
-    @model_validator(mode="after")
-    def _has_use(self) -> Self:
-        for name in ("cube_map", "rotation", "filter", "samples"):
-            if self.camera is None and name in self.model_fields_set:
-                raise ValueError(f"{name}: needs camera; without one, nothing is resampled")
-        if self.format == "exr" and self.bits != 8:
-            raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
-        if self.format == "png" and self.primaries:
-            raise ValueError("primaries: is only for format exr; a PNG is sRGB")
-        lights = [
-            name
-            for name in self.passes or ()
-            if name == LIGHT_GROUPS or PASSES[name].kind == "light"
-        ]
-        if self.primaries == "acescg" and lights:
-            raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")
-        return self
-
-    @property
-    def suffix(self) -> str:
-        """The suffix of the images' names."""
-        return f".{self.format}"
-
-    @property
-    def settings(self) -> ReprojectionSettings:
-        """The settings of scripts/reproject.py."""
-        # `Scene` has made a reprojection for each exposure.
-        assert not isinstance(self.exposure, list)
-        options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
-        return ReprojectionSettings.of(
-            **options,
-            formats=[self.format],
-            exposure=self.exposure,
-            passes=self.passes or [],
-            # `loading` has replaced a name by its strengths.
-            relight=self.relight,
-            primaries=self.primaries,
-        )
-
-
-# The keys of a reprojection that say how its views are resampled.
-_OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
-
-
-class SensorReprojection(Reprojection):
-    """The same views as a sensor sees them. `Scene.developments` makes it from ``sensor``."""
-
-    sensor: SensorSettings
-
-    @property
-    def settings(self) -> ReprojectionSettings:
-        return super().settings.model_copy(update={"sensor": self.sensor})
 
 
 class Flow(Settings):
@@ -197,21 +106,6 @@ class Report(Settings):
         "cameras look outward in all directions. Otherwise, the page shows the view in the rig's "
         "middle.",
     )
-
-
-def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection]:
-    """Replace each reprojection of several exposures by one for each, named by its stops."""
-    bracketed: dict[str, Reprojection] = {}
-    for name, reprojection in reprojections.items():
-        if not isinstance(reprojection.exposure, list):
-            bracketed[name] = reprojection
-            continue
-        for stops in reprojection.exposure:
-            key = f"{name}_ev{stops:g}"
-            if key in bracketed or key in reprojections:
-                raise ValueError(f"{name}.exposure: must not name {key} twice")
-            bracketed[key] = reprojection.model_copy(update={"exposure": stops})
-    return bracketed
 
 
 class Credits(Settings):
@@ -271,7 +165,7 @@ class Scene(Credits):
         description="Camera setups, by the names of their folders. Leave it out with "
         "scene.dataset, which has its own cameras.",
     )
-    reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
+    reprojections: Annotated[dict[Name, ReprojectionEntry], AfterValidator(bracketed)] = Field(
         {},
         description="Versions of the views through other lenses or as other files, by the names of "
         "their folders.",
@@ -396,7 +290,9 @@ class Scene(Credits):
     @property
     def developments(self) -> dict[str, Reprojection]:
         """The reprojections, and those that ``sensor`` adds, by the names of their folders."""
-        developments = dict(self.reprojections)
+        developments = {
+            name: entry.resolved(self.light_of(entry)) for name, entry in self.reprojections.items()
+        }
         for source in self.sensor.sources if self.sensor else ():
             developments |= self._sensor_reprojections(source)
         return developments
@@ -404,13 +300,14 @@ class Scene(Credits):
     def _sensor_reprojections(self, source: str) -> dict[str, Reprojection]:
         """Return the reprojections that ``sensor`` adds for a source, by their folders' names."""
         assert self.sensor
-        original = self.reprojections.get(source) or Reprojection()
-        optics = original.model_dump(include={*_OPTICS}, exclude_unset=True)
+        original = self.reprojections.get(source) or ReprojectionEntry()
+        optics = {name: getattr(original, name) for name in OPTICS}
         return {
-            name: SensorReprojection.of(
+            name: Reprojection.of(
                 **optics,
                 rigs=self.sensor.rigs or original.rigs,
                 bits=8 if sensor.bits <= 8 else 16,
+                formats=["png"],
                 sensor=sensor,
             )
             for name, sensor in self.sensor.folders(source).items()
@@ -447,7 +344,7 @@ class Scene(Credits):
         if self.render and self.render.transparent:
             raise ValueError("sensor: does not go with render.transparent")
 
-    def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
+    def _check_reprojection(self, key: str, reprojection: ReprojectionEntry) -> None:
         """Check that a reprojection's rigs and passes exist."""
         self._check_rig_names(f"{key}.rigs", reprojection.rigs or ())
         if reprojection.relight is not None:
@@ -473,12 +370,12 @@ class Scene(Credits):
                 hint = suggestion(name, self.rigs)
                 raise ValueError(f"{key}: there is no rig {name!r}{hint}")
 
-    def light_of(self, reprojection: Reprojection) -> Any:
+    def light_of(self, reprojection: ReprojectionEntry) -> Any:
         """Return the strengths of a reprojection's light, or `each`. None for the light as is."""
         light = reprojection.relight
         return self.relight[light] if isinstance(light, str) and light in self.relight else light
 
-    def _check_light(self, key: str, reprojection: Reprojection) -> None:
+    def _check_light(self, key: str, reprojection: ReprojectionEntry) -> None:
         """Check that the groups of a light exist, as far as the scene YAML names them."""
         light = self.light_of(reprojection)
         at = f"{key}.relight"
@@ -534,12 +431,12 @@ class Scene(Credits):
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
             has_depth = self.render is None or self.render.depth != "none"
             reprojection = None if source == VIEWS else developments[source]
-            if reprojection and self.light_of(reprojection) == light_groups.EACH:
+            if reprojection and reprojection.relight == light_groups.EACH:
                 raise ValueError(
                     f"{key}: {source} has each view once for each light, and an export once"
                 )
             if reprojection:
-                has_depth &= reprojection.format == "exr"
+                has_depth &= reprojection.has_depth
             self._check_passes_of(key, source, export)
             motion = self.render and self.render.camera_motion
             is_resampled = reprojection is not None and reprojection.camera is not None

@@ -182,7 +182,7 @@ class Stages:
             ]
         )
         lightfield = LightField.read(arguments.input_cfg)
-        settings = dataset.reprojections[name].settings
+        settings = dataset.reprojections[name]
         pipeline.run(Job(arguments, settings, lightfield, lightfield.lens))
 
     def _write_splits(self) -> Path | None:

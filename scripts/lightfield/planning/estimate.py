@@ -8,8 +8,7 @@ from pathlib import Path
 from statistics import fmean
 
 from lightfield.configuration.dataset_paths import DatasetPaths
-from lightfield.configuration.reprojections import LIGHT_GROUPS
-from lightfield.configuration.scene_yaml import Reprojection, SensorReprojection
+from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.files import DAMAGE
 from lightfield.formats import light_groups, passes
 from lightfield.planning import memory
@@ -117,9 +116,9 @@ class Estimate:
         """Return the bytes of a pixel of a reprojection, with the files beside its views."""
         groups, others = self._reprojected_passes(reprojection)
         pass_bytes = COMPRESSED * (6 * groups + sum(each.bytes for each in others))
-        if reprojection.format == "exr":
+        if reprojection.has_depth:
             return 10 * COMPRESSED + pass_bytes
-        if not isinstance(reprojection, SensorReprojection):
+        if reprojection.sensor is None:
             return _PNG_BYTES * reprojection.bits / 8 + pass_bytes
         size = NOISY_BYTES * reprojection.bits / 8
         if reprojection.sensor.bracket is not None:
@@ -128,7 +127,7 @@ class Estimate:
 
     def _reprojected_passes(self, reprojection: Reprojection) -> tuple[int, list[passes.Pass]]:
         """Return the number of a reprojection's light groups, and its other passes."""
-        names = reprojection.passes or []
+        names = reprojection.passes
         groups = self.light_group_count if LIGHT_GROUPS in names else 0
         return groups, [passes.by_name(name) for name in names if name != LIGHT_GROUPS]
 
@@ -167,7 +166,7 @@ class Estimate:
         resampled_passes = 2 * groups + len(others)
         read_pixels += self.dataset.pixels * resampled_passes
         pixel_seconds = REPROJECTION_SECONDS * (1 + resampled_passes)
-        if isinstance(reprojection, SensorReprojection):
+        if reprojection.sensor:
             is_bracket = reprojection.sensor.bracket is not None
             pixel_seconds += BRACKET_SECONDS if is_bracket else SENSOR_SECONDS
         return read_pixels * READ_SECONDS + self._made_pixels(name) * pixel_seconds

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import InstanceOf, TypeAdapter
 
-from lightfield.configuration.reprojections import MOST_SAMPLES, ReprojectionSettings
+from lightfield.configuration.reprojections import MOST_SAMPLES, Reprojection
 from lightfield.core.cli import check_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
@@ -23,7 +23,7 @@ from lightfield.reprojection.flags import add_lens_map_flags, add_reproject_flag
 _MOST_PIXELS = 2**19
 
 
-class FlagSettings(ReprojectionSettings):
+class FlagSettings(Reprojection):
     """Settings with a lens that a scene YAML's camera may not be able to describe.
 
     Flags give angles in radians. --no-reproject with --scale gives the source's lens in another
@@ -63,19 +63,19 @@ def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
     return lightfield, lightfield.lens
 
 
-def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
+def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> Reprojection:
     """Return the settings of a lens map, from --settings or from the flags."""
     check_settings(arguments, add_lens_map_flags)
     if arguments.settings:
-        return read_settings(ReprojectionSettings, arguments.settings)
+        return read_settings(Reprojection, arguments.settings)
     return _of_flags(_lens_map_content(arguments, source))
 
 
-def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
+def reproject_settings(arguments: argparse.Namespace, source: Lens) -> Reprojection:
     """Return the settings of a reprojection, from --settings or from the flags."""
     check_settings(arguments, add_reproject_flags)
     if arguments.settings:
-        settings = read_settings(ReprojectionSettings, arguments.settings)
+        settings = read_settings(Reprojection, arguments.settings)
         if not settings.formats:
             raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
         return settings
@@ -90,7 +90,7 @@ def reproject_settings(arguments: argparse.Namespace, source: Lens) -> Reproject
     return _of_flags(content)
 
 
-def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
+def _of_flags(content: Mapping[str, Any]) -> Reprojection:
     return checked(_FLAG_SETTINGS, dict(content), "flags")
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.configuration.reprojections import ReprojectionSettings
+from lightfield.configuration.reprojections import Reprojection
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.reprojection import lens_map
@@ -34,7 +34,7 @@ class Geometry:
     samples: int
 
     @classmethod
-    def of(cls, settings: ReprojectionSettings, source: Lens) -> "Geometry":
+    def of(cls, settings: Reprojection, source: Lens) -> "Geometry":
         """Return the geometry of views through the lens ``source``."""
         return cls(source, _targets(settings, source), settings.filter, settings.samples)
 
@@ -51,7 +51,7 @@ class Geometry:
         )
 
 
-def _targets(settings: ReprojectionSettings, source: Lens) -> list[Target]:
+def _targets(settings: Reprojection, source: Lens) -> list[Target]:
     rotation = lens_map.rotation_matrix(*settings.rotation)
     lens = settings.lens(source)
     if not settings.cube_map:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.configuration.reprojections import LIGHT_GROUPS, ReprojectionSettings
+from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.formats import light_groups, lightfield, passes
@@ -62,7 +62,7 @@ class Job:
     def __init__(
         self,
         arguments: argparse.Namespace,
-        settings: ReprojectionSettings,
+        settings: Reprojection,
         lightfield: LightField,
         source: Lens,
     ) -> None:

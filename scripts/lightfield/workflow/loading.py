@@ -10,6 +10,7 @@ from lightfield.configuration.description import Cluster
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CHOSEN, Render
+from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
 from lightfield.core.names import VIEWS
@@ -189,20 +190,18 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
 
 def _reprojections_of(
     name: str, written: scene_yaml.Scene, limits: Preset
-) -> dict[str, scene_yaml.Reprojection]:
+) -> dict[str, Reprojection]:
     """Return the reprojections of a rig's views."""
     reprojections = {}
     for key, reprojection in written.developments.items():
         if name in (reprojection.rigs or written.rigs):
             camera = reprojection.camera and _limited(reprojection.camera, limits)
-            light = written.light_of(reprojection)
-            update = {"camera": camera, "relight": light}
-            reprojections[key] = reprojection.model_copy(update=update)
+            reprojections[key] = reprojection.model_copy(update={"camera": camera})
     return reprojections
 
 
 def _exports_of(
-    rig: Rig, written: scene_yaml.Scene, reprojections: dict[str, scene_yaml.Reprojection]
+    rig: Rig, written: scene_yaml.Scene, reprojections: dict[str, Reprojection]
 ) -> Exports:
     """Return the exports of a rig's views and ``reprojections``.
 
