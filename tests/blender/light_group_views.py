@@ -15,7 +15,8 @@ from lightfield.core.errors import UserError
 from lightfield.formats.light_groups import resolved
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, inventory, light, shard
+from lightfield.rendering import blend_file, inventory, light
+from lightfield.stages.views import RenderShard
 
 SIZE = 24
 LENSES = {
@@ -111,16 +112,14 @@ def main(folder: Path) -> None:
             RIG, lenses.from_camera(LENSES[lens]), depth=None, frame=1, scene={}, render=block
         )
         content.write(folder / name / "lightfield.json")
-        shard.render(
-            content,
-            ":",
-            folder / name / "exr",
+        RenderShard(
+            lightfield=folder / name / "lightfield.json",
+            output=folder / name / "exr",
             blend=folder / "scene.blend",
-            inventory=None,
             device="cpu",
             threads=1,
             record=folder / f"{name}.json",
-        )
+        ).run()
 
     groups = resolved("each", emitters)
     for lens in LENSES:

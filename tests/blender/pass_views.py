@@ -19,7 +19,8 @@ from mathutils import Vector
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, shard
+from lightfield.rendering import blend_file
+from lightfield.stages.views import RenderShard
 
 # The wall's places at the frames 1, 2 and 3. Frame 2 is rendered.
 WALL = [(-0.1, 2.8, 0), (0, 3, 0), (0.25, 3.1, 0.05)]
@@ -227,17 +228,16 @@ def main(folder: Path) -> None:
 
     def render(name, content, views=":"):
         content.write(folder / name / "lightfield.json")
-        shard.render(
-            content,
-            views,
-            folder / name / "exr",
+        RenderShard(
+            lightfield=folder / name / "lightfield.json",
+            views=views,
+            output=folder / name / "exr",
             blend=blend,
-            inventory=None,
             device="cpu",
             threads=1,
             record=folder / f"{name}.json",
             journal=folder / f"{name}.jsonl",
-        )
+        ).run()
 
     objects = {}
     for name in LENSES:

@@ -18,7 +18,8 @@ from lightfield.configuration import keys
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, shard
+from lightfield.rendering import blend_file
+from lightfield.stages.views import RenderShard
 
 # The view shows rows of square tiles.
 ROW = 12
@@ -394,16 +395,14 @@ def main(folder: Path) -> None:
     for name, choice in CHOICES.items():
         lightfield = content(**choice)
         lightfield.write(folder / name / "lightfield.json")
-        shard.render(
-            lightfield,
-            ":",
-            folder / name / "exr",
+        RenderShard(
+            lightfield=folder / name / "lightfield.json",
+            output=folder / name / "exr",
             blend=blend,
-            inventory=None,
             device="cpu",
             threads=1,
             record=folder / f"{name}.json",
-        )
+        ).run()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ import bpy
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, shard
+from lightfield.rendering import blend_file
+from lightfield.stages.views import RenderShard
 
 SIZE = 48
 LENSES = {
@@ -248,16 +249,14 @@ def main(folder: Path) -> None:
         block = {**RENDER, **settings}
         content = LightField.from_rig(rig, made, depth=depth, frame=1, scene={}, render=block)
         content.write(folder / name / "lightfield.json")
-        shard.render(
-            content,
-            ":",
-            folder / name / "exr",
+        RenderShard(
+            lightfield=folder / name / "lightfield.json",
+            output=folder / name / "exr",
             blend=folder / "scene.blend",
-            inventory=None,
             device="cpu",
             threads=1,
             record=folder / f"{name}.json",
-        )
+        ).run()
 
     for lens in LENSES:
         render(lens, lens)

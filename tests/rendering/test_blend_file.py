@@ -13,7 +13,6 @@ from lightfield.configuration import config_file, scene_yaml
 from lightfield.core import download, names
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.core.stage import NoSettings
 from lightfield.stages.scene import CheckBlend
 from lightfield.workflow.loading import load_datasets, scene_datasets
 from lightfield.workflow.presence import check_presence
@@ -210,7 +209,7 @@ def scene(tmp_path, monkeypatch):
 def check(blend, scene="own"):
     output = blend.with_suffix(".json")
     output.unlink(missing_ok=True)
-    CheckBlend(settings=NoSettings(), scene=scene, blend=blend, output=output).run()
+    CheckBlend(scene=scene, blend=blend, output=output).run()
     return json.loads(output.read_text())
 
 

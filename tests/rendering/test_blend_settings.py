@@ -18,6 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.rendering import lightfield_file
+from lightfield.stages.views import RenderShard
 from lightfield.workflow.loading import datasets_of
 
 CASES = [
@@ -130,7 +131,7 @@ def without_change(tmp_path_factory):
 
 def of_plenoforge(path, yaml):
     """Return the picture (height, width, 4), depth, and the note that Plenoforge makes."""
-    from lightfield.rendering import inventory_file, shard
+    from lightfield.rendering import inventory_file
 
     content = {
         "scene": {
@@ -156,7 +157,15 @@ def of_plenoforge(path, yaml):
     views = lightfield_file.from_settings(LightfieldSettings.of_capture(dataset), inventory)
     folder = path.parent / "exr"
     with contextlib.redirect_stderr(io.StringIO()):
-        shard.render(views, ":", folder, blend=path, inventory=inventory, device="cpu", threads=1)
+        views.write(path.parent / "lightfield.json")
+        RenderShard(
+            lightfield=path.parent / "lightfield.json",
+            output=folder,
+            blend=path,
+            inventory=inventory,
+            device="cpu",
+            threads=1,
+        ).run()
     channels = "RGBA" if views.transparent else "RGB"
     image = images.read_image(folder / f"{views.views[0].name}.exr", [*channels, "Z"])
     pixels = np.stack([image.channels[name] for name in channels], axis=-1)

@@ -18,6 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.rendering import lightfield_file
+from lightfield.stages.views import RenderShard
 from lightfield.validation.validate import validate
 from lightfield.workflow.loading import datasets_of
 
@@ -60,7 +61,7 @@ DIFFERENT = 0.01
 
 def dataset(path, folder, change=None, **scene):
     """Render the views of a .blend with a change into ``folder``. Return them and the notes."""
-    from lightfield.rendering import inventory_file, shard
+    from lightfield.rendering import inventory_file
 
     save(path, blend_scenes.studio, change)
     content = {
@@ -82,9 +83,14 @@ def dataset(path, folder, change=None, **scene):
     views = lightfield_file.from_settings(LightfieldSettings.of_capture(made), inventory)
     views.write(folder / "lightfield.json")
     with contextlib.redirect_stderr(io.StringIO()):
-        shard.render(
-            views, ":", folder / "exr", blend=path, inventory=inventory, device="cpu", threads=1
-        )
+        RenderShard(
+            lightfield=folder / "lightfield.json",
+            output=folder / "exr",
+            blend=path,
+            inventory=inventory,
+            device="cpu",
+            threads=1,
+        ).run()
     pictures = []
     for view in views.views:
         image = images.read_image(folder / "exr" / f"{view.name}.exr", "RGB")

@@ -9,6 +9,7 @@ from lightfield.core.files import read_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
+from lightfield.stages.views import RenderShard
 
 pytestmark = pytest.mark.slow
 
@@ -97,7 +98,6 @@ def write_scene(folder, libraries):
 
 def rendered(folder, *passes):
     """Render two views of main.blend into a new folder. Return its path."""
-    from lightfield.rendering import shard
 
     rig = rigs.from_settings(
         {"type": "plane", "cameras": [2, 1], "size": [0.6, 1, 1], "center": [0, -4, 0.3]}
@@ -112,15 +112,14 @@ def rendered(folder, *passes):
     }
     views = LightField.from_rig(rig, lenses.from_camera(CAMERA), frame=1, render=render, depth="z")
     target = folder / "-".join(["made", *passes])
-    shard.render(
-        views,
-        ":",
-        target / "exr",
+    views.write(target / "lightfield.json")
+    RenderShard(
+        lightfield=target / "lightfield.json",
+        output=target / "exr",
         blend=folder / "main.blend",
-        inventory=None,
         device="cpu",
         threads=1,
-    )
+    ).run()
     return target
 
 

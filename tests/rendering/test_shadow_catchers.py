@@ -11,6 +11,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
+from lightfield.stages.views import RenderShard
 from lightfield.validation import validate as validation
 
 pytestmark = pytest.mark.slow
@@ -58,7 +59,6 @@ def write_scene(path):
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory, run_program):
     """A dataset of views all around the cube, some of them from below, without its .blend."""
-    from lightfield.rendering import shard
 
     folder = tmp_path_factory.mktemp("catcher") / "dataset"
     blend = folder.parent / "catcher.blend"
@@ -75,15 +75,13 @@ def rendered(tmp_path_factory, run_program):
         rigs.from_settings(rig), lenses.from_camera(CAMERA), frame=1, render=RENDER, depth="z"
     ).with_flow()
     views.write(folder / "lightfield.json")
-    shard.render(
-        LightField.read(folder / "lightfield.json"),
-        ":",
-        folder / "exr",
+    RenderShard(
+        lightfield=folder / "lightfield.json",
+        output=folder / "exr",
         blend=blend,
-        inventory=None,
         device="cpu",
         threads=2,
-    )
+    ).run()
     run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
     return folder
 
@@ -193,7 +191,7 @@ def test_passes_that_a_shadow_catcher_spoils_are_refused(tmp_path):
 def test_a_holdout_is_no_surface(transparent, tmp_path):
     import bpy
 
-    from lightfield.rendering import blend_file, shard
+    from lightfield.rendering import blend_file
 
     path = tmp_path / "holdout.blend"
     write_scene(path)
@@ -206,7 +204,14 @@ def test_a_holdout_is_no_surface(transparent, tmp_path):
         rigs.from_settings(rig), lenses.from_camera(CAMERA), frame=1, render=render, depth="z"
     )
     folder = tmp_path / "exr"
-    shard.render(lightfield, ":", folder, blend=path, inventory=None, device="cpu", threads=1)
+    lightfield.write(tmp_path / "lightfield.json")
+    RenderShard(
+        lightfield=tmp_path / "lightfield.json",
+        output=folder,
+        blend=path,
+        device="cpu",
+        threads=1,
+    ).run()
     (view,) = lightfield.views
     cube, ground, _ = true_distances(lightfield, view)
     image = planes(tmp_path, "exr", view)

@@ -73,6 +73,12 @@ class Stage(BaseModel, Generic[StageSettings]):
         return cls.model_fields["settings"].annotation  # type: ignore[return-value]
 
 
+class PlainStage(Stage[NoSettings]):
+    """A stage without settings: its files and options say everything."""
+
+    settings: NoSettings = NoSettings()
+
+
 def reads(text: str, default: Any = ..., **flag: Any) -> Any:
     """Return a field for a file or folder that a stage reads. ``text`` says what it is.
 

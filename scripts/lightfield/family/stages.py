@@ -20,16 +20,16 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.names import VIEWS
-from lightfield.core.stage import NoSettings
 from lightfield.export import MANIFESTS, instant_ngp
 from lightfield.formats.layout import SUMS, write_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
-from lightfield.rendering import inventory_file, shard
+from lightfield.rendering import inventory_file
 from lightfield.reprojection import flags, pipeline
 from lightfield.reprojection.job import Job
 from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
 from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings
+from lightfield.stages.views import RenderShard
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
 from lightfield.validation.validate import validate
@@ -133,7 +133,6 @@ class Stages:
             ).run()
         with self._stage("check_cameras"):
             CheckCameras(
-                settings=NoSettings(),
                 blend=self.blend,
                 lightfield=lightfield,
                 output=Path(str(dataset.cameras)),
@@ -142,17 +141,16 @@ class Stages:
     def _render(self, dataset: Dataset) -> None:
         with self._stage("render"):
             (record,) = dataset.records("render")
-            shard.render(
-                LightField.read(Path(dataset.folder, "lightfield.json")),
-                ":",
-                Path(dataset.folder, "exr"),
+            RenderShard(
                 blend=self.blend,
+                lightfield=Path(dataset.folder, "lightfield.json"),
                 inventory=self.inventory,
-                device=self.device,
-                threads=self.threads,
+                output=Path(dataset.folder, "exr"),
                 record=Path(record),
                 journal=Path(record).with_suffix(".journal.jsonl"),
-            )
+                device=self.device,
+                threads=self.threads,
+            ).run()
 
     def _reproject(self, dataset: Dataset, name: str) -> None:
         """Make the images of a reprojection, and its lightfield.json."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from lightfield.core.leftovers import temporary_folder
 from lightfield.formats.lightfield import LightField
-from lightfield.rendering import shard
+from lightfield.stages.views import RenderShard
 from lightfield.workflow import journal
 
 
@@ -51,16 +51,17 @@ def rendered(
     lightfield: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
 ) -> journal.Run:
     """Render a dataset into a new ``folder``. Return its run from the journal."""
+    path = folder / "lightfield.json"
+    lightfield.write(path)
     log = folder / "journal.jsonl"
-    shard.render(
-        lightfield,
-        ":",
-        folder / "exr",
+    RenderShard(
         blend=blend,
+        lightfield=path,
         inventory=inventory,
+        output=folder / "exr",
+        journal=log,
         device=device,
         threads=threads,
-        journal=log,
-    )
+    ).run()
     (run,) = journal.read(log)
     return run

@@ -37,6 +37,7 @@ from lightfield.geometry.flow import shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.planning import memory
+from lightfield.stages.views import RenderShard
 from lightfield.workflow.journal import Journal, is_suspect
 from lightfield.workflow.records import ShardRecord
 
@@ -47,58 +48,42 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 
-def render(
-    lightfield: LightField,
-    views: str,
-    folder: Path,
-    *,
-    blend: Path,
-    inventory: Path | None,
-    device: str,
-    threads: int | None,
-    record: Path | None = None,
-    journal: Path | None = None,
-    stall: int = 0,
-) -> None:
-    """Render those of the ``views``, FIRST:END, that are missing in ``folder``.
+def render(job: RenderShard) -> None:
+    """Render those of the chosen views that are missing.
 
-    Passes go into folders beside it. So do the names of the objects, materials and instances that
-    passes number. ``blend`` is the scene, and ``inventory`` a JSON of what it contains. ``threads``
-    None means all processors. ``record`` and ``journal`` are files to write, or None. A view that
-    takes more than ``stall`` seconds ends the process by SIGALRM. 0 sets no limit.
+    Passes go into folders beside that of the views. So do the names of the objects, materials and
+    instances that passes number. A view that takes too long ends the process by SIGALRM.
 
-    Raises `UserError` if the scene cannot be opened, if the ``device`` is missing, or if a file
-    cannot be written.
+    Raises `UserError` if the scene cannot be opened, if the device is missing, or if a file cannot
+    be written.
     """
+    lightfield = LightField.read(job.lightfield)
+    folder = job.output
     images.check_codec(lightfield.render.compression or "zip")
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
-    shard_journal = Journal(journal)
-    shard_record = ShardRecord(record, folder)
-    chosen_views = lightfield.views[view_slice(views, len(lightfield.views))]
+    journal = Journal(job.journal)
+    record = ShardRecord(job.record, folder)
+    chosen_views = lightfield.views[view_slice(job.views, len(lightfield.views))]
     missing_views = [
-        view for view in chosen_views if not _is_finished(view, lightfield, folder, shard_record)
+        view for view in chosen_views if not _is_finished(view, lightfield, folder, record)
     ]
     name_files = _name_files(lightfield, folder)
     names_key = keys.names_key(lightfield)
-    missing_name_files = [
-        path for path in name_files if not shard_record.is_finished(path, names_key)
-    ]
+    missing_name_files = [path for path in name_files if not record.is_finished(path, names_key)]
     _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing_views)
     # The dataset's folder names the scene and the rig, and the frame of a sequence.
-    label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
+    label = f"render {folder.parent}" + (f" {job.views}" if job.views != ":" else "")
     progress = Progress(len(missing_views), label, already=len(chosen_views) - len(missing_views))
     if missing_views or missing_name_files:
-        _open_scene(lightfield, blend, inventory, device, threads, shard_journal)
+        _open_scene(job, lightfield, journal)
         for path in missing_name_files:
             write_json(path, _names(path.parent.name))
-            shard_record.add(path, names_key)
-        _render_views(
-            missing_views, lightfield, folder, shard_record, shard_journal, progress, stall
-        )
+            record.add(path, names_key)
+        _render_views(missing_views, lightfield, folder, record, journal, progress, job.stall)
     view_files = [path for view in chosen_views for path in _files(folder, view, lightfield.passes)]
-    shard_record.write([*name_files, *view_files])
-    shard_journal.end()
+    record.write([*name_files, *view_files])
+    journal.end()
 
 
 def _is_finished(view: View, lightfield: LightField, folder: Path, record: ShardRecord) -> bool:
@@ -131,22 +116,15 @@ def _names(kind: str) -> dict[str, int]:
     return instances.shown().names if kind == "instance" else ids.names(kind)
 
 
-def _open_scene(
-    lightfield: LightField,
-    blend: Path,
-    inventory: Path | None,
-    device: str,
-    threads: int | None,
-    journal: Journal,
-) -> None:
+def _open_scene(job: RenderShard, lightfield: LightField, journal: Journal) -> None:
     """Open the scene in Blender, set Cycles up, and journal how long that took."""
-    contents = read_inventory(inventory, "left_out") if inventory else None
-    _check_memory(blend, contents or {}, lightfield)
-    threads = threads or processors.available()
+    contents = read_inventory(job.inventory, "left_out") if job.inventory else None
+    _check_memory(job.blend, contents or {}, lightfield)
+    threads = job.threads or processors.available()
     # A finished shard does not import Blender, which takes a second.
     with processors.only(threads):
         from lightfield.rendering import cycles
-    used_device = cycles.set_up(blend, contents, lightfield, device, threads)
+    used_device = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
     journal.append(
         {
             "start_up_seconds": round(time.time() - journal.started, 4),

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import rig, scene
+from lightfield.stages import rig, scene, views
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -14,5 +14,9 @@ STAGES: list[type[Stage[Any]]] = [
     rig.MakeLightfield,
     rig.FreePlaces,
     rig.CheckCameras,
+    views.RenderShard,
+    views.ImportViews,
+    views.Flow,
+    views.Splits,
 ]
 BY_NAME = {stage.name: stage for stage in STAGES}

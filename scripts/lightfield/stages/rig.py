@@ -9,7 +9,7 @@ from pydantic import Field, PlainSerializer
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.settings import Settings
-from lightfield.core.stage import ByHand, NoSettings, Stage, option, reads, writes
+from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.geometry.rigs import Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 
@@ -83,7 +83,7 @@ class MakeLightfield(Stage[LightfieldSettings]):
     output: Path = writes("lightfield.json to write")
 
 
-class CheckCameras(Stage[NoSettings]):
+class CheckCameras(PlainStage):
     """Finds cameras that are inside geometry, or that would show it wrongly."""
 
     name = "check_cameras"

@@ -18,7 +18,7 @@ from lightfield.configuration.scene_source import (
 )
 from lightfield.core.names import builders
 from lightfield.core.settings import Settings
-from lightfield.core.stage import NoSettings, Stage, cause, option, reads, writes
+from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.geometry.rigs.rig import Frame
 
 
@@ -101,7 +101,7 @@ class ImportModel(Stage[ImportSettings]):
     )
 
 
-class FetchBlend(Stage[NoSettings]):
+class FetchBlend(PlainStage):
     """Downloads the .blend of a scene YAML."""
 
     name = "fetch_blend"
@@ -111,7 +111,7 @@ class FetchBlend(Stage[NoSettings]):
     output: Path = writes(".blend to write")
 
 
-class CheckBlend(Stage[NoSettings]):
+class CheckBlend(PlainStage):
     """Checks that a .blend has the SHA-256 that is recorded for its scene."""
 
     name = "check_blend"
@@ -122,7 +122,7 @@ class CheckBlend(Stage[NoSettings]):
     output: Path = writes("JSON to write if the .blend has the right SHA-256")
 
 
-class Inventory(Stage[NoSettings]):
+class Inventory(PlainStage):
     """Lists what a scene contains, and what its rendering can leave out."""
 
     name = "inventory"

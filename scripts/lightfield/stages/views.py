@@ -1,0 +1,76 @@
+"""The stages that make views, and what follows from views alone: flow, and the list of splits."""
+
+from pathlib import Path
+from typing import Literal
+
+from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.stage import PlainStage, option, reads, writes
+
+Device = Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"]
+
+LIGHTFIELD = "lightfield.json of the dataset"
+VIEWS = "which frames of lightfield.json, as a slice from 0, END excluded (default: all)"
+FIRST_END = "FIRST:END"
+
+
+class RenderShard(PlainStage):
+    """Renders some views of a dataset in one process."""
+
+    name = "render_shard"
+    function = "lightfield.rendering.shard:render"
+
+    blend: Path = reads("the scene's .blend")
+    lightfield: Path = reads(LIGHTFIELD)
+    inventory: Path | None = reads(
+        "JSON that scripts/inventory.py wrote for the scene, which lists what rendering can leave "
+        "out",
+        None,
+    )
+    views: str = option(VIEWS, ":", metavar=FIRST_END)
+    output: Path = writes("folder to write the views to")
+    record: Path | None = writes("JSON to write: the sizes and checksums of the views", None)
+    journal: Path | None = writes(
+        "file to which a JSON line is added for each view, with its time", None
+    )
+    device: Device = option("device on which Cycles renders", "auto")
+    threads: AtLeastOne | None = option("CPU threads (default: all cores)", None)
+    stall: int = option(
+        "seconds after which a view counts as hung and the process ends (default: 0, never)",
+        0,
+        metavar="S",
+    )
+
+
+class ImportViews(PlainStage):
+    """Imports views that somebody else has rendered: links or copies them, and records them."""
+
+    name = "import_views"
+    function = "lightfield.rendering.imported_views:import_views"
+
+    dataset: Path = reads("folder of the existing dataset, with views in exr/")
+    lightfield: Path = reads("lightfield.json of the dataset to write")
+    views: str = option(VIEWS, ":", metavar=FIRST_END)
+    output: Path = writes("folder to write the views to")
+    record: Path | None = writes("JSON to write: the sizes and checksums of the views", None)
+
+
+class Flow(PlainStage):
+    """Computes the optical flow from views of a dataset to their neighbours."""
+
+    name = "flow"
+    function = "lightfield.export.flow:write_flow"
+
+    lightfield: Path = reads(LIGHTFIELD)
+    views: str = option(VIEWS, ":", metavar=FIRST_END)
+    output: Path = writes("folder to write", metavar="FOLDER")
+    record: Path | None = writes("JSON to write: the sizes and checksums of the files", None)
+
+
+class Splits(PlainStage):
+    """Lists which views of a scene's rigs are for training, validation and testing."""
+
+    name = "splits"
+    function = "lightfield.export.splits:write_splits"
+
+    lightfields: list[Path] = reads("the rigs' lightfield.json files", positional=True)
+    output: Path = writes("splits.json to write")
