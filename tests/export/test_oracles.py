@@ -67,6 +67,7 @@ EXPORTS = {
     "fisheye": {
         "colmap": {"points": 60},
         "lichtfeld": {"points": 60, "depth": True},
+        "nerfstudio": {"points": 60, "depth": True},
         "opendibr": {},
         "scannetpp": {"points": 60},
     },
