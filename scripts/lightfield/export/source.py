@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy
+from lightfield.formats.depth import depth_meaning
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import (
     LARGEST_STEP,
-    distance_from_z,
+    converted,
     in_16_bits,
-    z_from_distance,
 )
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -306,17 +306,14 @@ def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> 
     image = images.read_image(path, ["Z"])
     check_size(path, lightfield, image.channels["Z"])
     depth = image.channels["Z"].astype(np.float64)
-    stored_meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, lightfield.depth)
+    stored_meaning = depth_meaning(image.attributes, lightfield)
     if stored_meaning not in ("z", "distance"):
         raise UserError(
             f"{lightfield.path}: depth: is {stored_meaning!r}; must be z or distance "
             "to say what channel Z of the views holds"
         )
-    if stored_meaning == meaning:
-        # A pixel without a ray has no depth.
-        return np.where(np.isnan(rays[..., 2]), np.nan, depth)
-    convert = z_from_distance if meaning == "z" else distance_from_z
-    return convert(depth, rays)
+    # A pixel without a ray has no depth.
+    return np.where(np.isnan(rays[..., 2]), np.nan, converted(depth, rays, stored_meaning, meaning))
 
 
 def check_size(path: Path, lightfield: LightField, pixels: NDArray[Any]) -> None:

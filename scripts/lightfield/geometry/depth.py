@@ -23,13 +23,15 @@ def conventional_depth(lens: Lens) -> str:
     return "z" if isinstance(lens, Rectilinear) else "distance"
 
 
-def stored_distance(depth: Array, rays: Array, meaning: str | None) -> Array:
-    """Return the distance (...) in metres of the ``depth`` (...) that a view stores.
+def converted(depth: Array, rays: Array, stored: str | None, wanted: str) -> Array:
+    """Return ``depth`` (...) in metres, which is ``stored`` as "z" or "distance", as ``wanted``.
 
-    If ``meaning`` is "z", the depth is Z-depth, and the unit ``rays`` (..., 3) convert it. If
-    ``meaning`` is "distance", the depth is returned unchanged.
+    The unit ``rays`` (..., 3) convert it, if that is another. ``stored`` is None if there is no
+    depth to convert: all of it is inf or NaN.
     """
-    return distance_from_z(depth, rays) if meaning == "z" else depth
+    if stored in (wanted, None):
+        return depth
+    return z_from_distance(depth, rays) if wanted == "z" else distance_from_z(depth, rays)
 
 
 def z_from_distance(distance: Array, rays: Array) -> Array:

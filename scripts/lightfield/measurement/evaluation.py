@@ -20,7 +20,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path
 from lightfield.export.source import Bools, Floats, SourceDataset, check_size
 from lightfield.formats.lightfield import View
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
@@ -255,7 +255,7 @@ def regions(
     by_name = {"all": compared, "centre": compared & inner, "rim": compared & ~inner}
     if depth is not None:
         # Compare distances: towards the rim of a wide lens, Z decreases on any surface.
-        distance = stored_distance(depth, rays, source.lightfield.depth)
+        distance = converted(depth, rays, source.lightfield.depth, "distance")
         finite_distance = np.where(np.isfinite(distance), distance, 1e9)
         near = minimum_filter(np.where(valid, finite_distance, np.inf), _EDGE_PIXELS)
         far = maximum_filter(np.where(valid, finite_distance, 0), _EDGE_PIXELS)

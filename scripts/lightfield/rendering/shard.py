@@ -384,10 +384,9 @@ def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | Non
     ``rays`` are those of `depth_rays`.
     """
     z = cycles_depth
-    if rays is not None and lightfield.depth == "z":
-        z = depth.z_from_distance(z, rays)
-    elif rays is not None:
-        z = depth.distance_from_z(z, rays)
+    if rays is not None:
+        assert lightfield.depth
+        z = depth.converted(z, rays, depth.conventional_depth(lightfield.lens), lightfield.depth)
     # Outside the image circle there is no ray, and a pixel without a ray hits nothing.
     z = np.where(np.isnan(z), np.inf, z)
     return depth.with_precision(z, lightfield.render.depth_precision)

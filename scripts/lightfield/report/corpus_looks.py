@@ -19,7 +19,7 @@ from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.imaging import images, pictures
 from lightfield.workflow.member_record import MemberRecord
 
@@ -144,13 +144,13 @@ def _measured_views(dataset: Path) -> Iterator[dict[str, Any]]:
 def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
     """Return a view's sums over its pixels, which `_look` puts together.
 
-    ``rays`` (height, width, 3) and the ``meaning`` of depth are those of `stored_distance`.
+    ``rays`` (height, width, 3) and the ``meaning`` of depth are those of `converted`.
     """
     image = images.read_image(path)
     colour = np.where(np.isfinite(image.colour), image.colour, 0)
     alpha = image.channels.get("A", np.ones(colour.shape[:2], np.float32)).astype(np.float32)
     depth = image.channels.get("Z", np.full(alpha.shape, math.inf, np.float32))
-    distance = stored_distance(depth, rays, meaning)
+    distance = converted(depth, rays, meaning, "distance")
     hit = distance[np.isfinite(distance) & (distance > 0)]
     return {
         "image": np.dstack([colour, alpha]),

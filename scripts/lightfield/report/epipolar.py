@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs import Rig
 
@@ -129,7 +129,7 @@ def sample(
         column = np.minimum(x[visible].astype(int), width - 1)
         line = np.minimum(y[visible].astype(int), height - 1)
         stored = depth[line, column].astype(np.float64)
-        distance = stored_distance(stored, lens.rays(column + 0.5, line + 0.5), meaning)
+        distance = converted(stored, lens.rays(column + 0.5, line + 0.5), meaning, "distance")
         reach[visible] = distance / np.linalg.norm(camera_rays[visible], axis=-1)
     return light, reach
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.export.points import evenly
 from lightfield.formats.lightfield import LightField
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
@@ -226,7 +226,7 @@ def _pictures(
     rays = small.pixel_rays()
     reach = depth_range(depths)
     matrices = lightfield.matrices
-    distances = stored_distance(depths, rays, lightfield.depth)
+    distances = converted(depths, rays, lightfield.depth, "distance")
     farther = seeming_farther(small, light, distances, matrices[embedded])
     for entry, depth, steps in zip(packed, depths, farther, strict=True):
         entry["depth"] = webp(pack_depth(depth, reach, steps))

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.formats.depth import depth_meaning
 from lightfield.geometry.depth import in_16_bits, with_precision
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
@@ -44,13 +45,13 @@ class _Face:
     """One image file of a view: the whole view, or one face of a cube map.
 
     ``colour`` (h, w, 4) is linear float32. ``meaning`` says whether ``depth`` (h, w) is "z" or
-    "distance". ``unshown`` is the header's `UNSHOWN_ATTRIBUTE`.
+    "distance". None if nothing says so. ``unshown`` is the header's `UNSHOWN_ATTRIBUTE`.
     """
 
     colour: Array
     depth: Array | None
     has_alpha: bool
-    meaning: Attribute | None
+    meaning: str | None
     unshown: Attribute | None
 
 
@@ -71,9 +72,7 @@ class SourcePixels:
         depths = [face.depth for face in faces if face.depth is not None]
         self.depth = _side_by_side(depths) if len(depths) == len(faces) else None
         self.has_alpha = faces[0].has_alpha
-        # Trust the file first: another program may have written the lightfield.json.
-        meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
-        self.is_z = meaning == "z"
+        self.is_z = (faces[0].meaning or job.source.usual_depth) == "z"
         self.unshown = faces[0].unshown
         self.is_relit = False
 
@@ -120,7 +119,7 @@ class SourcePixels:
             colour,
             depth,
             alpha is not None,
-            image.attributes.get(DEPTH_ATTRIBUTE),
+            depth_meaning(image.attributes, job.lightfield),
             image.attributes.get(UNSHOWN_ATTRIBUTE),
         )
 
@@ -238,7 +237,7 @@ def _developed(
     settings = job.settings
     transparent = job.lightfield.transparent
     encode = to_8_bit if settings.bits == 8 else to_16_bit
-    strips, depth = _resampled(job, lens_map, source, target.lens.has_z_depth)
+    strips, depth = _resampled(job, lens_map, source, target.lens.usual_depth == "z")
     size = lens_map.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)

@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_cdt
 from lightfield.core.errors import UserError
 from lightfield.export.source import SourceDataset, pixel_indices
 from lightfield.formats.lightfield import View
-from lightfield.geometry.depth import z_from_distance
+from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
@@ -63,9 +63,9 @@ class Synthesised:
         """Return an EXR's channels R, G, B, A and Z. ``depth``, "z" or "distance", is Z's kind."""
         with np.errstate(over="ignore"):
             colour = np.nan_to_num(self.colour.clip(max=images.HALF_MAX)).astype(np.float16)
-        distance = z_from_distance(self.distance, rays) if depth == "z" else self.distance
+        z = converted(self.distance, rays, "distance", depth)
         channels = dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True))
-        return channels | {"A": (~self.holes).astype(np.float16), "Z": distance.astype(np.float32)}
+        return channels | {"A": (~self.holes).astype(np.float16), "Z": z.astype(np.float32)}
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ class Camera:
     def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
         """Return the world points (..., 3) at ``depth`` along the rays of the pixel centres."""
         rays = self.lens.rays(columns + 0.5, rows + 0.5)
-        distance = stored_distance(depth, rays, self.depth)
+        distance = converted(depth, rays, self.depth, "distance")
         with np.errstate(invalid="ignore"):
             arms = rays * distance[..., np.newaxis]
             points: Array = arms @ self.world_matrix[:3, :3].T + self.position

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
+from lightfield.formats.depth import depth_meaning
 from lightfield.formats.layout import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.formats.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
@@ -140,7 +141,7 @@ class Examiner:
         depth = image.channels.get("Z")
         if depth is not None:
             meaning = image_set.lightfield.depth
-            header = image.attributes.get(images.DEPTH_ATTRIBUTE, meaning)
+            header = depth_meaning(image.attributes, image_set.lightfield)
             text = f"is {header!r} by its header, {meaning!r} by its list"
             facts.fault("depth", text, header != meaning)
             if is_rendered:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.formats.layout import ImageSet
-from lightfield.geometry.depth import stored_distance
+from lightfield.geometry.depth import converted
 from lightfield.imaging.images import Image
 from lightfield.imaging.tonemap import encode_srgb
 
@@ -151,10 +151,11 @@ def _depth_faults(
 ) -> Iterator[str]:
     """Yield how the distances differ from those of the source, where it has a smooth surface."""
     around, weights = _four_around(source, original, rays)
-    distance = stored_distance(
+    distance = converted(
         image.channels["Z"][rays.rows, rays.columns].astype(np.float64),
         rays.rays,
         target.lightfield.depth,
+        "distance",
     )
     with np.errstate(invalid="ignore", divide="ignore"):
         is_surface = around.max(axis=1) <= _ONE_SURFACE * around.min(axis=1)
@@ -189,7 +190,9 @@ def _four_around(source: ImageSet, original: Image, rays: _Rays) -> tuple[Floats
     for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
         x = np.minimum(columns + right, lens.width - 1)
         y = np.minimum(rows + down, lens.height - 1)
-        values = stored_distance(depth[y, x], lens.rays(x + 0.5, y + 0.5), source.lightfield.depth)
+        values = converted(
+            depth[y, x], lens.rays(x + 0.5, y + 0.5), source.lightfield.depth, "distance"
+        )
         distances.append(np.where(is_inside, values, np.nan))
         weights.append(np.abs(parts - (1 - right, 1 - down)).prod(axis=1))
     return np.stack(distances, axis=1), np.stack(weights, axis=1)
