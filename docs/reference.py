@@ -44,8 +44,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
-from lightfield.measurement.costs import CostSettings, FullSize
-from lightfield.measurement.gpu_check import GpuCheckSettings
+from lightfield.stages import measurement
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
 from lightfield.stages.registry import BY_NAME
@@ -261,9 +260,12 @@ KEY_PAGES: dict[str, Page] = {
         "[settings file](job-keys.md) like the other programs.",
         [
             Section("synthesis_quality.py", job_settings.SynthesisSettings),
-            Section("costs.py", CostSettings),
-            Section("costs.py: full_size", FullSize),
-            Section("gpu_check.py", GpuCheckSettings),
+            Section("costs.py", measurement.CostSettings),
+            Section("costs.py: full_size", measurement.FullSize),
+            Section("probe.py", measurement.ProbeSettings),
+            Section("calibrate.py", measurement.CalibrationSettings),
+            Section("error_vs_time.py", measurement.ErrorVsTimeSettings),
+            Section("gpu_check.py", measurement.GpuCheckSettings),
         ],
     ),
 }

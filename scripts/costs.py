@@ -38,75 +38,8 @@ their pixels. They are an upper estimate, because larger views compress better. 
 deleted and the views were kept.
 """
 
-import argparse
-from pathlib import Path
-
-from lightfield.core.cli import run
-from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument(
-        "--journals", required=True, type=Path, help="folder of the journals of its shards"
-    )
-    parser.add_argument(
-        "--benchmarks",
-        required=True,
-        type=Path,
-        help="folder of the benchmark files that Snakemake wrote for its jobs",
-    )
-    parser.add_argument(
-        "--scene-benchmarks",
-        required=True,
-        nargs="+",
-        type=Path,
-        help="folders of the benchmark files that Snakemake wrote for the scene's jobs",
-    )
-    parser.add_argument("--blend", type=Path, help="the scene's .blend, if there is one")
-    parser.add_argument(
-        "--settings",
-        required=True,
-        type=Path,
-        metavar="JSON",
-        help="settings file with the keys energy (watts and cores), full "
-        "(views and resolution of the full dataset, and samples and denoise if they differ), and "
-        "reprojections (their names)",
-    )
-    parser.add_argument(
-        "--inventory", type=Path, help="JSON that scripts/inventory.py wrote for the scene"
-    )
-    parser.add_argument("--output", required=True, type=Path, help="JSON to write")
-    arguments = parser.parse_args()
-
-    # Only now, so that --help need not wait for these.
-    from lightfield.configuration.scene_source import FILE
-    from lightfield.core.settings import read_settings
-    from lightfield.formats.inventory import read_inventory
-    from lightfield.measurement import costs
-
-    settings = read_settings(costs.CostSettings, arguments.settings)
-    full = settings.full.model_dump()
-    if full["samples"] == FILE:
-        if arguments.inventory is None:
-            raise UserError("--inventory: is missing; it has the samples of the .blend")
-        full["samples"] = read_inventory(arguments.inventory, "blend")["blend"]["samples"]
-    content = costs.costs(
-        arguments.dataset,
-        arguments.blend,
-        arguments.journals,
-        arguments.benchmarks,
-        arguments.scene_benchmarks,
-        costs.Power.read(settings.energy.model_dump()),
-        full,
-        settings.reprojections,
-    )
-    write_json(arguments.output, content)
-
+from lightfield.core.flags import program
+from lightfield.stages.measurement import Costs
 
 if __name__ == "__main__":
-    run(main)
+    program(Costs, __doc__)

@@ -19,7 +19,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.core.settings import read_settings
 from lightfield.geometry.rigs import from_settings
-from lightfield.measurement.costs import CostSettings
+from lightfield.stages.measurement import CostSettings
 from lightfield.stages.scene import ImportSettings
 from lightfield.workflow.loading import load_datasets
 

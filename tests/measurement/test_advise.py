@@ -14,6 +14,7 @@ from lightfield.geometry import lenses
 from lightfield.measurement import advice, calibration, error_vs_time, strata, trials
 from lightfield.measurement.experiment import Experiment
 from lightfield.measurement.metrics import make_reference
+from lightfield.stages.measurement import ErrorVsTimeSettings
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
@@ -105,12 +106,8 @@ def test_a_reference_has_at_least_the_samples_that_are_asked_for(asked, rendered
     content = error_vs_time.measure(
         Recorded(),
         RenderBlock(**RENDER),
-        size=32,
-        windows=1,
-        octaves=1,
-        reference_samples=asked,
-        seeds=2,
-        name="room",
+        ErrorVsTimeSettings(size=32, octaves=1, reference=asked),
+        "room",
     )
     assert set(samples) == {content["measured_on"]["reference_samples"]} == {rendered}
 

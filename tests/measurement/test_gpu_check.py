@@ -10,6 +10,7 @@ from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses
 from lightfield.measurement import gpu_check
 from lightfield.measurement.trials import Trial
+from lightfield.stages.measurement import FullSize
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 RIG = {"type": "plane", "cameras": [2, 1], "size": 0.3}
@@ -94,7 +95,7 @@ def test_pictures_without_noise_are_compared_exactly(trials):
 
 
 def test_hours_follow_from_views_pixels_and_samples():
-    full = {"big": {"views": 10, "resolution": [2000, 1000]}}
+    full = {"big": FullSize(views=10, resolution=[2000, 1000])}
     maker = Simulated(lenses.from_camera(CAMERA))
     content = gpu_check.check(maker, "gpu", RenderBlock(samples=256), full)
     assert content["devices"] == ["CPU", "GPU"]

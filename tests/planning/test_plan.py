@@ -13,7 +13,8 @@ from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
-from lightfield.rendering import probe as probing
+from lightfield.rendering import shard
+from lightfield.stages.measurement import Probe, ProbeSettings
 from lightfield.workflow import shard_counts
 from lightfield.workflow.journal import Journal
 from lightfield.workflow.loading import scene_datasets
@@ -211,20 +212,29 @@ def test_a_probe_estimates_the_size_of_the_views(run_program, room, tmp_path):
 
 
 def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
-    def render(probes, views, folder, journal, **_):
-        folder.mkdir()
-        log = Journal(journal)
+    def render(job):
+        job.output.mkdir()
+        log = Journal(job.journal)
         log.append({"start_up_seconds": 1.0, "device": "CPU", "threads": 1})
-        for view in probes.views:
-            (folder / f"{view.name}.exr").write_bytes(b"1000")
+        for view in LightField.read(job.lightfield).views:
+            (job.output / f"{view.name}.exr").write_bytes(b"1000")
             seconds = dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 2.0)
             log.append({"view": view.name, "finished": 3.0, **seconds})
 
-    monkeypatch.setattr(probing.shard, "render", render)
+    monkeypatch.setattr(shard, "render", render)
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [128, 128]})
-    lightfield = LightField.from_rig(
-        {"type": "plane", "cameras": [1, 1]}, lens, render={"samples": 4}
+    path = tmp_path / "lightfield.json"
+    LightField.from_rig({"type": "plane", "cameras": [1, 1]}, lens, render={"samples": 4}).write(
+        path
     )
-    probe = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
+    output = tmp_path / "probe.json"
+    Probe(
+        settings=ProbeSettings(size=64),
+        blend=tmp_path,
+        inventory=tmp_path,
+        lightfield=path,
+        output=output,
+    ).run()
+    probe = plan.read_probe(output)
     assert (probe["view_seconds"], probe["view_bytes"]) == ([8.0], [16.0])
     assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, probe)], {})

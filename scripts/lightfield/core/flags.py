@@ -53,7 +53,7 @@ def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.Argu
             "--settings",
             type=Path,
             metavar="JSON",
-            required=stage.by_hand is None,
+            required=stage.by_hand is None and stage.model_fields["settings"].is_required(),
             help="settings file",
         )
     for name, field in stage.model_fields.items():

@@ -120,5 +120,7 @@ def paths_of(job: Stage[Any], role: str) -> list[Path]:
     paths: list[Path] = []
     for name in fields_of(type(job), role):
         value = getattr(job, name)
-        paths += value if isinstance(value, list) else [value] if value is not None else []
+        for entry in value if isinstance(value, list) else [value]:
+            values = entry if isinstance(entry, tuple) else (entry,)
+            paths += [each for each in values if isinstance(each, Path)]
     return paths

@@ -12,6 +12,9 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
+from lightfield.core.errors import UserError
+from lightfield.core.files import absolute_path, write_json
+from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
@@ -27,6 +30,7 @@ from lightfield.planning.sampling import (
     standard_error,
 )
 from lightfield.planning.unit_costs import DENOISING_SAMPLES
+from lightfield.stages.measurement import Calibrate
 
 _PROBE_SEED = 1
 _HELD_OUT_SEED = 2
@@ -275,6 +279,60 @@ class Search:
         elif now.error > self.target:
             doublings = math.log(now.error / self.target) / math.log(before.error / now.error)
         return doublings > math.log2(2 * affordable / now.samples)
+
+
+def write(job: Calibrate) -> None:
+    """Write a scene's choice, and the seconds of each method. Warns if the choice is not good.
+
+    Raises `UserError` if the scene has no target error.
+    """
+    lightfield = LightField.read(job.lightfield)
+    if lightfield.render.target_error is None:
+        raise UserError(f"{job.lightfield}: render: is missing the key target_error")
+    maker = Trials.of(job, lightfield)
+    settings = job.settings
+    record, seconds = calibrate(maker, lightfield.render, settings.size, settings.probes)
+    write_json(job.output, record)
+    if job.seconds:
+        write_json(job.seconds, seconds)
+    print(_summary(absolute_path(job.lightfield).parent.name, record))
+    warning = _problem(record, lightfield.render.most_samples)
+    if warning:
+        print(f"warning: render.target_error: {warning}", file=sys.stderr)
+
+
+def _summary(name: str, record: Mapping[str, Any]) -> str:
+    """Return the choice and its errors in one line."""
+    reached = (f"{stratum} {part['error']:.2g}" for stratum, part in record["strata"].items())
+    return (
+        f"note: {name}: {record['way']}, {record['choice']}: "
+        f"error {record['probe_error']:.3g} on the probe views and "
+        f"{record['held_out_error']:.3g} ± {record['held_out_standard_error']:.1g} on others, "
+        f"wanted {record['target_error']:g}; {record['times_fewer_samples']:.1f} times cheaper "
+        "than plain path tracing at equal error; the worst thousandth of pixels left out, with "
+        f"which it is {record['probe_error_of_all_pixels']:.3g}; by the light that pixels show "
+        f"most of: {', '.join(reached)}"
+    )
+
+
+def _problem(record: Mapping[str, Any], most_samples: int | None) -> str | None:
+    """Return what is wrong with the choice. None if it reaches the target and is confirmed."""
+    target = record["target_error"]
+    error = record["probe_error"]
+    held_out_error = record["held_out_error"]
+    if not record["reached"] and error <= target:
+        return (
+            f"{target:g} is reached, but the error of all pixels is "
+            f"{record['probe_error_of_all_pixels']:.3g}: bright ones are missing"
+        )
+    if not record["reached"]:
+        return (
+            f"{target:g} is not reached within the preset's {most_samples} samples; "
+            f"the best there is has {error:.3g}"
+        )
+    if not record["confirmed"] and held_out_error > target:
+        return f"is {target:g}, but held-out views have the error {held_out_error:.3g}"
+    return None
 
 
 def calibrate(

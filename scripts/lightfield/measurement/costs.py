@@ -8,18 +8,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import mean
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import Field
-
-from lightfield.configuration.config_file import Energy
+from lightfield.configuration.scene_source import FILE
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
 from lightfield.core.paths import files_below
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import Settings
+from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.planning.sampling import cost_in_samples, standard_error
 from lightfield.planning.unit_costs import DENOISING_SAMPLES
+from lightfield.stages import measurement
 from lightfield.workflow import journal
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 
@@ -48,34 +48,6 @@ class Stage:
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
     peak_memory_bytes: int = 0
-
-
-class FullSize(Settings):
-    """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
-
-    views: AtLeastOne = Field(
-        description="Number of views of the rig.", json_schema_extra={"unit": "views"}
-    )
-    resolution: list[AtLeastOne] = Field(
-        min_length=2,
-        max_length=2,
-        description="Width and height of a view.",
-        json_schema_extra={"unit": "pixels"},
-    )
-    samples: AtLeastOne | Literal["file"] | None = Field(
-        None, description="Number of paths for each pixel.", json_schema_extra={"unit": "paths"}
-    )
-    denoise: bool | None = Field(None, description="Whether views are denoised.")
-
-
-class CostSettings(Settings):
-    """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
-
-    energy: Energy = Field(description="The block `energy` of config.yaml.")
-    full: FullSize = Field(
-        description="Size of the dataset at full size, for which costs are estimated."
-    )
-    reprojections: list[str] = Field([], description="Names of the dataset's reprojections.")
 
 
 @dataclass(frozen=True)
@@ -246,6 +218,31 @@ def _latest_device(runs: Sequence[journal.Run]) -> str | None:
         return None
     latest = max(rendered, key=lambda run: run.views[-1]["finished"])
     return str(latest.start["device"])
+
+
+def write(job: measurement.Costs) -> None:
+    """Write the costs.json of a dataset."""
+    settings = job.settings
+    full = settings.full.model_dump()
+    if full["samples"] == FILE:
+        full["samples"] = _samples_of_blend(job.inventory)
+    content = costs(
+        job.dataset,
+        job.blend,
+        job.journals,
+        job.benchmarks,
+        job.scene_benchmarks,
+        Power.read(settings.energy.model_dump()),
+        full,
+        settings.reprojections,
+    )
+    write_json(job.output, content)
+
+
+def _samples_of_blend(inventory: Path | None) -> Any:
+    if inventory is None:
+        raise UserError("--inventory: is missing; it has the samples of the .blend")
+    return read_inventory(inventory, "blend")["blend"]["samples"]
 
 
 def costs(

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from lightfield.core.files import write_csv, write_json, write_text
 from lightfield.formats.render_block import RenderBlock
 from lightfield.imaging import plots
-from lightfield.measurement import advice, metrics, strata
+from lightfield.measurement import advice, metrics, strata, trials
 from lightfield.measurement.experiment import (
     WHOLE_VIEWS,
     Experiment,
@@ -42,6 +42,7 @@ from lightfield.measurement.summaries import strata_table
 from lightfield.measurement.trials import Trial, Trials, both_see, nearest_view
 from lightfield.planning.sampling import DENOISED, standard_error
 from lightfield.planning.sampling import PLAIN as PLAIN_SAMPLING
+from lightfield.stages.measurement import ErrorVsTime, ErrorVsTimeSettings
 
 PLAIN = "plain"
 ADAPTIVE = "adaptive"
@@ -120,32 +121,33 @@ class Point:
         return {**asdict(self), "psnr": self.psnr if math.isfinite(self.psnr) else None}
 
 
+def make(job: ErrorVsTime) -> None:
+    """Measure every method on a scene, and write the figures, tables and plots."""
+    lightfield, maker = trials.of_calibrated(job)
+    write(job.output, measure(maker, lightfield.render, job.settings, job.output.name))
+
+
 def measure(
     maker: Trials,
     render: RenderBlock,
-    *,
-    size: int,
-    windows: int,
-    octaves: int,
-    reference_samples: int,
-    seeds: int,
+    settings: ErrorVsTimeSettings,
     name: str,
 ) -> dict[str, Any]:
-    """Measure every method on ``windows`` windows of ``size``² pixels of each stratum.
+    """Measure every method on windows of each stratum.
 
     One more window shows the same place in the first one's neighbouring view. ``render`` is the
-    scene's own block. Sample counts are 1 to 2^``octaves``, each rendered with ``seeds`` seeds.
-    Errors of whole views are the mean of the strata's, weighted by their areas. Then try changes of
-    the settings on the same windows. ``name`` starts the progress lines.
+    scene's own block. Sample counts are 1 to 2^octaves, each rendered with several seeds. Errors of
+    whole views are the mean of the strata's, weighted by their areas. Then try changes of the
+    settings on the same windows. ``name`` starts the progress lines.
     """
-    chosen, areas = strata.choose(maker, size, windows)
+    chosen, areas = strata.choose(maker, settings.size, settings.probes)
     neighbour = nearest_view(maker.lightfield.views, chosen[0].view)
     if neighbour:
         chosen.insert(1, replace(chosen[0], view=neighbour))
-    experiment = Experiment.stratified(maker, chosen, areas, reference_samples, name)
+    experiment = Experiment.stratified(maker, chosen, areas, settings.reference, name)
     on_cpu = experiment.device == "CPU"
-    methods = _all_methods(render, octaves, guiding=on_cpu)
-    experiment.run(methods, range(1, 1 + seeds), f"{name}: trials")
+    methods = _all_methods(render, settings.octaves, guiding=on_cpu)
+    experiment.run(methods, range(1, 1 + settings.seeds), f"{name}: trials")
     points = {
         stratum: [
             measured_point(method, [experiment.renders(method)[n] for n in places], places.values())
@@ -156,8 +158,8 @@ def measure(
     return {
         "measured_on": {
             **experiment.described(),
-            "seeds": seeds,
-            "reference_samples": samples_of_reference(reference_samples),
+            "seeds": settings.seeds,
+            "reference_samples": samples_of_reference(settings.reference),
             "device": experiment.device,
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from lightfield.core.settings import Settings
+from lightfield.core import processors, units
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json, write_text
 from lightfield.formats.render_block import RenderBlock
-from lightfield.measurement import metrics
-from lightfield.measurement.costs import FullSize
+from lightfield.measurement import metrics, trials
 from lightfield.measurement.trials import Trial, Trials
 from lightfield.planning.sampling import standard_error
+from lightfield.stages.measurement import FullSize, GpuCheck
 
 # The longer side of the view that both devices render, in pixels.
 SIZE = 128
@@ -32,16 +33,6 @@ _MOST_ERRORS = 6.0
 SAME_DEPTH = 1e-4
 # At silhouettes rounding decides which surface a ray hits, so this part of the pixels may differ.
 _SILHOUETTES = 1e-3
-
-
-class GpuCheckSettings(Settings):
-    """The settings of scripts/gpu_check.py."""
-
-    full: dict[str, FullSize] = Field(
-        {},
-        description="Sizes of the datasets at full size, whose hours are estimated, by their "
-        "names.",
-    )
 
 
 @dataclass(frozen=True)
@@ -121,15 +112,54 @@ def _blocks(pixels: NDArray[Any], block: int) -> Any:
     return complete.reshape(rows, block, columns, block, -1).mean(axis=(1, 3))
 
 
+def make(job: GpuCheck) -> None:
+    """Write and print the comparison, and the hours of full datasets.
+
+    Raises `UserError` if there is no GPU, or if it renders another picture.
+    """
+    device = _gpu_of(job)
+    lightfield, maker = trials.of_calibrated(job)
+    content = check(maker, device, lightfield.render, job.settings.full)
+    name = job.output.name
+    text = table(name, content)
+    print(text)
+    if not content["same"]:
+        raise UserError(
+            f"{name}: the GPU renders another picture than the processor: colours differ "
+            f"{content['colour']:.2f} times as much as noise explains, all light by "
+            f"{content['light']:.1f} standard errors, and {content['depth']:.2%} of the depths "
+            "differ; try another driver, or render with device=cpu"
+        )
+    write_text(job.output.with_suffix(".md"), text)
+    write_json(job.output.with_suffix(".json"), content)
+    print(
+        f"note: {name}: the GPU renders the same picture; it takes "
+        f"{units.duration(3600 * sum(content['hours'].values()))} for all datasets at full size"
+    )
+
+
+def _gpu_of(job: GpuCheck) -> str:
+    """Return the device to check. Raises `UserError` if this machine does not have it."""
+    # Without a GPU, nothing is rendered.
+    with processors.only(job.threads):
+        from lightfield.rendering import cycles
+
+    device = "gpu" if job.device == "auto" else job.device
+    if not cycles.gpu(device):
+        raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
+    return device
+
+
 def check(
-    maker: Trials, device: str, render: RenderBlock, full: Mapping[str, Mapping[str, Any]]
+    maker: Trials, device: str, render: RenderBlock, full: Mapping[str, FullSize]
 ) -> dict[str, Any]:
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
-    ``render`` has the scene's settings. ``full`` has the ``views`` and ``resolution`` of each of
-    its datasets at full size. Returns the comparison, and the seconds of a sample of a megapixel on
-    a core and on the GPU. Also returns the GPU hours of each dataset.
+    ``render`` has the scene's settings. ``full`` has the size of each of its datasets. Returns
+    the comparison, and the seconds of a sample of a megapixel on a core and on the GPU. Also
+    returns the GPU hours of each dataset.
     """
+    assert isinstance(render.samples, int)
     lens = maker.lens
     scale = min(1.0, SIZE / max(lens.width, lens.height))
     small = lens.resized(*(max(BLOCK, round(side * scale)) for side in (lens.width, lens.height)))
@@ -154,7 +184,7 @@ def check(
         "gpu_seconds": gpu * 1e6,
         "samples": render.samples,
         "hours": {
-            name: dataset["views"] * math.prod(dataset["resolution"]) * render.samples * gpu / 3600
+            name: dataset.views * math.prod(dataset.resolution) * render.samples * gpu / 3600
             for name, dataset in full.items()
         },
     }

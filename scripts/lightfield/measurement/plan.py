@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from lightfield.core import processors, units
-from lightfield.core.files import read_keys, reading
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, reading, write_text
 from lightfield.measurement import metrics
 from lightfield.planning.sampling import DENOISED, TRACED, standard_error
+from lightfield.stages.measurement import Plan
 
 COLUMNS = (
     "dataset",
@@ -93,6 +95,23 @@ class Expected:
             f"| {self.view_seconds:.3g} ± {self.view_error:.1g} | {units.duration(self.seconds)} "
             f"| {_times(self.cheaper_seconds)} | {units.size(self.bytes)} |"
         )
+
+
+def write(job: Plan) -> None:
+    """Write and print the table of the chosen datasets. Raises `UserError` if none is rendered."""
+    for name in job.family:
+        print(f"{name}: its members are not probed; snakemake -n estimates them")
+    if job.family and not job.dataset:
+        return
+    if not job.dataset:
+        raise UserError("the views of all chosen datasets exist already: nothing is rendered")
+    probes = [(name, frames, read_probe(probe)) for name, frames, probe in job.dataset]
+    advice = {
+        name: read_keys(path, "error_vs_time.py", "changes")["changes"] for name, path in job.advice
+    }
+    text = table(probes, advice)
+    write_text(job.output, text)
+    print(text, end="")
 
 
 def read_probe(path: Path | str) -> dict[str, Any]:

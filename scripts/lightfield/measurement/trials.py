@@ -8,7 +8,6 @@ measurement continues where it stopped, and a repeated one renders nothing. The 
 device, not `auto`, because devices differ in speed.
 """
 
-import argparse
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,6 +30,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.planning.sampling import PLAIN, calibrated
+from lightfield.stages.measurement import CalibratedTrialStage, TrialStage
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
@@ -127,16 +127,9 @@ class Trials:
         self._started = False
 
     @classmethod
-    def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
-        """Return the trials for the arguments of `trial_flags.add_arguments`."""
-        return cls(
-            arguments.blend,
-            arguments.inventory,
-            lightfield,
-            arguments.device,
-            arguments.threads,
-            arguments.cache,
-        )
+    def of(cls, job: TrialStage[Any], lightfield: LightField) -> "Trials":
+        """Return the trials of a stage, on the views of a light field."""
+        return cls(job.blend, job.inventory, lightfield, job.device, job.threads, job.cache)
 
     def on(self, device: str, lens: Lens) -> "Trials":
         """Return trials of the same views on another device and through another lens."""
@@ -307,22 +300,22 @@ class Trials:
         self._started = True
 
 
-def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
-    """Return the dataset with its final ``render`` settings, and its trials.
+def of_calibrated(job: CalibratedTrialStage[Any]) -> tuple[LightField, Trials]:
+    """Return the dataset of a stage with its final ``render`` settings, and its trials.
 
     The choice of calibrate.py replaces a target error. Raises `UserError` if the dataset has a
-    target error, and ``arguments`` name no calibration.
+    target error, and the stage has no calibration.
     """
-    lightfield = LightField.read(arguments.lightfield)
-    if arguments.calibration:
-        render = calibrated(lightfield.render, arguments.calibration)
+    lightfield = LightField.read(job.lightfield)
+    if job.calibration:
+        render = calibrated(lightfield.render, job.calibration)
         lightfield = lightfield.changed(render=render.to_json())
     elif lightfield.render.samples is None:
         raise UserError(
-            f"{arguments.lightfield}: render has a target error and no samples; "
+            f"{job.lightfield}: render has a target error and no samples; "
             "give --calibration, the file that scripts/calibrate.py wrote for it"
         )
-    return lightfield, Trials.of(arguments, lightfield)
+    return lightfield, Trials.of(job, lightfield)
 
 
 def nearest_view(views: Sequence[View], view: View) -> View | None:

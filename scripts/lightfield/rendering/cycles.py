@@ -30,6 +30,7 @@ from lightfield.rendering import (
     surfaces,
     volumes,
 )
+from lightfield.stages.measurement import CheckDevice
 
 # `auto` tries the kinds of GPU in this order.
 _GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -245,6 +246,11 @@ def set_window(x: int, y: int, width: int, height: int) -> None:
     render.border_max_x = (x + width + 0.5) / across
     render.border_min_y = (bottom + 0.5) / down
     render.border_max_y = (bottom + height + 0.5) / down
+
+
+def check_device(job: CheckDevice) -> None:
+    """Raise `UserError` if this machine has no such device."""
+    gpu(job.device)
 
 
 def gpu(device: str) -> str | None:

@@ -8,28 +8,35 @@ in a pixel, and compress worse.
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.files import write_json
 from lightfield.core.leftovers import temporary_folder
 from lightfield.formats.lightfield import LightField
+from lightfield.stages.measurement import Probe
 from lightfield.stages.views import RenderShard
 from lightfield.workflow import journal
 
 
-def measure(
-    lightfield: LightField, count: int, size: int, blend: Path, inventory: Path, device: str
-) -> dict[str, Any]:
-    """Render ``count`` probes with a longer side of ``size`` pixels on one core, or on the device.
+def write(job: Probe) -> None:
+    """Write the estimate of a dataset's views."""
+    write_json(job.output, _measured(job))
+
+
+def _measured(job: Probe) -> dict[str, Any]:
+    """Render the probes on one core, or on the device.
 
     Returns the dataset's ``views``, ``resolution`` and ``samples``, and the ``device``, CPU or GPU.
     ``view_seconds`` and ``view_bytes`` are what each probe's view would take at full size.
     """
+    lightfield = LightField.read(job.lightfield)
     views = lightfield.views
     lens = lightfield.lens
-    small = lens.fitted(size)
+    small = lens.fitted(job.settings.size)
+    count = job.settings.views
     # Render one more than are counted: the first is left out.
     step = max(1, len(views) // (count + 1))
     probes = lightfield.changed(lens=small, views=views[::step][: count + 1])
     with temporary_folder() as temporary:
-        run = rendered(probes, blend, inventory, device, 1, temporary)
+        run = rendered(probes, job.blend, job.inventory, job.device, 1, temporary)
         sizes = []
         for view in run.later_views:
             files = temporary.rglob(f"{view['view']}.exr")

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import rig, scene, views
+from lightfield.stages import measurement, rig, scene, views
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -18,5 +18,12 @@ STAGES: list[type[Stage[Any]]] = [
     views.ImportViews,
     views.Flow,
     views.Splits,
+    measurement.CheckDevice,
+    measurement.Probe,
+    measurement.Calibrate,
+    measurement.Costs,
+    measurement.Plan,
+    measurement.ErrorVsTime,
+    measurement.GpuCheck,
 ]
 BY_NAME = {stage.name: stage for stage in STAGES}

@@ -1,0 +1,225 @@
+"""The stages that measure error, quality and time, and that estimate costs."""
+
+from pathlib import Path
+from typing import Generic, Literal
+
+from pydantic import Field
+
+from lightfield.configuration.config_file import Energy
+from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.settings import Settings
+from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
+from lightfield.planning.sampling import PROBES, WINDOW_SIZE
+
+INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
+
+
+class FullSize(Settings):
+    """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
+
+    views: AtLeastOne = Field(
+        description="Number of views of the rig.", json_schema_extra={"unit": "views"}
+    )
+    resolution: list[AtLeastOne] = Field(
+        min_length=2,
+        max_length=2,
+        description="Width and height of a view.",
+        json_schema_extra={"unit": "pixels"},
+    )
+    samples: AtLeastOne | Literal["file"] | None = Field(
+        None, description="Number of paths for each pixel.", json_schema_extra={"unit": "paths"}
+    )
+    denoise: bool | None = Field(None, description="Whether views are denoised.")
+
+
+class CostSettings(Settings):
+    """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
+
+    energy: Energy = Field(description="The block `energy` of config.yaml.")
+    full: FullSize = Field(
+        description="Size of the dataset at full size, for which costs are estimated."
+    )
+    reprojections: list[str] = Field([], description="Names of the dataset's reprojections.")
+
+
+class Costs(Stage[CostSettings]):
+    """Adds up what a dataset has cost, and estimates what it costs at full size."""
+
+    name = "costs"
+    function = "lightfield.measurement.costs:write"
+
+    dataset: Path = reads("folder of the dataset")
+    journals: Path = reads("folder of the journals of its shards")
+    benchmarks: Path = reads("folder of the benchmark files that Snakemake wrote for its jobs")
+    scene_benchmarks: list[Path] = reads(
+        "folders of the benchmark files that Snakemake wrote for the scene's jobs"
+    )
+    blend: Path | None = reads("the scene's .blend, if there is one", None)
+    inventory: Path | None = reads(INVENTORY, None)
+    output: Path = writes("JSON to write")
+
+
+class ProbeSettings(Settings):
+    """The settings of scripts/probe.py."""
+
+    views: AtLeastOne = Field(
+        3, description="Number of views to render.", json_schema_extra={"unit": "views"}
+    )
+    size: AtLeastOne = Field(
+        48,
+        description="Longer side of these views, in pixels.",
+        json_schema_extra={"unit": "pixels"},
+    )
+
+
+class Probe(Stage[ProbeSettings]):
+    """Estimates the time and size of a dataset's views from a few small views."""
+
+    name = "probe"
+    function = "lightfield.rendering.probe:write"
+    by_hand = ProbeSettings
+
+    blend: Path = reads("the scene's .blend")
+    inventory: Path = reads(INVENTORY)
+    lightfield: Path = reads("lightfield.json of the dataset")
+    device: str = option("device on which Cycles renders", "auto")
+    output: Path = writes("JSON to write")
+
+
+class Plan(PlainStage):
+    """Tabulates the views, hours and gigabytes of the chosen datasets."""
+
+    name = "plan"
+    function = "lightfield.measurement.plan:write"
+
+    dataset: list[tuple[str, AtLeastOne, Path]] = reads(
+        "a dataset: scene/rig, its number of frames, and the JSON that scripts/probe.py wrote",
+        [],
+        metavar=("NAME", "FRAMES", "PROBE"),
+    )
+    advice: list[tuple[str, Path]] = reads(
+        "advice for a dataset: scene/rig, and the JSON that scripts/error_vs_time.py wrote for its "
+        "scene",
+        [],
+        metavar=("NAME", "JSON"),
+    )
+    family: list[str] = option("name of a family of scenes", [], metavar="NAME")
+    output: Path = writes("Markdown file to write")
+
+
+class CheckDevice(PlainStage):
+    """Checks that Cycles can render on a device of this machine."""
+
+    name = "check_device"
+    function = "lightfield.rendering.cycles:check_device"
+
+    device: Literal["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"] = option(
+        "device to look for", positional=True
+    )
+
+
+class TrialStage(Stage[StageSettings], Generic[StageSettings]):
+    """A stage that renders windows of a dataset's views."""
+
+    blend: Path = reads("the scene's .blend")
+    inventory: Path = reads(INVENTORY)
+    lightfield: Path = reads("lightfield.json")
+    device: str = option("device on which Cycles renders", "auto")
+    threads: AtLeastOne = option("CPU threads", 1)
+    cache: Path = writes(
+        "folder that keeps finished renders, so that an interrupted run can continue"
+    )
+
+
+class CalibratedTrialStage(TrialStage[StageSettings], Generic[StageSettings]):
+    """A stage that renders windows with the samples of a scene, or of its calibration."""
+
+    calibration: Path | None = reads(
+        "JSON that scripts/calibrate.py wrote, for a scene with target_error", None
+    )
+
+
+class _WindowSettings(Settings):
+    size: AtLeastOne = Field(
+        WINDOW_SIZE,
+        description="Width and height of each rendered window, in pixels.",
+        json_schema_extra={"unit": "pixels"},
+    )
+
+
+class CalibrationSettings(_WindowSettings):
+    """The settings of scripts/calibrate.py."""
+
+    probes: AtLeastOne = Field(
+        PROBES,
+        description="Number of windows of views to render. As many others are held out to check "
+        "the choice.",
+        json_schema_extra={"unit": "windows"},
+    )
+
+
+class Calibrate(TrialStage[CalibrationSettings]):
+    """Chooses the cheapest method that reaches a scene's target error."""
+
+    name = "calibrate"
+    function = "lightfield.measurement.calibration:write"
+    by_hand = CalibrationSettings
+
+    lightfield: Path = reads("lightfield.json with render.target_error")
+    output: Path = writes(
+        "JSON to write: the chosen method, and the measurements behind the choice"
+    )
+    seconds: Path | None = writes("JSON to write: the seconds that each method took", None)
+
+
+class ErrorVsTimeSettings(_WindowSettings):
+    """The settings of scripts/error_vs_time.py."""
+
+    probes: AtLeastOne = Field(
+        1,
+        description="Windows of each stratum of the views. The first is also rendered in a "
+        "neighbouring view.",
+        json_schema_extra={"unit": "windows"},
+    )
+    octaves: AtLeastOne = Field(8, description="How often to double the samples, starting from 1.")
+    reference: AtLeastOne = Field(
+        2048,
+        description="Samples of the reference renders.",
+        json_schema_extra={"unit": "paths"},
+    )
+    seeds: int = Field(
+        2,
+        ge=2,
+        description="Renders of each method with different seeds, 2 or more. More of them separate "
+        "bias from variance better.",
+    )
+
+
+class ErrorVsTime(CalibratedTrialStage[ErrorVsTimeSettings]):
+    """Measures the error of renders against their time."""
+
+    name = "error_vs_time"
+    function = "lightfield.measurement.error_vs_time:make"
+    by_hand = ErrorVsTimeSettings
+
+    output: Path = writes("path without suffix of the .csv, .json, .md, .svg and .png to write")
+
+
+class GpuCheckSettings(Settings):
+    """The settings of scripts/gpu_check.py."""
+
+    full: dict[str, FullSize] = Field(
+        {},
+        description="Sizes of the datasets at full size, whose hours are estimated, by their "
+        "names.",
+    )
+
+
+class GpuCheck(CalibratedTrialStage[GpuCheckSettings]):
+    """Checks that a GPU renders the same as the processor, and estimates full datasets' hours."""
+
+    name = "gpu_check"
+    function = "lightfield.measurement.gpu_check:make"
+
+    settings: GpuCheckSettings = Field(default_factory=GpuCheckSettings)
+    output: Path = writes("path without suffix of the .json and .md to write")
