@@ -34,6 +34,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
+from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_csv
@@ -46,7 +47,6 @@ from lightfield.imaging.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VER
 from lightfield.measurement.metrics import pareto
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.colour import resample_colour
-from lightfield.reprojection.filters import DEFAULT_FILTER
 
 try:
     import cv2

@@ -22,29 +22,8 @@ Examples, with views in garden/exr and garden/lightfield.json:
     --cubemap 512 --png
 """
 
-import argparse
-
-from lightfield.core import cli
-from lightfield.reprojection import flags
-
-
-def main() -> None:
-    """Run the program on the command line's arguments."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    flags.add_file_flags(parser)
-    flags.add_configuration_flags(parser)
-    flags.add_reproject_flags(parser)
-    arguments = parser.parse_args()
-
-    # Only now, so that --help need not wait for these.
-    from lightfield.reprojection import flag_settings, job, pipeline
-
-    lightfield, source = flag_settings.read_source(arguments)
-    settings = flag_settings.reproject_settings(arguments, source)
-    pipeline.run(job.Job(arguments, settings, lightfield, source))
-
+from lightfield.core.flags import program
+from lightfield.stages.lenses import Reproject
 
 if __name__ == "__main__":
-    cli.run(main)
+    program(Reproject, __doc__)

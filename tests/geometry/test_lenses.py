@@ -959,20 +959,18 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
 
 
 USE_IT = """
-import argparse, math
+import math
+from lightfield.core.flags import parsed
 from lightfield.geometry import lenses
-from lightfield.reprojection import flag_settings, flags
 from lightfield.reprojection.geometry import Geometry
+from lightfield.stages.lenses import LensMap
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
 assert lenses.from_lightfield(lens.to_lightfield()).fov == math.radians(60)
-parser = argparse.ArgumentParser()
-flags.add_configuration_flags(parser)
-flags.add_lens_map_flags(parser)
-words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
-arguments = parser.parse_args(words)
-source = flag_settings.read_source(arguments)[1]
-geometry = Geometry.of(flag_settings.lens_map_settings(arguments, source), source)
+words = ["map.npy", "--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
+job = parsed(LensMap, None, words)
+_, source = job.read()
+geometry = Geometry.of(job.settings, source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 

@@ -16,7 +16,8 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.depth import resample_depth
-from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
+from lightfield.configuration.reprojections import DEFAULT_FILTER
+from lightfield.reprojection.filters import FILTERS
 from stability import ROUNDINGS
 
 EPS = float(np.finfo(np.float64).eps)

@@ -6,18 +6,17 @@ import math
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import cv2
 import forks
 import numpy as np
 import pytest
-from conftest import BLENDER
+from conftest import BLENDER, SCRIPTS
 
-import reproject
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
+from lightfield.core.flags import parsed
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -29,6 +28,7 @@ from lightfield.reprojection import kernels, lens_map
 from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.filters import FILTERS
+from lightfield.stages.lenses import Reproject
 
 SIZE = 48
 FISHEYE = Equidistant(width=SIZE, height=SIZE, fov=math.pi)
@@ -75,19 +75,22 @@ def dataset(tmp_path):
     return tmp_path
 
 
+def reproject(words):
+    parsed(Reproject, None, words).run()
+
+
 @pytest.fixture
-def run(dataset, monkeypatch):
+def run(dataset):
     """Return a function that runs the program on the dataset. Its output folder is `out`."""
 
     def go(*flags, configs=True, source=True):
-        command = ["reproject.py", *flags, "--output-dir", str(dataset / "out")]
+        command = [*flags, "--output-dir", str(dataset / "out")]
         if source:
             command += ["--input-dir", str(dataset / "exr")]
         if configs:
             command += ["--input-cfg", str(dataset / "lightfield.json")]
             command += ["--output-cfg", str(dataset / "out" / "lightfield.json")]
-        monkeypatch.setattr(sys, "argv", command)
-        reproject.main()
+        reproject(command)
 
     return go
 
@@ -426,7 +429,7 @@ def test_file_and_configuration_agree_on_the_kind_of_depth(dataset, run, config_
     assert np.allclose(after.channels["Z"][inside], expected[inside], rtol=1e-6)
 
 
-def test_a_cube_map_and_back(dataset, run, monkeypatch):
+def test_a_cube_map_and_back(dataset, run):
     run("--cubemap", "64", "--exr")
     out = dataset / "out"
     config = json.loads((out / "lightfield.json").read_text())
@@ -450,11 +453,10 @@ def test_a_cube_map_and_back(dataset, run, monkeypatch):
         )
         color = scene_color(cube.rays(x, y))
         write_exr(path, {c: color[..., i].astype("f2") for i, c in enumerate("RGB")})
-    command = ["reproject.py", "--input-dir", str(out), "--input-cfg", str(dataset / "cube.json")]
+    command = ["--input-dir", str(out), "--input-cfg", str(dataset / "cube.json")]
     command += ["--filter-prefix", "view_0000f", "--equirectangular", "full"]
     command += ["--output-resolution", "64,32", "--png", "--output-dir", str(dataset / "pano")]
-    monkeypatch.setattr(sys, "argv", command)
-    reproject.main()
+    reproject(command)
     assert names(dataset / "pano") == ["view_0000f.png"]
     channels = read_image(dataset / "pano" / "view_0000f.png").channels
     assert "A" not in channels
@@ -566,7 +568,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
     (out / "view_0000f.exr").rename(out / "exr" / "view_0000f.exr")
     config["frames"] = config["frames"][:1]
     (dataset / "lightfield.json").write_text(json.dumps(config))
-    sys.argv[1:] = [
+    command = [
         "--rectilinear",
         "40,36",
         "--output-resolution",
@@ -579,7 +581,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         "--output-dir",
         str(dataset / "back"),
     ]
-    reproject.main()
+    reproject(command)
     back = read_image(dataset / "back" / "view_0000f.exr").channels
     rays = Rectilinear(width=21, height=21, focal_length=40, sensor_size=(36, 36)).pixel_rays()
     assert np.abs(back["R"] - scene_color(rays)[..., 0]).max() < 0.01
@@ -594,9 +596,18 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         (("--png",), "give the output lens"),
         (PERSPECTIVE, "--exr, --png"),
         ((*PERSPECTIVE, "--png", "--rotation", "5"), "--rotation 5: must have the form PAN"),
-        ((*PERSPECTIVE, "--png", "--samples", "0"), "--samples 0"),
-        ((*PERSPECTIVE, "--png", "--samples", "999999999"), "--samples 999999999: must be from 1"),
-        (("--cubemap", "9999999999", "--png"), "--cubemap 9999999999: must be from 1 to"),
+        (
+            (*PERSPECTIVE, "--png", "--samples", "0"),
+            "--samples: is 0; must be a whole number at least 1",
+        ),
+        (
+            (*PERSPECTIVE, "--png", "--samples", "999999999"),
+            "--samples: is 999999999",
+        ),
+        (
+            ("--cubemap", "9999999999", "--png"),
+            "--cubemap: is 9999999999",
+        ),
         (("--rectilinear", "18,36", "--png", "--scale", "0.001"), "leaves no pixel"),
         (("--rectilinear", "18,36", "--png", "--scale", "1e9"), "makes a side of over"),
         ((*PERSPECTIVE, "--png", "--output-resolution", "1e9,4"), "must be two whole numbers"),
@@ -760,7 +771,7 @@ def renders(tmp_path_factory):
         capture_output=True,
         text=True,
         check=False,
-        env=os.environ | {"PYTHONPATH": str(Path(reproject.__file__).parent)},
+        env=os.environ | {"PYTHONPATH": str(SCRIPTS)},
     )
     assert result.returncode == 0, result.stderr
     return np.load(path)

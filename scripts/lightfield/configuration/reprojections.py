@@ -36,6 +36,10 @@ Light = Literal["each"] | dict[str, _Strength | _Colour]
 Stops = Annotated[float, Field(ge=-100, le=100)]
 
 
+Filter = Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]
+DEFAULT_FILTER: Filter = "adaptive"
+
+
 class ReprojectionOptions(Settings):
     """The options that a scene YAML shares with the programs' settings files."""
 
@@ -52,8 +56,8 @@ class ReprojectionOptions(Settings):
         description="Rotation of the camera: pan to the left, pitch downward, and roll clockwise.",
         json_schema_extra={"unit": "degrees"},
     )
-    filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
-        "adaptive",
+    filter: Filter = Field(
+        DEFAULT_FILTER,
         description="Filter that resamples colour. adaptive averages over the whole area of each "
         "pixel, so it also suits smaller images.",
     )

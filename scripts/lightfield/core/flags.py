@@ -3,14 +3,15 @@
 A field may have these keys in its ``json_schema_extra``: ``short``, a list of short flags;
 ``metavar``; ``positional``; ``commas``, for a list in one word; and ``may_be_empty``, for a list
 that a flag without values makes empty. A flag of a list may be given again, for more values. A list
-of tuples takes one tuple each time.
+of tuples takes one tuple each time. ``group`` is a title in --help. Of all flags with the same
+``one_of``, only one may be given.
 """
 
 import argparse
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter
 from pydantic.fields import FieldInfo
@@ -19,6 +20,8 @@ from lightfield.core import cli
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked, read_settings
 from lightfield.core.stage import ByHand, NoSettings, Stage
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def program(stage: type[Stage[Any]], description: str | None) -> None:
@@ -36,8 +39,7 @@ def parsed(
     given = vars(parser_of(stage, description).parse_args(words))
     own = {name: given.pop(name) for name in stage.model_fields if name in given}
     own["settings"] = _settings(stage, own, given)
-    job: Stage[Any] = _checked(stage, own)
-    return job
+    return checked_flags(stage, own)
 
 
 def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.ArgumentParser:
@@ -56,14 +58,37 @@ def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.Argu
             required=stage.by_hand is None and stage.model_fields["settings"].is_required(),
             help="settings file",
         )
+    groups = _Groups(parser)
     for name, field in stage.model_fields.items():
         if name != "settings":
-            _add(parser, name, field, may_be_required=True)
+            _add(groups.of(field), name, field, may_be_required=True)
     if stage.by_hand:
-        group = parser.add_argument_group("Instead of --settings")
+        groups.default = parser.add_argument_group("Instead of --settings")
         for name, field, _ in _flags_of(stage.by_hand):
-            _add(group, name, field, may_be_required=False)
+            _add(groups.of(field), name, field, may_be_required=False)
     return parser
+
+
+class _Groups:
+    """The groups of a parser's flags, by their titles. ``default`` has those without."""
+
+    def __init__(self, parser: argparse.ArgumentParser) -> None:
+        self.parser = parser
+        self.default: Any = parser
+        self.titled: dict[str, Any] = {}
+        self.exclusive: dict[str, Any] = {}
+
+    def of(self, field: FieldInfo) -> Any:
+        """Return the group to which the flag of a field belongs."""
+        extra = _extra(field)
+        group = self.default
+        if title := extra.get("group"):
+            group = self.titled.get(title) or self.parser.add_argument_group(title)
+            self.titled[title] = group
+        if choice := extra.get("one_of"):
+            group = self.exclusive.get(choice) or group.add_mutually_exclusive_group()
+            self.exclusive[choice] = group
+        return group
 
 
 def _settings(stage: type[Stage[Any]], own: dict[str, Any], flags: dict[str, Any]) -> Any:
@@ -80,12 +105,12 @@ def _settings(stage: type[Stage[Any]], own: dict[str, Any], flags: dict[str, Any
         elif field.is_required():
             raise UserError(f"{_flag(name)}: is missing; or give --settings")
     if stage.by_hand and issubclass(stage.by_hand, ByHand):
-        return _checked(stage.by_hand, content).settings(own)
-    return _checked(model, content)
+        return checked_flags(stage.by_hand, content).settings(own)
+    return checked_flags(model, content)
 
 
-def _checked(model: type[BaseModel], content: Mapping[str, Any]) -> Any:
-    """Return what flags give as a model. Raises `UserError` that names the wrong flag."""
+def checked_flags(model: type[Model], content: Mapping[str, Any]) -> Model:
+    """Return what flags give as a ``model``. Raises `UserError` that names the wrong flag."""
     try:
         return checked(TypeAdapter(model), content, "")
     except UserError as error:

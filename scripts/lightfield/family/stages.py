@@ -25,8 +25,7 @@ from lightfield.formats.layout import SUMS, write_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import inventory_file
-from lightfield.reprojection import flags, pipeline
-from lightfield.reprojection.job import Job
+from lightfield.stages.lenses import Reproject
 from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
 from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings
 from lightfield.stages.views import RenderShard
@@ -157,31 +156,16 @@ class Stages:
         (source_record,) = dataset.records("render")
         (record,) = dataset.records(name)
         folder = Path(dataset.folder, name)
-        parser = argparse.ArgumentParser()
-        flags.add_file_flags(parser)
-        flags.add_configuration_flags(parser)
-        flags.add_reproject_flags(parser)
-        arguments = parser.parse_args(
-            [
-                "--input-dir",
-                f"{dataset.folder}/exr",
-                "--output-dir",
-                str(folder),
-                "--input-cfg",
-                f"{dataset.folder}/lightfield.json",
-                "--output-cfg",
-                f"{folder}/lightfield.json",
-                "--source-record",
-                source_record,
-                "--record",
-                record,
-                "--views",
-                f"0:{dataset.view_count}",
-            ]
-        )
-        lightfield = LightField.read(arguments.input_cfg)
-        settings = dataset.reprojections[name]
-        pipeline.run(Job(arguments, settings, lightfield, lightfield.lens))
+        Reproject(
+            settings=dataset.reprojections[name],
+            input_cfg=Path(dataset.folder, "lightfield.json"),
+            input_dir=Path(dataset.folder, "exr"),
+            output_dir=folder,
+            output_cfg=folder / "lightfield.json",
+            source_record=Path(source_record),
+            record=Path(record),
+            views=f"0:{dataset.view_count}",
+        ).run()
 
     def _write_splits(self) -> Path | None:
         """Write the splits.json of the member. Return None if no rig has a split."""

@@ -23,4 +23,3 @@ FILTERS = {
     "adaptive": Filter(2, covers=True),
     "st_warp": Filter(2),
 }
-DEFAULT_FILTER = "adaptive"

@@ -1,6 +1,5 @@
 """A run of scripts/reproject.py: its files, its views, and their keys."""
 
-import argparse
 import hashlib
 import itertools
 import json
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
+from lightfield.configuration.reprojections import LIGHT_GROUPS
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.formats import light_groups, lightfield, passes
@@ -27,6 +26,7 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.sensor import parameters_of
+from lightfield.stages.lenses import Reproject
 from lightfield.workflow import shard_files
 from lightfield.workflow.records import ShardRecord
 
@@ -59,34 +59,30 @@ class Light:
 class Job:
     """The settings that all views of a run share. Errors name the wrong flag or key."""
 
-    def __init__(
-        self,
-        arguments: argparse.Namespace,
-        settings: Reprojection,
-        lightfield: LightField,
-        source: Lens,
-    ) -> None:
-        self.arguments = arguments
+    def __init__(self, stage: Reproject) -> None:
+        self.stage = stage
+        settings = stage.settings
+        if not settings.formats:
+            raise UserError("--settings: formats: must be a list of exr, png, or both")
         self.settings = settings
-        self.lightfield = lightfield
-        self.source = source
-        self.geometry = Geometry.of(settings, source)
+        self.lightfield, self.source = stage.read()
+        self.geometry = Geometry.of(settings, self.source)
         self.targets = self.geometry.targets
-        if arguments.no_configs and arguments.output_cfg:
+        if stage.no_configs and stage.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         if not self.copies:
             self.lightfield.require_centre()
-        if settings.sensor and lightfield.transparent:
+        if settings.sensor and self.lightfield.transparent:
             raise UserError("sensor: does not go with transparent views")
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
-        self.record = ShardRecord(arguments.record, arguments.output_dir)
+        self.record = ShardRecord(stage.record, stage.output_dir)
         # For each 16-bit depth map, how many depths no step of it holds.
         self.lost_depths: list[int] = []
         # The SHA-256 of each image, by its path in the dataset.
         self.source_sums: dict[str, str] = {}
-        if arguments.source_record:
-            for path, (_, digest) in shard_files.read_record(arguments.source_record).items():
+        if stage.source_record:
+            for path, (_, digest) in shard_files.read_record(stage.source_record).items():
                 self.source_sums[path] = digest
 
     def _chosen_passes(self) -> list[Pass]:
@@ -99,7 +95,7 @@ class Job:
         for name in chosen:
             if name not in available:
                 allowed = ", ".join(available) or "no passes to reproject"
-                raise UserError(f"passes: is {name}; {self.arguments.input_cfg} has {allowed}")
+                raise UserError(f"passes: is {name}; {self.stage.input_cfg} has {allowed}")
         return [passes.by_name(name) for name in chosen]
 
     def _chosen_lights(self) -> list[Light]:
@@ -110,7 +106,7 @@ class Job:
             return [Light()]
         if not groups:
             raise UserError(
-                f"relight: {self.arguments.input_cfg} has no light groups; "
+                f"relight: {self.stage.input_cfg} has no light groups; "
                 "render.light_groups makes them"
             )
         if isinstance(light, str):
@@ -132,7 +128,7 @@ class Job:
         return [self._map(target) for target in self.targets]
 
     def _map(self, target: Target) -> LensMap:
-        path = self.arguments.lens_map
+        path = self.stage.lens_map
         if path is None:
             return self.geometry.compute(target)
         path = path.with_name(path.stem + target.suffix + path.suffix)
@@ -204,12 +200,12 @@ class Job:
             files["mask"] = f"dynamic_mask_{name}.png"
         if self.settings.sensor:
             files |= sensor_files(self.settings.sensor, name)
-        folder: Path = self.arguments.output_dir
+        folder = self.stage.output_dir
         return {kind: folder / file for kind, file in files.items()}
 
     def pass_outputs(self, view: SourceView, target: Target) -> dict[Pass, Path]:
         """Return the files of a view's passes."""
-        folder: Path = self.arguments.output_dir
+        folder = self.stage.output_dir
         return {each: each.path(folder, view.name + target.suffix) for each in self.passes}
 
     def files(self, view: SourceView, target: Target, light: Light) -> list[Path]:
@@ -247,19 +243,21 @@ class Job:
 
     def views(self) -> list[SourceView]:
         """Return the chosen views, in the order of their names or frames."""
-        arguments = self.arguments
-        if arguments.single:
+        stage = self.stage
+        if stage.single:
             if isinstance(self.source, CubeMap):
                 raise UserError(
                     "--single: is one face of a cube map; give --input-dir, for all six"
                 )
-            return [SourceView(arguments.single.stem, (arguments.single,))]
-        folder: Path = arguments.input_dir
+            return [SourceView(stage.single.stem, (stage.single,))]
+        folder = stage.input_dir
+        if folder is None:
+            raise UserError("--input-dir: is missing; or give --single")
         if not folder.is_dir():
             raise UserError(f"--input-dir {folder}: no such folder")
-        if arguments.views:
+        if stage.views:
             names = [view.name for view in self.lightfield.views]
-            names = names[view_slice(arguments.views, len(names))]
+            names = names[view_slice(stage.views, len(names))]
             views = [SourceView(name, _find(folder, name, self.source)) for name in names]
         else:
             views = self._views_in(folder)
@@ -287,8 +285,8 @@ class Job:
 
     def _passes(self, name: str, suffix: str) -> bool:
         """Return whether a name passes the filters, with or without its ``suffix``."""
-        end = self.arguments.filter_suffix
-        return name.startswith(self.arguments.filter_prefix) and (
+        end = self.stage.filter_suffix
+        return name.startswith(self.stage.filter_prefix) and (
             name.endswith(end) or (name + suffix).endswith(end)
         )
 

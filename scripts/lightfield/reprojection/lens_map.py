@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, atomic_path, read_problem
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
-from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
+from lightfield.reprojection.filters import FILTERS
 from lightfield.reprojection.fold import Fold
 from lightfield.reprojection.footprints import bounds, distance_to_missing, mark, measure
 from lightfield.reprojection.kernels import Topology

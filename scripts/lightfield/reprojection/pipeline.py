@@ -19,24 +19,25 @@ from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, Light, SourceView
 from lightfield.reprojection.passes import write_passes
 from lightfield.reprojection.pixels import SourcePixels, write
+from lightfield.stages.lenses import Reproject
 
 
-def run(job: Job) -> None:
+def run(stage: Reproject) -> None:
     """Reproject the chosen views. Raises `UserError` with the number of views that failed."""
-    arguments = job.arguments
-    views = [] if arguments.dry_run else job.views()
+    job = Job(stage)
+    views = [] if stage.dry_run else job.views()
     _check_apart(job, views)
-    if arguments.output_cfg:
-        job.output_lightfield().write(arguments.output_cfg)
-    if arguments.dry_run:
+    if stage.output_cfg:
+        job.output_lightfield().write(stage.output_cfg)
+    if stage.dry_run:
         return
     # One thread makes each view. OpenImageIO, which is imported later, must add no threads.
     os.environ["OPENIMAGEIO_THREADS"] = "1"
     maps = job.maps
     # lens_map.py has already reported the maps in files.
-    if arguments.lens_map is None:
+    if stage.lens_map is None:
         lens_map.report(maps)
-    label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
+    label = f"reproject to {stage.output_dir} {stage.views or ''}".rstrip()
     progress = Progress(len(views), label)
     paths: list[Path] = []
     failed: list[str] = []
@@ -56,7 +57,7 @@ def run(job: Job) -> None:
         steps = job.settings.depth_png
         assert steps is not None
         print(
-            f"note: {arguments.output_dir}: {lost} depths are 0, unknown, in 16-bit depth maps, "
+            f"note: {stage.output_dir}: {lost} depths are 0, unknown, in 16-bit depth maps, "
             f"which hold only {1 / steps:g} to {LARGEST_STEP / steps:g} m"
         )
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
@@ -64,8 +65,8 @@ def run(job: Job) -> None:
 
 def _check_apart(job: Job, views: list[SourceView]) -> None:
     """Raise `UserError` if an output would replace an input, even through another path."""
-    if job.arguments.output_cfg and job.arguments.input_cfg:
-        keep_apart("--output-cfg", job.arguments.output_cfg, job.arguments.input_cfg)
+    if job.stage.output_cfg and job.stage.input_cfg:
+        keep_apart("--output-cfg", job.stage.output_cfg, job.stage.input_cfg)
     resolve_folder = cache(Path.resolve)
     for view in views:
         inputs = {(resolve_folder(path.parent), path.name) for path in job.sources(view)}
@@ -73,14 +74,14 @@ def _check_apart(job: Job, views: list[SourceView]) -> None:
             for path in job.files(view, target, light):
                 if (resolve_folder(path.parent), path.name) in inputs:
                     raise UserError(
-                        f"--output-dir {job.arguments.output_dir}: would replace the input {path}; "
+                        f"--output-dir {job.stage.output_dir}: would replace the input {path}; "
                         "give another folder"
                     )
 
 
 def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
     """Yield each view with its files, or with the error that stopped it."""
-    with ThreadPoolExecutor(max(1, job.arguments.parallel)) as pool:
+    with ThreadPoolExecutor(max(1, job.stage.parallel)) as pool:
         futures = {pool.submit(_reproject_view, job, view): view for view in views}
         for future in as_completed(futures):
             error = future.exception()
@@ -91,14 +92,14 @@ def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, An
 
 def _reproject_view(job: Job, view: SourceView) -> list[Path]:
     """Make a view's missing or outdated files. Return all of its files."""
-    arguments = job.arguments
+    stage = job.stage
     paths_of_view: list[Path] = []
     todo: list[tuple[int, Target, Light, str]] = []
     identity = ""
     for light, (index, target) in itertools.product(job.lights, enumerate(job.targets)):
         paths = job.files(view, target, light)
         paths_of_view += paths
-        if arguments.skip_if_exists and all(path.exists() for path in paths):
+        if stage.skip_if_exists and all(path.exists() for path in paths):
             continue
         identity = identity or _identity(view)
         key = job.key(view, target, light, identity)
@@ -121,7 +122,7 @@ def _check(job: Job, view: SourceView) -> None:
         expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(
-                f"{path}: is not as it was written (see {job.arguments.source_record}); "
+                f"{path}: is not as it was written (see {job.stage.source_record}); "
                 "scripts/verify.py --mend makes it again"
             )
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import measurement, rig, scene, views
+from lightfield.stages import lenses, measurement, rig, scene, views
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -16,6 +16,8 @@ STAGES: list[type[Stage[Any]]] = [
     rig.CheckCameras,
     views.RenderShard,
     views.ImportViews,
+    lenses.LensMap,
+    lenses.Reproject,
     views.Flow,
     views.Splits,
     measurement.CheckDevice,

@@ -1,0 +1,25 @@
+"""Writes the lens map of a rig, or the lens maps of a cube map's faces."""
+
+from lightfield.core.files import write_text
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.geometry import Geometry
+from lightfield.stages.lenses import LensMap
+
+_UNSEEN = "The source does not see this face.\n"
+
+
+def write(job: LensMap) -> None:
+    """Compute and write the lens maps. A face that the source does not see gets a line of text."""
+    _, source = job.read()
+    geometry = Geometry.of(job.settings, source)
+    maps = {target.suffix: geometry.compute(target) for target in geometry.targets}
+    lens_map.report(list(maps.values()))
+    # The workflow cannot tell which faces are seen, so it expects a file for each.
+    suffixes = [f"_{face}" for face in CUBE_FACES] if job.settings.cube_map else [""]
+    for suffix in suffixes:
+        file = job.file.with_name(job.file.stem + suffix + job.file.suffix)
+        if suffix in maps:
+            lens_map.save(file, maps[suffix])
+        else:
+            write_text(file, _UNSEEN)

@@ -1,0 +1,63 @@
+"""The stages that make views through another lens from finished views."""
+
+from pathlib import Path
+
+from lightfield.configuration.reprojections import Reprojection
+from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.stage import Stage, option, reads, writes
+from lightfield.stages.lens_flags import LensMapFlags, ReprojectFlags, Source
+
+_FILES = "Input and output"
+_CHOICE = "Choice of files"
+_RUNTIME = "Runtime"
+
+
+class LensMap(Source, Stage[Reprojection]):
+    """Computes a lens map, which `Reproject` applies to every view of a rig."""
+
+    name = "lens_map"
+    function = "lightfield.reprojection.lens_map_files:write"
+    by_hand = LensMapFlags
+
+    file: Path = writes("lens map to write, .npy", positional=True, metavar="FILE")
+
+
+class Reproject(Source, Stage[Reprojection]):
+    """Reprojects views from one lens to another."""
+
+    name = "reproject"
+    function = "lightfield.reprojection.pipeline:run"
+    by_hand = ReprojectFlags
+
+    input_dir: Path | None = reads(
+        "folder of the images", None, short=["-i"], group=_FILES, one_of="source"
+    )
+    single: Path | None = reads(
+        "one image, instead of a folder", None, metavar="FILE", group=_FILES, one_of="source"
+    )
+    output_dir: Path = writes("folder to write to", short=["-o"], group=_FILES)
+    output_cfg: Path | None = writes("lightfield.json to write", None, metavar="JSON", group=_FILES)
+    record: Path | None = writes(
+        "JSON to write last: a list of the files", None, metavar="JSON", group=_FILES
+    )
+    source_record: Path | None = reads(
+        "record whose sizes and checksums the images must match", None, metavar="JSON", group=_FILES
+    )
+    lens_map: Path | None = reads(
+        "lens map that lens_map.py computed", None, metavar="FILE", group=_FILES
+    )
+    filter_prefix: str = option("only images whose names start with this", "", group=_CHOICE)
+    filter_suffix: str = option(
+        "only images whose names end with this, with or without .png or .exr", "", group=_CHOICE
+    )
+    views: str | None = option(
+        "only these frames of --input-cfg, as a slice from 0, END excluded",
+        None,
+        metavar="FIRST:END",
+        group=_CHOICE,
+    )
+    skip_if_exists: bool = option("keep existing output files", False, group=_RUNTIME)
+    parallel: AtLeastOne = option(
+        "how many images are processed at the same time", 1, short=["-j"], group=_RUNTIME
+    )
+    dry_run: bool = option("write only --output-cfg, and no images", False, group=_RUNTIME)
