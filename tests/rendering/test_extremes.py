@@ -9,6 +9,7 @@ import pytest
 from mpmath import mpf
 
 import stability
+from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.geometry import rigs
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -16,7 +17,6 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.depth import resample_depth
-from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.reprojection.filters import FILTERS
 from stability import ROUNDINGS
 
