@@ -44,6 +44,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
+from lightfield.stages import exports as export_stages
 from lightfield.stages import measurement
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
@@ -242,7 +243,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("build_scene.py", scene_stages.BuildSettings),
             Section("make_lightfield.py", LightfieldSettings),
             Section("free_places.py", rig_stages.FreePlacesSettings),
-            Section("surface.py", job_settings.MeshSettings),
+            Section("surface.py", export_stages.MeshSettings),
             Section("reproject.py and lens_map.py", reprojections.Reprojection),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
@@ -596,7 +597,7 @@ def row_of(action: argparse.Action) -> str:
     flags = ", ".join(f"`{flag}`" for flag in action.option_strings)
     is_required = action.required and action.nargs not in ("?", "*")
     default = "required" if is_required else "–"
-    given = re.search(r" \(default: ([^)]*)\)$", action.help or "")
+    given = re.search(r" \(default: (\S+)\)$", action.help or "")
     value = given[1] if action.default == argparse.SUPPRESS and given else action.default
     has_default = isinstance(value, str | int | float | Path) and value is not False
     if not is_required and has_default and value != argparse.SUPPRESS:

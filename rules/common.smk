@@ -40,13 +40,13 @@ from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.configuration.job_settings import (
     FiguresSettings,
     Measurement,
-    MeshSettings,
     PackSettings,
     PageSettings,
     SequenceValidationSettings,
     SynthesisSettings,
     ValidationSettings,
 )
+from lightfield.stages.exports import MeshSettings
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.loading import (

@@ -13,12 +13,12 @@ from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
 
 from lightfield.configuration import config_file, scene_yaml
 from lightfield.configuration.exports import ExportSettings, settings_of
-from lightfield.configuration.job_settings import MeshSettings
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.core.settings import read_settings
 from lightfield.geometry.rigs import from_settings
+from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import CostSettings
 from lightfield.stages.scene import ImportSettings
 from lightfield.workflow.loading import load_datasets

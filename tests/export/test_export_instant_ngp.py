@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-import export_instant_ngp
 from lightfield.configuration.exports import ExportSettings, InstantNgp
 from lightfield.core.errors import UserError
+from lightfield.core.flags import parsed
 from lightfield.export import instant_ngp
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images
+from lightfield.stages.exports import ExportInstantNgp
 
 RIG: dict[str, Any] = {
     "type": "cylinder",
@@ -56,7 +57,7 @@ class Dataset:
         """Return the transforms.json that the program writes for these arguments."""
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        export_instant_ngp.main([*map(str, [*paths, *arguments])])
+        parsed(ExportInstantNgp, None, [*map(str, [*paths, *arguments])]).run()
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -620,6 +621,7 @@ def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) ->
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
         (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: does not go with scale"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: needs --scale"),
+        (FISHEYE, ["--scale", 1, "--offset", 0, "nan", 0], "--offset: is NaN; must be a finite"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
         (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),
@@ -641,14 +643,13 @@ def test_an_impossible_export_is_an_error(
         (["--image-suffix", ".jpg"], r"--image-suffix: invalid choice: '\.jpg'"),
         # Later versions of Python quote the number.
         (["--aabb-scale", "3"], r"--aabb-scale: invalid choice: (3|'3') "),
-        (["--offset", "0", "nan", "0"], "--offset: is nan; must be a finite number"),
     ],
 )
 def test_impossible_arguments_are_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        export_instant_ngp.main(arguments)
+        parsed(ExportInstantNgp, None, arguments)
     assert re.search(message, capsys.readouterr().err)
 
 

@@ -18,15 +18,16 @@ from oracles import exported_cameras, exported_depth, exported_pictures
 from pydantic import TypeAdapter
 from sphere import LENSES, look_at_ball, write_views
 
-import export_instant_ngp
 from lightfield import export
 from lightfield.configuration.exports import settings_of
 from lightfield.core.files import read_json, write_json
+from lightfield.core.flags import parsed
 from lightfield.export import MANIFESTS, zarr_store
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.imaging import images
+from lightfield.stages.exports import ExportInstantNgp
 from lightfield.validation.files import read_sets
 
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -146,7 +147,7 @@ def write_instant_ngp(folder, name, arguments):
     files += ["--output", folder_of_set / "transforms.json"]
     files += ["--image-suffix", ".exr", "--image-dir", images]
     files += ["--depth-dir", folder_of_set / "instant_ngp" / "depth"]
-    export_instant_ngp.main([*map(str, files), *arguments])
+    parsed(ExportInstantNgp, None, [*map(str, files), *arguments]).run()
 
 
 @functools.cache

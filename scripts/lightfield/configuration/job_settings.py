@@ -6,40 +6,16 @@ Reprojections and exports have modules of their own.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.family import Draw, Member
-from lightfield.configuration.scene_source import (
-    FILE,
-)
 from lightfield.configuration.scene_yaml import Credits, load_scene
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings, read_settings
 from lightfield.geometry.rigs import AnyRig, as_written
-from lightfield.geometry.rigs.rig import Frame
-
-
-class MeshSettings(Settings):
-    """The settings of scripts/surface.py."""
-
-    formats: list[Literal["glb", "ply"]] = Field(
-        ["glb", "ply"], min_length=1, description="As in the scene YAML."
-    )
-    frame: Frame | Literal["file"] = Field(
-        1, description=f"Frame to load. {FILE}: the .blend's own."
-    )
-    scene_name: str | None = Field(None, description="As in the scene YAML.")
-    view_layers: Literal["all"] | list[str] | None = Field(
-        None, description="As in the scene YAML."
-    )
-    numbered: bool = Field(
-        False,
-        description="Whether objects.json lists the numbers that objects have in the passes object "
-        "and instance.",
-    )
 
 
 class FiguresSettings(Settings):

@@ -32,6 +32,8 @@ EXPORTS = (
 # Those of them that are made of a whole sequence.
 SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview", "scene_flow")
 
+INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
+
 # The formats of model files that scripts/import_model.py reads.
 MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")
 # Those of them that do not say which axis points up, with the usual axis.

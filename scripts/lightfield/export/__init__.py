@@ -21,12 +21,20 @@ from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import NAME
+from lightfield.stages.exports import ExportViews
 from lightfield.workflow.view_store import ViewStore
 
 Source = SourceDataset | SourceSequence
 
 # The folder of a dataset that holds its exports.
 FOLDER = "exports"
+
+
+def write(job: ExportViews) -> None:
+    """Write an export of a dataset's folder."""
+    source = source_of(job.format, job.settings, job.dataset)
+    files = run(job.format, source, job.settings.options, job.output)
+    print(f"{job.output}: {len(source.lightfield.views)} views in {len(files)} files")
 
 
 def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:

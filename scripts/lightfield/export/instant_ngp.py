@@ -6,7 +6,6 @@
 # (x, y, z) becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around
 # (½, ½, ½).
 
-import argparse
 import math
 import os
 import sys
@@ -18,20 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
 from lightfield.configuration.exports import (
     BOUNDS_PIXELS,
     BOUNDS_VIEWS,
     FARTHEST,
-    ExportSettings,
-    InstantNgp,
 )
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
-from lightfield.core.names import VIEWS
 from lightfield.core.progress import Progress
-from lightfield.core.settings import checked, read_settings
 from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
@@ -42,6 +36,7 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
+from lightfield.stages.exports import ExportInstantNgp
 from lightfield.workflow.view_store import ViewStore
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -70,47 +65,17 @@ def _pictures(path: Path) -> list[str]:
 MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
-def _settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
-    """Return the settings from --settings, or from the flags."""
-    if arguments.settings:
-        return read_settings(ExportSettings[InstantNgp], arguments.settings)
-    if arguments.scale is None and arguments.offset is not None:
-        raise UserError("--offset: needs --scale; without --scale, both are fitted")
-    corners = arguments.render_aabb
-    options = {
-        "sources": [VIEWS],
-        "scale": arguments.scale,
-        "offset": arguments.offset,
-        "bounds": "depth" if arguments.depth_bounds else "rig",
-        "aabb_scale": arguments.aabb_scale,
-        "render_aabb": [corners[:3], corners[3:]] if corners else None,
-        "depth": arguments.depth_dir is not None,
-    }
-    content = {
-        "options": {key: value for key, value in options.items() if value is not None},
-        "suffix": arguments.image_suffix,
-    }
-    if arguments.placed_as:
-        content["trained_by"] = arguments.placed_as
-    return checked(TypeAdapter(ExportSettings[InstantNgp]), content, "flags")
-
-
-def export(arguments: argparse.Namespace) -> None:
+def write(job: ExportInstantNgp) -> None:
     """Write a dataset's transforms.json, and the files that it names."""
-    write(_settings_from(arguments), arguments)
-
-
-def write(settings: ExportSettings[InstantNgp], arguments: argparse.Namespace) -> None:
-    """Write what the settings describe to the paths of ``arguments``, as `export` does."""
-    options = settings.options
-    lightfield = LightField.read(arguments.input_cfg)
+    options = job.settings.options
+    lightfield = LightField.read(job.input_cfg)
     lightfield.require_centre()
-    view_names = {arguments.output: [view.name for view in lightfield.views]}
+    view_names = {job.output: [view.name for view in lightfield.views]}
     for part in PARTS:
         names = [view.name for view in lightfield.views if view.split == part]
         if names:
-            view_names[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = names
-    writer = _Writer(arguments, settings, lightfield)
+            view_names[job.output.with_stem(f"{job.output.stem}_{part}")] = names
+    writer = _Writer(job, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
     common["options"] = options.recorded
@@ -126,7 +91,7 @@ def write(settings: ExportSettings[InstantNgp], arguments: argparse.Namespace) -
         print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
     store = ViewStore.configured()
     if store:
-        store.put_list(arguments.output, [*writer.pictures, *list(view_names)[1:]])
+        store.put_list(job.output, [*writer.pictures, *list(view_names)[1:]])
 
 
 class _Writer:
@@ -134,14 +99,14 @@ class _Writer:
 
     def __init__(
         self,
-        arguments: argparse.Namespace,
-        settings: ExportSettings[InstantNgp],
+        job: ExportInstantNgp,
         lightfield: LightField,
     ) -> None:
-        self.output: Path = arguments.output
-        self.options = settings.options
-        self.suffix = settings.suffix
-        self.trained_by = Path(settings.trained_by) if settings.trained_by else None
+        self.output = job.output
+        self.options = job.settings.options
+        self.suffix = job.settings.suffix
+        trained_by = job.settings.trained_by
+        self.trained_by = Path(trained_by) if trained_by else None
         self.lightfield = lightfield
         self.lens = lightfield.lens
         try:
@@ -150,16 +115,18 @@ class _Writer:
             raise UserError(f"{lightfield.path}: {error}") from None
         self.rays = self.lens.pixel_rays()
         self.blind = _blind_pixels(self.lens)
-        self.image_dir: Path = arguments.image_dir or lightfield.folder
+        self.image_dir = job.image_dir or lightfield.folder
         # The images written so far.
         self.pictures: list[Path] = []
         folder = self.output.parent / "instant_ngp"
-        self.exr_dir: Path = arguments.exr_dir or folder
-        self.depth_dir: Path = arguments.depth_dir or folder / "depth"
+        self.exr_dir = job.exr_dir or folder
+        self.depth_dir = job.depth_dir or folder / "depth"
         # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
         # the axis. All other rays have length 1. The loader ignores a depth of 0.
         self.meaning = conventional_depth(self.lens)
-        keep_apart("--output", self.output, arguments.input_cfg, self.trained_by)
+        keep_apart("--output", self.output, job.input_cfg, self.trained_by)
+        if job.depth_dir and not self.options.depth:
+            raise UserError("--depth-dir: needs options.depth: true in the settings file")
         if self.suffix == ".exr":
             keep_apart("--exr-dir", self.exr_dir, self.image_dir)
         elif self.options.depth:

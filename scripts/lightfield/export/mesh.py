@@ -23,7 +23,10 @@ from numpy.typing import NDArray
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_text
+from lightfield.export import is_mesh_of_dataset, replace_folder
 from lightfield.geometry.mesh import Box, Floats, Mesh, Placed, Surface, box_around, to_world
+from lightfield.rendering.surface import surface_of
+from lightfield.stages.exports import WriteSurface
 
 GLB = "scene.glb"
 PLY = "scene.ply"
@@ -46,7 +49,27 @@ _ELEMENT_ARRAY_BUFFER = 34963
 _Z_UP_TO_Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 
 
-def export(surface: Surface, formats: Sequence[str], frame: int, folder: Path) -> None:
+def write(job: WriteSurface) -> None:
+    """Write what cameras can see of a scene, and list the files in export.json."""
+    surface, frame = surface_of(job)
+    formats = job.settings.formats
+    files = replace_folder(
+        "mesh",
+        {"formats": formats},
+        job.output,
+        lambda folder: _write_files(surface, formats, frame, folder),
+        is_own=is_mesh_of_dataset(job.output),
+    )
+    for name, reason in surface.left_out.items():
+        print(f"left out: {name}: {reason}")
+    triangles = sum(len(surface.meshes[placed.mesh].triangles) for placed in surface.placed)
+    print(
+        f"{job.output}: {len(surface.placed)} objects and instances of "
+        f"{len(surface.meshes)} meshes, {triangles} triangles, in {len(files)} files"
+    )
+
+
+def _write_files(surface: Surface, formats: Sequence[str], frame: int, folder: Path) -> None:
     """Write a scene's surface at a ``frame`` into ``folder``, in ``formats`` of "glb" and "ply".
 
     Raises `UserError` if cameras can see no mesh, or if a format cannot hold so many triangles.

@@ -4,7 +4,6 @@ All stages of a member run in this process, so that Blender is loaded once for m
 stage that needs the scene opens its .blend anew, as the stages of other scenes do.
 """
 
-import argparse
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,11 +19,12 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.names import VIEWS
-from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.export import MANIFESTS
 from lightfield.formats.layout import SUMS, write_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import inventory_file
+from lightfield.stages.exports import ExportInstantNgp, ExportViews
 from lightfield.stages.lenses import Reproject
 from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
 from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings
@@ -204,18 +204,19 @@ class Stages:
             **roles,
         )
         if isinstance(options, InstantNgp):
-            images = Path(dataset.folder, "exr" if is_rendered else source)
-            paths = argparse.Namespace(
+            ExportInstantNgp(
+                settings=settings,
                 input_cfg=folder / "lightfield.json",
                 output=folder / "transforms.json",
-                image_dir=images,
-                exr_dir=None,
-                depth_dir=None,
-            )
-            instant_ngp.write(settings, paths)
+                image_dir=Path(dataset.folder, "exr" if is_rendered else source),
+            ).run()
         else:
-            views = export.source_of(name, settings, Path(dataset.folder))
-            export.run(name, views, settings.options, folder / export.FOLDER / name)
+            ExportViews(
+                settings=settings,
+                format=name,
+                dataset=Path(dataset.folder),
+                output=folder / export.FOLDER / name,
+            ).run()
 
     def _validate(self, dataset: Dataset, splits: Path | None) -> None:
         """Check a dataset, and write its validation.json and checksums.

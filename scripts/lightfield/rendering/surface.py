@@ -13,10 +13,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.mesh import Mesh, Placed, Surface
-from lightfield.rendering import instances, volumes
+from lightfield.rendering import blend_file, frames, ids, instances, pruning, volumes
 from lightfield.rendering.ids import has_no_surface
 from lightfield.rendering.render_graph import in_render
+from lightfield.stages.exports import WriteSurface
 
 # Why an object of a type has no mesh.
 _REASONS = {
@@ -29,6 +31,23 @@ _REASONS = {
 _WITH_A_MESH_BESIDE = ("CURVE", "FONT", "META", "SURFACE")
 _HAIR = "has hair, which Cycles draws without a mesh"
 _ONLY_VOLUME = "has materials that are only volumes"
+
+
+def surface_of(job: WriteSurface) -> tuple[Surface, int]:
+    """Open the .blend of a job. Return the surface that cameras can see, and its frame."""
+    settings = job.settings
+    path = job.inventory
+    inventory = read_inventory(path, "left_out", "hidden") if path else None
+    blend_file.open_scene(job.blend, settings.model_dump(), inventory)
+    if settings.numbered:
+        # The numbers follow from the objects that a render keeps.
+        hidden = inventory["hidden"] if inventory else pruning.removable_objects()
+        pruning.remove_objects(hidden)
+    if isinstance(settings.frame, int):
+        frames.go_to(settings.frame)
+    if settings.numbered:
+        ids.assign(["object"])
+    return visible_surface(settings.numbered), bpy.context.scene.frame_current
 
 
 def visible_surface(numbered: bool) -> Surface:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import lenses, measurement, rig, scene, views
+from lightfield.stages import exports, lenses, measurement, rig, scene, views
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -20,6 +20,9 @@ STAGES: list[type[Stage[Any]]] = [
     lenses.Reproject,
     views.Flow,
     views.Splits,
+    exports.ExportViews,
+    exports.ExportInstantNgp,
+    exports.WriteSurface,
     measurement.CheckDevice,
     measurement.Probe,
     measurement.Calibrate,

@@ -8,6 +8,7 @@ from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.scene_source import FILE
+from lightfield.core.names import INVENTORY
 from lightfield.core.settings import Settings
 from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.geometry.rigs import Random, as_written
@@ -15,8 +16,6 @@ from lightfield.geometry.rigs.rig import Frame
 
 # The keys of a rig that say what a camera sees and what its view is for.
 _CAMERA_KEYS = ("camera", "split")
-
-INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 
 def _places_as_written(rig: Random) -> dict[str, Any]:
