@@ -260,7 +260,9 @@ KEY_PAGES: dict[str, Page] = {
         "These programs measure or estimate something. They read a "
         "[settings file](job-keys.md) like the other programs.",
         [
-            Section("synthesis_quality.py", job_settings.SynthesisSettings),
+            Section("evaluate.py", measurement.EvaluationSettings),
+            Section("evaluate_surface.py", measurement.SurfaceSettings),
+            Section("synthesis_quality.py", measurement.SynthesisSettings),
             Section("costs.py", measurement.CostSettings),
             Section("costs.py: full_size", measurement.FullSize),
             Section("probe.py", measurement.ProbeSettings),

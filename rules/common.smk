@@ -43,10 +43,10 @@ from lightfield.configuration.job_settings import (
     PackSettings,
     PageSettings,
     SequenceValidationSettings,
-    SynthesisSettings,
     ValidationSettings,
 )
 from lightfield.stages.exports import MeshSettings
+from lightfield.stages.measurement import SynthesisSettings
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.loading import (

@@ -13,7 +13,6 @@ from pydantic import Field, PlainSerializer
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.family import Draw, Member
 from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings, read_settings
 from lightfield.geometry.rigs import AnyRig, as_written
 
@@ -114,21 +113,6 @@ class PackSettings(Settings):
     def most_bytes(self) -> float | None:
         """The largest size of a part, or of a shard, in bytes. None without ``gigabytes``."""
         return self.gigabytes and self.gigabytes * 1e9
-
-
-class SynthesisSettings(Settings):
-    """The settings of scripts/synthesis_quality.py."""
-
-    truth: list[str] = Field(
-        [],
-        description="Folders of the datasets with which synthesised views are compared. Without "
-        "this key, they are compared with the dataset's own test views.",
-    )
-    views: AtLeastOne = Field(
-        12,
-        description="How many views of each of these datasets are compared.",
-        json_schema_extra={"unit": "views"},
-    )
 
 
 class BatchSettings(Settings):

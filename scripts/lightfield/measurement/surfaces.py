@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import reading
+from lightfield.core.files import keep_apart, reading, write_json
+from lightfield.stages.measurement import EvaluateSurface, SurfaceSettings
 
 Points = NDArray[np.float64]
 
@@ -74,6 +75,29 @@ def read_surface(path: Path) -> Surface:
     if not np.isfinite(vertices).all():
         raise UserError(f"{path}: has points that are not finite")
     return Surface(path, corners if len(corners) else None, vertices)
+
+
+def evaluate(job: EvaluateSurface) -> None:
+    """Print the figures of a surface by its protocol, and write them."""
+    if job.output:
+        keep_apart("--output", job.output, job.candidate, job.reference)
+    candidate = read_surface(job.candidate)
+    reference = read_surface(job.reference)
+    figures = _figures(candidate, reference, job.settings)
+    if job.output:
+        write_json(job.output, {**job.settings.as_json(), **figures})
+    print(", ".join(f"{name} {value:.6g}" for name, value in figures.items()))
+
+
+def _figures(candidate: Surface, reference: Surface, settings: SurfaceSettings) -> dict[str, float]:
+    """Return the figures of a surface by a protocol."""
+    if settings.protocol == "dtu":
+        spacing = settings.spacing or _DTU_SPACING
+        return dtu(candidate, reference, spacing, settings.most_distance or _DTU_MOST_DISTANCE)
+    if settings.protocol == "nerf_synthetic":
+        return nerf_synthetic(candidate, reference, settings.points or NERF_SYNTHETIC_POINTS)
+    assert settings.tau is not None
+    return tanks_and_temples(candidate, reference, settings.tau)
 
 
 def dtu(

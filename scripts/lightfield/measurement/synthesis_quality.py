@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import absolute_path
+from lightfield.core.files import absolute_path, write_csv
+from lightfield.core.progress import Progress
 from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry.depth import with_precision
@@ -24,10 +26,14 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
-from lightfield.measurement import metrics
+from lightfield.measurement import metrics, summaries
 from lightfield.measurement.summaries import PLACES, WHOLE
+from lightfield.stages.measurement import SynthesisQuality, SynthesisSettings
 from lightfield.synthesis.defaults import BEST
 from lightfield.synthesis.view import Sources, reader
+
+# True views, and the dataset that has them.
+_Truth = tuple[SourceDataset, Sequence[View]]
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,63 @@ class _Variant:
     sources: Sources
     best: int
     size: int
+
+
+def measure(job: SynthesisQuality) -> None:
+    """Write and print the quality of a dataset's synthesised views."""
+    source = SourceDataset(job.dataset, "", ".exr")
+    views, truths = _views_and_truths(source, job.settings)
+    exposure = _exposure(truths)
+    all_variants = list(variants(source, views))
+    progress = Progress(len(all_variants), "synthesis", "variants")
+    rows: list[dict[str, Any]] = []
+    for variant in all_variants:
+        for truth, true_views in truths:
+            rows += compare(variant, views, true_views, truth, exposure)
+        progress.done()
+    write_csv(job.output.with_name(f"{job.output.name}.csv"), rows)
+    means = summaries.means(rows)
+    draw(means, job.output)
+    for row in means:
+        print(_line(row))
+
+
+def _views_and_truths(
+    source: SourceDataset, settings: SynthesisSettings
+) -> tuple[Sequence[View], list[_Truth]]:
+    """Return the views to synthesise from, and those to compare with."""
+    views: Sequence[View] = source.lightfield.views
+    truths: list[_Truth]
+    if settings.truth:
+        datasets = [SourceDataset(Path(folder), "", ".exr") for folder in settings.truth]
+        truths = [(truth, truth.lightfield.views) for truth in datasets]
+    else:
+        views, _, tests = splits(source.lightfield)
+        truths = [(source, tests)]
+    return views, [
+        (truth, true_views[:: -(-len(true_views) // settings.views)])
+        for truth, true_views in truths
+    ]
+
+
+def _exposure(truths: Sequence[_Truth]) -> float:
+    """Return the exposure that shows all true views well."""
+    colours = [
+        images.read_image(truth.path(view), "RGB").colour
+        for truth, true_views in truths
+        for view in true_views
+    ]
+    return pictures.exposure_for(np.concatenate([colour.reshape(-1, 3) for colour in colours]))
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    """Return a row of `summaries.means` as a line of text."""
+    return (
+        f"{row['truth']:<24} {row['variant']:>10} {row['value']:<18} PSNR {row['psnr']:5.2f} "
+        f"dB, holes black {row['psnr_black']:5.2f}  WS-PSNR {row['ws_psnr']:5.2f}  "
+        f"IV-PSNR {row['iv_psnr']:5.2f}  SSIM {row['ssim']:.3f}  FLIP {row['flip']:.3f}, "
+        f"black {row['flip_black']:.3f}  holes {row['holes']:.2%}"
+    )
 
 
 def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[_Variant]:

@@ -9,16 +9,55 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_csv
+from lightfield.core.leftovers import temporary_folder
+from lightfield.core.names import VIEWS
 from lightfield.core.progress import Progress
 from lightfield.export.source import Floats, SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
+from lightfield.stages.measurement import Evaluate, EvaluationSettings
 
 # The page shows pictures of at most this many views. The table has all.
 _SHOWN_VIEWS = 24
 WIDEST = 1500
+
+
+def evaluate(job: Evaluate) -> None:
+    """Write the errors of renders, and their page. If this fails, the output stays as it was."""
+    source = _source(job.dataset, job.settings)
+    views = source.lightfield.views
+    tests = [view for view in views if view.split == "test"] or splits(source.lightfield).test
+    background = np.array(list(bytes.fromhex(job.settings.background))) / 255
+    job.output.parent.mkdir(parents=True, exist_ok=True)
+    with temporary_folder(job.output.parent) as temporary:
+        overall = write(temporary, source, tests, job.renders, job.masks, background)
+        _move_files(temporary, job.output)
+    views_compared = "1 view" if len(tests) == 1 else f"{len(tests)} views"
+    print(
+        f"{views_compared}: PSNR {overall['psnr']:.2f} dB, WS-PSNR {overall['ws_psnr']:.2f} dB, "
+        f"IV-PSNR {overall['iv_psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, "
+        f"FLIP {overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
+    )
+
+
+def _source(dataset: Path, settings: EvaluationSettings) -> SourceDataset:
+    """Return the true views of a dataset."""
+    name = "" if settings.source == VIEWS else settings.source
+    return SourceDataset(
+        dataset, name, settings.suffix, exposure=settings.exposure, reinhard=settings.reinhard
+    )
+
+
+def _move_files(folder: Path, target: Path) -> None:
+    """Move all files below a folder to the same places below another one."""
+    for path in list(folder.rglob("*")):
+        if path.is_file():
+            moved = target / path.relative_to(folder)
+            moved.parent.mkdir(parents=True, exist_ok=True)
+            path.replace(moved)
 
 
 def write(

@@ -1,11 +1,13 @@
 """The stages that measure error, quality and time, and that estimate costs."""
 
+import re
 from pathlib import Path
-from typing import Generic, Literal
+from typing import Annotated, Generic, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.configuration.config_file import Energy
+from lightfield.core.names import VIEWS
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
@@ -223,3 +225,146 @@ class GpuCheck(CalibratedTrialStage[GpuCheckSettings]):
 
     settings: GpuCheckSettings = Field(default_factory=GpuCheckSettings)
     output: Path = writes("path without suffix of the .json and .md to write")
+
+
+class SynthesisSettings(Settings):
+    """The settings of scripts/synthesis_quality.py."""
+
+    truth: list[str] = Field(
+        [],
+        description="Folders of the datasets with which synthesised views are compared. Without "
+        "this key, they are compared with the dataset's own test views.",
+    )
+    views: AtLeastOne = Field(
+        12,
+        description="How many views of each of these datasets are compared.",
+        json_schema_extra={"unit": "views"},
+    )
+
+
+class SynthesisQuality(Stage[SynthesisSettings]):
+    """Measures how well held-out views are synthesised from a dataset."""
+
+    name = "synthesis_quality"
+    function = "lightfield.measurement.synthesis_quality:measure"
+    by_hand = SynthesisSettings
+
+    dataset: Path = reads("folder of a dataset with depth", positional=True)
+    output: Path = writes("path without suffix of the files to write", metavar="STEM")
+
+
+NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
+
+
+def _colour(text: str) -> str:
+    """Return a colour as six hexadecimal digits."""
+    code = NAMED_COLOURS.get(text, text.removeprefix("#"))
+    if not re.fullmatch("[0-9a-fA-F]{6}", code):
+        raise ValueError("must be black, white or rrggbb, two hexadecimal digits for each channel")
+    return code
+
+
+class EvaluationSettings(Settings):
+    """The settings of scripts/evaluate.py."""
+
+    source: str = Field(
+        VIEWS, description=f"Name of a reprojection. {VIEWS}: the views as rendered."
+    )
+    suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the dataset's views.")
+    exposure: float = Field(
+        0.0,
+        ge=-100,
+        le=100,
+        description="Exposure of EXR views in stops, as in the export.",
+        json_schema_extra={"unit": "stops"},
+    )
+    reinhard: float = Field(
+        1.0,
+        ge=1e-9,
+        le=1e9,
+        description="Tone mapping of EXR views, as in the export: the value that becomes white. 1: "
+        "no tone mapping.",
+        json_schema_extra={"unit": "light"},
+    )
+    background: Annotated[str, AfterValidator(_colour)] = Field(
+        "black",
+        validate_default=True,
+        description="Colour behind transparent pixels: black, white or rrggbb.",
+        json_schema_extra={"metavar": "COLOUR"},
+    )
+
+
+class Evaluate(Stage[EvaluationSettings]):
+    """Compares renders of a dataset's test views with the truth."""
+
+    name = "evaluate"
+    function = "lightfield.report.evaluation_page:evaluate"
+    by_hand = EvaluationSettings
+
+    renders: Path = reads("folder of the renders to evaluate", positional=True, metavar="RENDERS")
+    dataset: Path = reads("the dataset's folder")
+    masks: Path | None = reads(
+        "folder of masks, <view>.png; pixels that are 0 in them are not compared", None
+    )
+    output: Path = writes("folder to write")
+
+
+_Positive = Annotated[float, Field(gt=0)]
+# The keys that only one protocol reads.
+_KEYS_OF_PROTOCOLS = {
+    "spacing": "dtu",
+    "most_distance": "dtu",
+    "points": "nerf_synthetic",
+    "tau": "tanks_and_temples",
+}
+
+
+class SurfaceSettings(Settings):
+    """The settings of scripts/evaluate_surface.py."""
+
+    protocol: Literal["dtu", "nerf_synthetic", "tanks_and_temples"] = Field(
+        description="Benchmark whose definition of the metrics is used."
+    )
+    spacing: _Positive | None = Field(
+        None,
+        description="For dtu: distance between sampled points, in metres (default: 0.0002).",
+        json_schema_extra={"unit": "m"},
+    )
+    most_distance: _Positive | None = Field(
+        None,
+        description="For dtu: distance in metres beyond which a point is ignored (default: 0.02).",
+        json_schema_extra={"unit": "m"},
+    )
+    points: AtLeastOne | None = Field(
+        None,
+        description="For nerf_synthetic: number of points sampled on each surface (default: "
+        "2500000).",
+        json_schema_extra={"unit": "points"},
+    )
+    tau: _Positive | None = Field(
+        None,
+        description="For tanks_and_temples: distance in metres below which a point counts as "
+        "correct.",
+        json_schema_extra={"unit": "m"},
+    )
+
+    @model_validator(mode="after")
+    def _keys_of_the_protocol(self) -> Self:
+        for name, protocol in _KEYS_OF_PROTOCOLS.items():
+            if getattr(self, name) is not None and protocol != self.protocol:
+                raise ValueError(f"{name}: is only for --protocol {protocol}")
+        if self.protocol == "tanks_and_temples" and self.tau is None:
+            raise ValueError("tau: is missing; the benchmark has 0.003 to 0.025 m, by the scene")
+        return self
+
+
+class EvaluateSurface(Stage[SurfaceSettings]):
+    """Compares a reconstructed surface with the true one, by the metrics of a benchmark."""
+
+    name = "evaluate_surface"
+    function = "lightfield.measurement.surfaces:evaluate"
+    by_hand = SurfaceSettings
+
+    candidate: Path = reads("the reconstructed surface", positional=True, metavar="SURFACE")
+    reference: Path = reads("the true surface")
+    output: Path | None = writes("JSON to write", None)

@@ -30,5 +30,8 @@ STAGES: list[type[Stage[Any]]] = [
     measurement.Plan,
     measurement.ErrorVsTime,
     measurement.GpuCheck,
+    measurement.Evaluate,
+    measurement.EvaluateSurface,
+    measurement.SynthesisQuality,
 ]
 BY_NAME = {stage.name: stage for stage in STAGES}
