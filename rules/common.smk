@@ -28,7 +28,16 @@ from lightfield.workflow.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.planning import memory
+from lightfield.planning.cost import (
+    STAGES,
+    Cost,
+    cost,
+    light_group_count,
+    members_cost,
+    shard_threads,
+    temporary_bytes,
+    view_cost,
+)
 from lightfield.workflow import ledger, presence, shard_counts
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path

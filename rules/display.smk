@@ -4,13 +4,7 @@ import resource
 
 from lightfield.core.units import duration
 from lightfield.workflow.run_display import RunDisplay, Task
-from lightfield.planning.unit_costs import JOB_SECONDS, START_UP_SECONDS
-from lightfield.planning.forecast import (
-    SENSOR_PHASE,
-    Work,
-    calibration_seconds,
-    forecast,
-)
+from lightfield.planning.forecast import SENSOR_PHASE, Work, forecast
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -43,19 +37,8 @@ PHASE_ORDER = {
         ]
     )
 }
-# Jobs of these phases have no estimate. Their logs say how long they take.
+# The cost of jobs of these phases is unknown. Their logs say how long they take.
 UNKNOWN_PHASES = ("measurement", "benchmark", "learn", "plan", "synthesis")
-# Rules that start Blender, beside those that render.
-BLENDER_RULES = (
-    "build_scene",
-    "check_blend",
-    "check_cameras",
-    "free_places",
-    "import_model",
-    "inventory",
-    "mesh",
-    "probe_cameras",
-)
 
 
 def views_of(job):
@@ -97,51 +80,36 @@ def is_of_dataset(job):
     )
 
 
-def estimated_seconds(job):
-    """Return the estimated seconds of a job on one core. None if they are unknown."""
+@cache
+def stages():
+    """Return the stages that have a cost, by the names of their rules, which a module may rename."""
+    return {getattr(rules, stage).rule.name: stage for stage in STAGES}
+
+
+def cost_of(job):
+    """Return the cost of a job. None if it is unknown."""
     wildcards = job.wildcards
     if is_of(job, "calibrate"):
-        dataset = first_dataset(wildcards.scene)
-        render = dataset.render
-        if render.target_error is None:
-            return 0.0
-        return calibration_seconds(
-            render.target_error, min(dataset.rig.camera.resolution), render.most_samples
-        )
+        return cost("calibrate", first_dataset(wildcards.scene))
     if phase_of(job) in UNKNOWN_PHASES:
         return None
     if is_of(job, "build_members"):
-        return START_UP_SECONDS + batch_seconds(wildcards)
-    if is_of(job, *BLENDER_RULES):
-        return START_UP_SECONDS
-    if not is_of_dataset(job):
-        return JOB_SECONDS
-    estimate = dataset_of(wildcards).estimate
-    if is_of(job, "render"):
-        return START_UP_SECONDS + views_of(job) * estimate.view_seconds
-    if is_of(job, "render_panorama"):
-        return estimate.panorama_seconds
-    if is_of(job, "import_views"):
-        return JOB_SECONDS + views_of(job) * estimate.import_seconds
-    if is_of(job, "reproject"):
-        seconds = estimate.reprojection_seconds(wildcards.reprojection)
-        return JOB_SECONDS + views_of(job) * seconds
-    if is_of(job, "export", "export_to_instant_ngp", "validate"):
-        return JOB_SECONDS + estimate.check_seconds
-    if is_of(job, "figures", "page"):
-        return JOB_SECONDS + estimate.report_seconds
-    return JOB_SECONDS
+        return batch_cost(wildcards)
+    stage = stages().get(job.rule.name, job.rule.name)
+    dataset = dataset_of(wildcards) if is_of_dataset(job) else None
+    return cost(stage, dataset, views_of(job), wildcards.get("reprojection", ""))
 
 
 def task_of(job):
     """Return the display's task for a job."""
+    expected = cost_of(job)
     return Task(
         job.rule.name,
         str(Path(job.log[0]).relative_to(stored(f"{WORK}/logs")).with_suffix("")),
         phase_of(job),
         Path(job.log[0]),
         views=rendered_views(job),
-        seconds=estimated_seconds(job),
+        seconds=expected and expected.seconds,
     )
 
 
@@ -223,12 +191,12 @@ def announce_calibrations(jobs):
             scene = job.wildcards.scene
             renders = [each for each in jobs if is_of(each, "render")]
             render_seconds = sum(
-                estimated_seconds(render)
+                cost_of(render).seconds
                 for render in renders
                 if render.wildcards.scene == scene
             )
             print(
-                f"calibrating {scene} takes some {duration(estimated_seconds(job))} of a core,"
+                f"calibrating {scene} takes some {duration(cost_of(job).seconds)} of a core,"
                 f" and rendering it then some {duration(render_seconds)}",
                 file=sys.stderr,
             )
@@ -286,14 +254,9 @@ def dataset_name_of(job):
 
 def work_of(job):
     """Return a job's part of the forecast."""
-    if is_of(job, "build_members"):
-        views, size = batch_views(job.wildcards)
-    else:
-        views = rendered_views(job)
-        estimate = dataset_of(job.wildcards).estimate if views else None
-        size = views * estimate.all_view_bytes if estimate else 0.0
-    seconds = estimated_seconds(job) or 0.0
-    return Work(phase_of(job), dataset_name_of(job), views, seconds, size)
+    is_batch = is_of(job, "build_members")
+    views = batch_views(job.wildcards) if is_batch else rendered_views(job)
+    return Work(phase_of(job), dataset_name_of(job), views, cost_of(job) or Cost())
 
 
 def print_forecast():

@@ -42,9 +42,12 @@ rule plan:
         ),
         families=shlex.join(f"--family={folder}" for folder in FAMILY_FOLDERS),
         advice=advice_arguments(),
+        watts=SETTINGS.energy.watts,
+        cores=SETTINGS.energy.core_count,
         table=f"{RESULTS}/tables/plan.md",
     message:
         "Adding up the time and size of the chosen datasets"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} {params.families} {params.advice} --output {params.table} > {log} 2>&1"
+        " {params.datasets} {params.families} {params.advice}"
+        " --watts {params.watts} --cores {params.cores} --output {params.table} > {log} 2>&1"

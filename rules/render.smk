@@ -44,7 +44,7 @@ rule render:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     benchmark:
         times_of("{scene}/{rig}/render/{first}-{end}")
-    threads: shard_threads
+    threads: threads_of_shard
     resources:
         mem_mb=shard_memory,
         runtime=shard_minutes,

@@ -43,12 +43,12 @@ def check_disk_space():
     needs = []
     for dataset in datasets.values():
         views = presence.missing_views(dataset)
-        size = views * dataset.estimate.all_view_bytes
+        size = views * view_cost(dataset).disk_bytes
         needs.append(disk_space.Need(Path(RESULTS), size, views))
     batches = [job.wildcards for job in jobs if is_of(job, "build_members")]
     for wildcards in batches:
-        views, size = batch_views(wildcards)
-        needs.append(disk_space.Need(Path(RESULTS), size, views))
+        size = batch_cost(wildcards).disk_bytes
+        needs.append(disk_space.Need(Path(RESULTS), size, batch_views(wildcards)))
     # A built scene takes at most 100 MB.
     for _ in {dataset.scene_name for dataset in datasets.values()}:
         needs.append(disk_space.Need(Path(WORK), 1e8))
@@ -63,8 +63,7 @@ def check_disk_space():
     if renders and RUNS_HERE:
         # Each render job writes a view's passes to memory, or to TMPDIR if memory is too small.
         view_size = max(
-            d.pixels * memory.passes_pixel_bytes(d.estimate.light_group_count)
-            for d in datasets.values()
+            temporary_bytes(d.pixels, light_group_count(d)) for d in datasets.values()
         )
         at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
         size = at_once * view_size

@@ -28,7 +28,7 @@ machine counts. Waiting and idle time do not count.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
 samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
-samples (see `lightfield.planning.sampling`). The uncertainty is the standard error of that mean
+samples (see `lightfield.planning.cost`). The uncertainty is the standard error of that mean
 over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
 a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
 views and pixels. Everything else stays as it was. The first view of each process prepares the scene

@@ -5,8 +5,6 @@ from lightfield.configuration.family import RECORD, outdated_members
 from lightfield.configuration.job_settings import BatchSettings, CountSettings
 from lightfield.core.names import SOFTBOXES
 
-# The CPU seconds of a member beside its views, and those of the checks.
-MEMBER_SECONDS = 0.5
 # The names of the chosen families, by their folders.
 FAMILY_FOLDERS = {family_folder(name, SETTINGS): name for name in FAMILIES}
 
@@ -131,24 +129,14 @@ def missing_members(wildcards):
 
 
 def batch_views(wildcards):
-    """Return how many views the missing members of a batch have, and their bytes."""
+    """Return how many views the missing members of a batch have."""
     datasets = member_datasets(wildcards.family)
-    views = sum(dataset.view_count for dataset in datasets)
-    size = sum(d.view_count * d.estimate.all_view_bytes for d in datasets)
-    members = missing_members(wildcards)
-    return members * views, members * size
+    return missing_members(wildcards) * sum(d.view_count for d in datasets)
 
 
-def batch_seconds(wildcards):
-    """Return the estimated CPU seconds of the missing members of a batch."""
-    seconds = 0.0
-    for dataset in member_datasets(wildcards.family):
-        estimate = dataset.estimate
-        view_seconds = estimate.view_seconds + sum(
-            map(estimate.reprojection_seconds, dataset.reprojections)
-        )
-        seconds += dataset.view_count * view_seconds + estimate.check_seconds
-    return missing_members(wildcards) * (seconds + MEMBER_SECONDS)
+def batch_cost(wildcards):
+    """Return the cost of the missing members of a batch."""
+    return members_cost(member_datasets(wildcards.family), missing_members(wildcards))
 
 
 def family_results():

@@ -13,9 +13,7 @@ def panorama_settings(dataset):
 
 def panorama_memory(wildcards, attempt):
     """Return the memory of the panorama in MB. Each retry requests more."""
-    dataset = dataset_of(wildcards)
-    need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
-    return math.ceil(need / 1e6) * attempt
+    return cost("render_panorama", dataset_of(wildcards)).megabytes(attempt)
 
 
 def measurements(wildcards):

@@ -27,7 +27,7 @@ from sphere import write_views
 
 from lightfield import export
 from lightfield.configuration import blend_lock, scene_yaml
-from lightfield.configuration.config_file import load_config
+from lightfield.configuration.config_file import Energy, load_config
 from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.export import MANIFESTS
@@ -41,6 +41,8 @@ from lightfield.geometry import lenses
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
 from lightfield.measurement import plan
+from lightfield.planning import cost as planning
+from lightfield.planning.cost import cost
 from lightfield.planning.sampling import calibrated
 from lightfield.reprojection import lens_map
 from lightfield.validation import splits_check
@@ -239,7 +241,7 @@ def inventory(_):
 
 def read_scene_inventory(path, dataset):
     external_changed(dataset, None)
-    dataset.estimate.memory_bytes(100)
+    cost("render", dataset)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
         read_inventory(path, key)
@@ -382,7 +384,7 @@ def calibration(_):
 
 def read_calibration(path, dataset):
     calibrated(RenderBlock(target_error=0.01, seed=0), path)
-    dataset.estimate.view_seconds  # noqa: B018
+    cost("render", dataset)
 
 
 def probe(_):
@@ -397,9 +399,9 @@ def probe(_):
 
 
 def read_probe(path, dataset):
-    dataset.estimate.view_seconds  # noqa: B018
+    cost("render", dataset)
     dataset.shards  # noqa: B018
-    plan.table([("a/b", 1, plan.read_probe(path))], {})
+    plan.table([("a/b", 1, planning.read_probe(path))], {}, Energy())
 
 
 def shards(_):

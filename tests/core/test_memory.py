@@ -1,39 +1,17 @@
-"""The memory of rendering: measured, requested, shared between jobs, and refused in time."""
+"""The memory of a machine and of rendering: measured, and refused in time."""
 
 import json
 
 import pytest
-from checkouts import ROOT
 
-from lightfield.configuration.config_file import load_config, read_config
 from lightfield.core import memory as machine
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.planning import memory
-from lightfield.rendering import scene_memory, shard
-from lightfield.workflow.loading import scene_datasets
-
-GB = 10**9
-
-
-@pytest.mark.parametrize(
-    ("cores", "shards", "need", "available", "expected"),
-    [
-        (64, 1000, GB, 256 * GB, 1),
-        (64, 1000, 4 * GB, 64 * GB, 5),
-        (7, 1000, 4 * GB, 18 * GB, 2),
-        (64, 2, GB, 256 * GB, 32),
-        (64, 2, 20 * GB, 25 * GB, 64),
-        (2, 1000, 100 * GB, 25 * GB, 2),
-        (1, 0, GB, 25 * GB, 1),
-    ],
-)
-def test_simultaneous_jobs_fit_into_memory(cores, shards, need, available, expected):
-    threads = memory.threads(cores, shards, need, available)
-    assert threads == expected
-    assert cores // threads * need <= available or threads == cores
+from lightfield.planning.cost import DENOISED_PIXEL_MEMORY
+from lightfield.rendering import scene_memory
+from lightfield.stages.views import RenderShard
 
 
 def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
@@ -76,18 +54,6 @@ def test_the_tightest_of_nested_memory_limits_counts(group, limits, tmp_path, mo
     assert machine.available() == 1_000_000
 
 
-def test_a_job_requests_the_measured_memory_of_the_scene(tmp_path):
-    content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
-    dataset = scene_datasets("garden", settings=load_config(content))[0]
-    pixels = 2048 * 2048 * memory.PIXEL_BYTES
-    assert dataset.estimate.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
-    (tmp_path / "garden").mkdir()
-    (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
-    assert dataset.estimate.view_memory_bytes == 2.4 * GB + pixels
-    # Four pixels for each pixel of a view, up to 4096 × 2048.
-    assert dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
-
-
 def test_a_scene_is_measured_in_a_process_of_its_own(room):
     measured = scene_memory.measure(room, {"left_out": [], "fullest_frame": 1}, {})
     assert 100e6 < measured < 1e9
@@ -96,19 +62,20 @@ def test_a_scene_is_measured_in_a_process_of_its_own(room):
 def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [1000, 1000]})
     rig = {"type": "plane", "cameras": [1, 1]}
-    lightfield = LightField.from_rig(rig, lens, depth="z", frame=1, render={"denoise": True})
+    render = {"denoise": True, "seed": 0}
+    path = tmp_path / "lightfield.json"
+    LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(path)
     inventory = tmp_path / "inventory.json"
     inventory.write_text(json.dumps({"memory_bytes": machine.available(), "left_out": []}))
-    needed = machine.available() + 1000 * 1000 * memory.DENOISED_PIXEL_BYTES
+    needed = machine.available() + 1000 * 1000 * DENOISED_PIXEL_MEMORY
     message = rf"a\.blend: a view of 1000 × 1000 pixels takes {units.size(needed)} of memory"
     with pytest.raises(UserError, match=message):
-        shard.render(
-            lightfield.changed(render={"denoise": True, "seed": 0}),
-            ":",
-            tmp_path / "exr",
+        RenderShard(
             blend=tmp_path / "a.blend",
+            lightfield=path,
             inventory=inventory,
+            output=tmp_path / "exr",
             device="cpu",
             threads=1,
-        )
+        ).run()
     assert not (tmp_path / "exr").exists()

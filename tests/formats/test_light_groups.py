@@ -20,6 +20,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.planning.cost import cost, view_cost
 from lightfield.reprojection.filters import FILTERS
 from lightfield.validation.validate import validate
 from lightfield.workflow.loading import scene_datasets
@@ -384,19 +385,22 @@ def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch)
         for count in (1, 100)
     )
     pixels = 16**2
-    more_memory = many.estimate.view_memory_bytes - few.estimate.view_memory_bytes
+    rendered = [cost("render", dataset, views=1) for dataset in (few, many)]
+    more_memory = rendered[1].memory_bytes - rendered[0].memory_bytes
     # At least Cycles' own buffers and halves.
     assert more_memory > 99 * 12 * pixels
-    assert many.estimate.view_bytes > 10 * few.estimate.view_bytes
-    assert many.estimate.all_view_bytes - many.estimate.view_bytes > 10 * (
-        few.estimate.all_view_bytes - few.estimate.view_bytes
-    )
+    assert rendered[1].disk_bytes > 10 * rendered[0].disk_bytes
+    beside = [
+        view_cost(dataset).disk_bytes - each.disk_bytes
+        for dataset, each in zip((few, many), rendered, strict=True)
+    ]
+    assert beside[1] > 10 * beside[0]
 
 
 def test_a_moving_camera_is_planned_to_take_longer(tmp_path, monkeypatch):
     motion = {"travel": [0.1, 0, 0]}
     still, moving = (
-        write_scene(tmp_path, monkeypatch, **more).estimate.view_seconds
+        view_cost(write_scene(tmp_path, monkeypatch, **more)).seconds
         for more in ({}, {"camera_motion": motion})
     )
     assert 1.05 * still < moving < 1.5 * still
@@ -414,9 +418,11 @@ def test_reprojected_groups_take_time_and_disk_space(tmp_path, monkeypatch):
         for more in ({}, {"passes": ["light_groups"]})
     )
     # Half floats of three channels, of ten groups and the rest.
-    added = with_groups.estimate.all_view_bytes - without.estimate.all_view_bytes
+    added = view_cost(with_groups).disk_bytes - view_cost(without).disk_bytes
     assert 0.5 * 11 * 6 * 16**2 < added <= 11 * 6 * 16**2
-    seconds = [each.estimate.reprojection_seconds("flat") for each in (without, with_groups)]
+    # So many views that the start of the job hardly counts.
+    views = 10**6
+    seconds = [cost("reproject", each, views, "flat").seconds for each in (without, with_groups)]
     assert seconds[1] > 11 * seconds[0]
 
 

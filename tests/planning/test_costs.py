@@ -126,11 +126,6 @@ def dataset(tmp_path, run_program):
     return count
 
 
-def test_the_papers_energy_follows_from_its_days_and_watts():
-    # SILVR, footnote on rendering: around 12 days at 500 W, 144 kWh.
-    assert costs.Power(watts=500, cores=1).kwh(12 * 24 * 3600) == pytest.approx(144)
-
-
 def test_all_time_counts_and_repeated_time_is_reported(dataset):
     costs_content = dataset(*KILLED, *RESUMED)
     (shard,) = costs_content["shards"]

@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned
 
+from lightfield.configuration.config_file import Energy
 from lightfield.configuration.description import Cluster
 from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
+from lightfield.planning.cost import ProbedViews, read_probe
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Probe, ProbeSettings
 from lightfield.workflow import shard_counts
@@ -84,9 +86,8 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
     # Jobs of 1000 cores would need fewer than 100, but 100 run at once.
     assert count(cluster=Cluster(jobs=100, cores=1000)) == 100
     probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
-    write_json(
-        Path(sphere.work, "probe.json"), probe | {"view_seconds": [6.0], "view_bytes": [1e7]}
-    )
+    probe |= {"views": 642, "view_seconds": [6.0], "view_bytes": [1e7]}
+    write_json(Path(sphere.work, "probe.json"), probe)
     # Ten views are the fewest for which the start is a small part.
     assert count(cluster=Cluster(jobs=100, cores=16)) == 65
     assert count(cluster=Cluster(jobs=50, cores=16)) == 64
@@ -122,12 +123,14 @@ def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     assert planned(folder, *arguments)["render"] == 300
 
 
+ENERGY = Energy(watts=100, cores=4)
+
+
 def test_the_table_adds_up_the_probes_measurements():
-    fisheye = {"resolution": [2048, 2048], "samples": 256, "device": "CPU"}
-    fisheye |= {"views": 100, "view_seconds": [30.0, 36.0, 42.0], "view_bytes": [1e7, 1.2e7]}
-    panoramas = fisheye | {"views": 8, "resolution": [4096, 2048], "view_seconds": [90.0]}
+    fisheye = ProbedViews(100, (2048, 2048), 256, "CPU", (30.0, 36.0, 42.0), (1e7, 1.2e7))
+    panoramas = ProbedViews(8, (4096, 2048), 256, "CPU", (90.0,), (1e7, 1.2e7))
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
-    text = plan.table(datasets, {})
+    text = plan.table(datasets, {}, ENERGY)
     # 300 views of 36 ± 12/√12 s take 3 h, and of 11 MB 3.3 GB.
     assert (
         "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h 00 min | — | — | 3.3 GB |"
@@ -140,16 +143,18 @@ def test_the_table_adds_up_the_probes_measurements():
     assert "| all | 308 | | | | 3 h 12 min ± 17 min | — | — | 3.39 GB |" in text
     assert "Times of one processor core" in text
     assert "time = views × s a view" in text.split("| all |")[1]
-    assert "Times of the graphics card." in plan.table(
-        [("a/b", 1, fisheye | {"device": "GPU"})], {}
-    )
+    # A quarter of 100 W for 300 × 36 s and 8 × 90 s.
+    assert "and 0.08 kWh." in text
+    on_card = replace(fisheye, device="GPU")
+    # The whole machine takes 100 W for 100 × 36 s.
+    text = plan.table([("a/b", 1, on_card)], {}, ENERGY)
+    assert "Times of the graphics card, with 0.1 kWh together." in text
 
 
 def test_times_of_a_core_and_of_a_graphics_card_have_no_sum():
-    probe = {"resolution": [64, 64], "samples": 4, "views": 10, "view_bytes": [1e6]}
-    on_core = probe | {"device": "CPU", "view_seconds": [60.0]}
-    on_card = probe | {"device": "GPU", "view_seconds": [0.5]}
-    text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {})
+    on_core = ProbedViews(10, (64, 64), 4, "CPU", (60.0,), (1e6,))
+    on_card = replace(on_core, device="GPU", seconds=(0.5,))
+    text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {}, ENERGY)
     assert "| 60 ± 0 | 10 min |" in text and "| 0.5 ± 0 | 5 s |" in text
     assert "| all | 20 | | | | — | — | — | 20 MB |" in text
     assert "graphics card for a/c, and of one processor core for the others" in text
@@ -178,9 +183,8 @@ def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
         }
         assert plan.cheaper_parts(256, advice | {"unchanged": still}) == (None, None)
     assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
-    probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
-    probe |= {"view_seconds": [3600.0], "view_bytes": [1e9]}
-    text = plan.table([("a/b", 1, probe)], {"a/b": advice})
+    probe = ProbedViews(100, (64, 64), 256, "CPU", (3600.0,), (1e9,))
+    text = plan.table([("a/b", 1, probe)], {"a/b": advice}, ENERGY)
     assert "| 100 h | 51 h | 21 h | 100 GB |" in text
 
 
@@ -235,6 +239,7 @@ def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
         lightfield=path,
         output=output,
     ).run()
-    probe = plan.read_probe(output)
-    assert (probe["view_seconds"], probe["view_bytes"]) == ([8.0], [16.0])
-    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, probe)], {})
+    expected = read_probe(output)
+    assert (expected.seconds, expected.sizes) == ((8.0,), (16.0,))
+    text = plan.table([("a/b", 1, expected)], {}, ENERGY)
+    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in text

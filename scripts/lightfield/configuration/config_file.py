@@ -98,6 +98,11 @@ class Energy(Settings):
         json_schema_extra={"unit": "cores"},
     )
 
+    @property
+    def core_count(self) -> int:
+        """The number of cores. auto means those of this machine."""
+        return os.cpu_count() or 1 if self.cores == "auto" else self.cores
+
 
 _SHARDS_ARE_AUTOMATIC = (
     "leave it out, or set views_per_shard to the number of views that one render job makes"

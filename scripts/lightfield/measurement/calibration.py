@@ -19,6 +19,7 @@ from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.trials import Trials, Window, nearest_view
+from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples
 from lightfield.planning.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,
@@ -26,10 +27,8 @@ from lightfield.planning.sampling import (
     PLAIN_SAMPLES,
     REFERENCE_PART,
     REFERENCE_SAMPLES,
-    cost_in_samples,
     standard_error,
 )
-from lightfield.planning.unit_costs import DENOISING_SAMPLES
 from lightfield.stages.measurement import Calibrate
 
 _PROBE_SEED = 1

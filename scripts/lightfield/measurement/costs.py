@@ -2,7 +2,6 @@
 
 import csv
 import math
-import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -10,15 +9,17 @@ from pathlib import Path
 from statistics import mean
 from typing import Any
 
+from lightfield.configuration.config_file import Energy
 from lightfield.configuration.scene_source import FILE
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
-from lightfield.planning.sampling import cost_in_samples, standard_error
-from lightfield.planning.unit_costs import DENOISING_SAMPLES
+from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples, kwh
+from lightfield.planning.sampling import standard_error
 from lightfield.stages import measurement
 from lightfield.workflow import journal
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
@@ -48,24 +49,6 @@ class Stage:
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
     peak_memory_bytes: int = 0
-
-
-@dataclass(frozen=True)
-class Power:
-    """The wattage of a machine when all its ``cores`` work."""
-
-    watts: float
-    cores: int
-
-    @classmethod
-    def read(cls, settings: Mapping[str, Any]) -> "Power":
-        """Read the key `energy` of config.yaml."""
-        cores = os.cpu_count() or 1 if settings["cores"] == "auto" else settings["cores"]
-        return cls(**{**settings, "cores": cores})
-
-    def kwh(self, machine_seconds: float) -> float:
-        """Return the energy that the whole machine takes in ``machine_seconds``."""
-        return self.watts * machine_seconds / 3.6e6
 
 
 def _shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
@@ -232,7 +215,7 @@ def write(job: measurement.Costs) -> None:
         job.journals,
         job.benchmarks,
         job.scene_benchmarks,
-        Power.read(settings.energy.model_dump()),
+        settings.energy,
         full,
         settings.reprojections,
     )
@@ -251,7 +234,7 @@ def costs(
     journals: Path,
     benchmarks: Path,
     scene_benchmarks: Iterable[Path],
-    power: Power,
+    energy: Energy,
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any]:
@@ -280,12 +263,12 @@ def costs(
         "shards": shards,
         **{name: round(sum(shard[name] for shard in shards), 3) for name in totals},
         "device": device,
-        "cores": power.cores,
-        "watts": power.watts,
-        "energy_kwh": power.kwh(_machine_seconds(stages, runs, power.cores)),
+        "cores": energy.core_count,
+        "watts": energy.watts,
+        "energy_kwh": kwh(_machine_seconds(stages, runs, energy.core_count), energy.watts),
         "attribution": (
-            f"{power.watts:g} W, the whole machine's, times wall time, times the part of its "
-            f"{power.cores} cores that was busy"
+            f"{energy.watts:g} W, the whole machine's, times wall time, times the part of its "
+            f"{energy.core_count} cores that was busy"
             + ("; all of it while a graphics card renders" if any(map(on_card, runs)) else "")
         ),
         "extrapolation": extrapolation(
@@ -293,7 +276,7 @@ def costs(
             stages,
             sizes["render"],
             LightField.read(dataset / NAME),
-            power,
+            energy,
             full,
             reprojections,
         ),
@@ -364,7 +347,7 @@ def extrapolation(
     stages: Mapping[str, Stage],
     view_bytes: int,
     lightfield: LightField,
-    power: Power,
+    energy: Energy,
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
@@ -390,7 +373,7 @@ def extrapolation(
         missing_part = max(0.0, 1 - len(times) / scale.views)
         error = scale.views * standard_error(times) * math.sqrt(missing_part)
     # Beside a graphics card, a core's time is only a part of the machine's.
-    part = 1 if by_processor else 1 / power.cores
+    part = 1 if by_processor else 1 / energy.core_count
     growing_stages = {"validate", FLOW.name, *reprojections}
     each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
         stage.cpu_seconds for name, stage in stages.items() if name in growing_stages
@@ -404,15 +387,17 @@ def extrapolation(
     first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
     once = first_views + part * (start_ups + fixed_stages)
     seconds = scale.views * (mean(times) + each_view * scale.pixels) + once
-    machine = seconds / power.cores if by_processor else seconds
+    machine = seconds / energy.core_count if by_processor else seconds
     return {
         "views": scale.views,
         "resolution": full["resolution"],
         "samples": scale.samples,
         "core_hours": seconds / 3600,
         "core_hours_uncertainty": None if error is None else error / 3600,
-        "energy_kwh": power.kwh(machine),
-        "energy_kwh_uncertainty": (None if error is None else power.kwh(error * machine / seconds)),
+        "energy_kwh": kwh(machine, energy.watts),
+        "energy_kwh_uncertainty": (
+            None if error is None else kwh(error * machine / seconds, energy.watts)
+        ),
         "gigabytes": view_bytes / len(lightfield.views) * scale.views * scale.pixels / 1e9,
         "basis": basis(len(times), lightfield, scale, by_processor),
     }
@@ -434,10 +419,9 @@ def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) 
     lens = lightfield.lens
     render = lightfield.render
     denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render.denoise else ""
-    views = "view" if count == 1 else "views"
     device = "the processor" if by_processor else "a graphics card: hours are the machine's"
     text = (
-        f"path tracing of {count} {views}: {lens.width} × {lens.height} pixels, "
+        f"path tracing of {units.count(count, 'view')}: {lens.width} × {lens.height} pixels, "
         f"{render.samples} samples{denoising}; in proportion to pixels and samples; "
         f"on {device}; all else as measured, the part that every view needs in proportion to "
         "views and pixels"

@@ -3,17 +3,17 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from statistics import fmean
 from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.config_file import Energy
 from lightfield.core import processors, units
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, reading, write_text
+from lightfield.core.files import read_keys, write_text
 from lightfield.measurement import metrics
-from lightfield.planning.sampling import DENOISED, TRACED, standard_error
+from lightfield.planning.cost import Cost, ProbedViews, kwh, read_probe
+from lightfield.planning.sampling import DENOISED, TRACED
 from lightfield.stages.measurement import Plan
 
 COLUMNS = (
@@ -27,9 +27,6 @@ COLUMNS = (
     "calibrated",
     "size",
 )
-
-# The keys of a probe that `read_probe` needs.
-_PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
 
 # The error that the calibrated time is for.
 _TARGET_ERROR = 0.01
@@ -51,49 +48,41 @@ probe
 
 @dataclass(frozen=True)
 class Expected:
-    """The estimate of one dataset. Seconds are those of one core or of the GPU.
+    """The estimate of one dataset of so many frames. Seconds are those of one core or of the GPU.
 
     ``parts`` are those of `cheaper_parts`.
     """
 
     name: str
-    views: int
-    probe: Mapping[str, Any]
+    frames: int
+    probe: ProbedViews
     parts: tuple[float | None, float | None]
 
     @property
-    def view_seconds(self) -> float:
-        """The mean seconds of a view."""
-        return fmean(self.probe["view_seconds"])
+    def views(self) -> int:
+        """The views of all frames."""
+        return self.frames * self.probe.views
 
     @property
-    def view_error(self) -> float:
-        """The standard error of `view_seconds`."""
-        return standard_error(self.probe["view_seconds"])
-
-    @property
-    def seconds(self) -> float:
-        """The seconds of all views."""
-        return self.views * self.view_seconds
+    def cost(self) -> Cost:
+        """The cost of all views."""
+        return self.views * self.probe.view_cost
 
     @property
     def cheaper_seconds(self) -> list[float | None]:
         """The seconds of all views denoised and calibrated. None if unknown."""
-        return [None if part is None else part * self.seconds for part in self.parts]
-
-    @property
-    def bytes(self) -> float:
-        """The bytes of all views."""
-        return self.views * fmean(self.probe["view_bytes"])
+        return [None if part is None else part * self.cost.seconds for part in self.parts]
 
     @property
     def row(self) -> str:
         """The dataset's row of the table."""
-        width, height = self.probe["resolution"]
+        probe = self.probe
+        width, height = probe.resolution
         return (
-            f"| {self.name} | {self.views} | {width} × {height} | {self.probe['samples']} "
-            f"| {self.view_seconds:.3g} ± {self.view_error:.1g} | {units.duration(self.seconds)} "
-            f"| {_times(self.cheaper_seconds)} | {units.size(self.bytes)} |"
+            f"| {self.name} | {self.views} | {width} × {height} | {probe.samples} "
+            f"| {probe.view_cost.seconds:.3g} ± {probe.view_error:.1g} "
+            f"| {units.duration(self.cost.seconds)} | {_times(self.cheaper_seconds)} "
+            f"| {units.size(self.cost.disk_bytes)} |"
         )
 
 
@@ -109,39 +98,21 @@ def write(job: Plan) -> None:
     advice = {
         name: read_keys(path, "error_vs_time.py", "changes")["changes"] for name, path in job.advice
     }
-    text = table(probes, advice)
+    energy = Energy(watts=job.watts, cores=job.cores or "auto")
+    text = table(probes, advice, energy)
     write_text(job.output, text)
     print(text, end="")
 
 
-def read_probe(path: Path | str) -> dict[str, Any]:
-    """Return the result of scripts/probe.py. Raises `UserError` if the file is damaged."""
-    probe = read_keys(path, "probe.py", *_PROBED)
-    with reading(path, "probe"):
-        width, height = probe["resolution"]
-        numbers = [*probe["view_seconds"], *probe["view_bytes"]]
-        counts = [probe["views"], probe["samples"], width, height]
-        if not all(0 <= number < 1e18 for number in [*numbers, *counts]):
-            raise ValueError("a number is below 0, or far too large")
-        if not all(isinstance(count, int) and count < 2**31 for count in counts):
-            raise ValueError("a count is not a whole number")
-        if not (probe["view_seconds"] and probe["view_bytes"]):
-            raise ValueError("no view was measured")
-    return probe
-
-
-def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:
+def table(
+    datasets: Sequence[tuple[str, int, ProbedViews]], advice: Mapping[str, Any], energy: Energy
+) -> str:
     """Return the table of (name, frames, probe), with the sums and the formulas below.
 
     ``advice`` has the results of `lightfield.measurement.advice`, by the datasets' names.
     """
     expected = [
-        Expected(
-            name,
-            probe["views"] * frames,
-            probe,
-            cheaper_parts(probe["samples"], advice.get(name)),
-        )
+        Expected(name, frames, probe, cheaper_parts(probe.samples, advice.get(name)))
         for name, frames, probe in datasets
     ]
     lines = [
@@ -152,7 +123,7 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
         *(dataset.row for dataset in expected),
         _sums_row(expected),
         "",
-        _device_of(expected),
+        _device_of(expected, energy),
         "",
         FORMULAS,
         "Probes are a few small views with all their samples. The seconds to an error follow from",
@@ -170,37 +141,41 @@ def _sums_row(expected: Sequence[Expected]) -> str:
     Times of a core and of a graphics card have no sum.
     """
     views = sum(dataset.views for dataset in expected)
-    size = sum(dataset.bytes for dataset in expected)
+    total = sum((dataset.cost for dataset in expected), Cost())
+    size = units.size(total.disk_bytes)
     if 0 < len(on_card(expected)) < len(expected):
-        return f"| all | {views} | | | | — | {_times([None, None])} | {units.size(size)} |"
-    seconds = sum(dataset.seconds for dataset in expected)
-    error = math.hypot(*(dataset.views * dataset.view_error for dataset in expected))
+        return f"| all | {views} | | | | — | {_times([None, None])} | {size} |"
+    error = math.hypot(*(dataset.views * dataset.probe.view_error for dataset in expected))
     columns = zip(*(dataset.cheaper_seconds for dataset in expected), strict=True)
     cheaper = [None if None in column else sum(column) for column in columns]
     return (
-        f"| all | {views} | | | | {units.duration(seconds)} ± {units.duration(error)} "
-        f"| {_times(cheaper)} | {units.size(size)} |"
+        f"| all | {views} | | | | {units.duration(total.seconds)} ± {units.duration(error)} "
+        f"| {_times(cheaper)} | {size} |"
     )
 
 
 def on_card(expected: Sequence[Expected]) -> list[str]:
     """Return the names of the datasets whose probes a graphics card rendered."""
-    return [dataset.name for dataset in expected if dataset.probe["device"] != "CPU"]
+    return [dataset.name for dataset in expected if dataset.probe.device != "CPU"]
 
 
-def _device_of(expected: Sequence[Expected]) -> str:
-    """Return the device of the times, and how long this machine's cores take."""
+def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
+    """Return the device of the times, how long this machine takes, and its energy."""
     names = on_card(expected)
-    if len(names) == len(expected):
-        return "Times of the graphics card."
-    if names:
+    if 0 < len(names) < len(expected):
         return (
             f"Times of the graphics card for {', '.join(names)}, and of one processor core for "
             "the others. They have no sum."
         )
+    seconds = sum(dataset.cost.seconds for dataset in expected)
+    if names:
+        return f"Times of the graphics card, with {kwh(seconds, energy.watts):.3g} kWh together."
     cores = processors.available()
-    seconds = sum(dataset.seconds for dataset in expected) / cores
-    return f"Times of one processor core; this machine's {cores} take {units.duration(seconds)}."
+    used = kwh(seconds / energy.core_count, energy.watts)
+    return (
+        f"Times of one processor core; this machine's {cores} take "
+        f"{units.duration(seconds / cores)} and {used:.3g} kWh."
+    )
 
 
 def cheaper_parts(

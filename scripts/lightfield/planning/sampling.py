@@ -1,4 +1,4 @@
-"""Constants and functions for the sampling of a ``render`` block, and the cost of samples."""
+"""Constants and functions for the sampling of a ``render`` block."""
 
 import math
 import statistics
@@ -7,7 +7,6 @@ from pathlib import Path
 
 from lightfield.core.files import read_keys, reading
 from lightfield.formats.render_block import RenderBlock
-from lightfield.planning.unit_costs import DENOISING_SAMPLES
 
 # A calibration renders this many windows of views, and as many held-out ones.
 PROBES = 16
@@ -29,11 +28,6 @@ TRACED = "path tracing"
 DENOISED = "denoised"
 
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
-
-
-def cost_in_samples(samples: float, denoise: bool) -> float:
-    """Return the cost of a pixel in samples: ``samples``, and denoising if ``denoise``."""
-    return samples + DENOISING_SAMPLES * denoise
 
 
 def calibrated(render: RenderBlock, path: Path) -> RenderBlock:

@@ -36,7 +36,7 @@ from lightfield.geometry import depth
 from lightfield.geometry.flow import shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.planning import memory
+from lightfield.planning.cost import rendering_memory
 from lightfield.stages.views import RenderShard
 from lightfield.workflow.journal import Journal, is_suspect
 from lightfield.workflow.records import ShardRecord
@@ -144,7 +144,7 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     denoise = lightfield.render.denoise
     scene = inventory.get("memory_bytes", 0)
     groups = len(lightfield.light_groups)
-    needed = memory.needed(scene, lens.width * lens.height, denoise, groups)
+    needed = rendering_memory(scene, lens.width * lens.height, denoise, groups)
     if needed > available():
         raise UserError(
             f"{blend}: a view of {lens.width} × {lens.height} pixels takes {units.size(needed)} "

@@ -13,7 +13,7 @@ from lightfield.core import disk_space, units
 from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, UserError
 from lightfield.core.leftovers import temporary_folder
 from lightfield.imaging import images
-from lightfield.planning.memory import passes_pixel_bytes
+from lightfield.planning.cost import temporary_bytes
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.moving_camera import place_camera
 from lightfield.rendering.quiet import quiet
@@ -49,7 +49,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         name: [f"{layer}.{name}.{channel}" for channel in channels]
         for name, channels in passes.items()
     }
-    size = scene.render.resolution_x * scene.render.resolution_y * passes_pixel_bytes(groups)
+    size = temporary_bytes(scene.render.resolution_x * scene.render.resolution_y, groups)
     with temporary_folder(disk_space.fast_folder(size)) as folder:
         scene.render.filepath = str(folder / "view.exr")
         try:

@@ -106,6 +106,8 @@ class Plan(PlainStage):
         metavar=("NAME", "JSON"),
     )
     family: list[str] = option("name of a family of scenes", [], metavar="NAME")
+    watts: float = option("power of the machine when all its cores work", 65.0)
+    cores: AtLeastOne | None = option("number of cores of that machine", None)
     output: Path = writes("Markdown file to write")
 
 

@@ -1,4 +1,4 @@
-"""A dataset, as rules and programs use it: description, files, shards and estimates."""
+"""A dataset, as rules and programs use it: description, files and shards."""
 
 import math
 from dataclasses import dataclass
@@ -7,18 +7,13 @@ from itertools import pairwise
 
 from lightfield.configuration.dataset_paths import DatasetPaths
 from lightfield.formats import passes
-from lightfield.planning.estimate import Estimate
+from lightfield.planning.cost import shard_count
 from lightfield.workflow import shard_counts
 
 
 @dataclass(frozen=True)
 class Dataset(DatasetPaths):
     """One scene seen by one rig, made shard by shard."""
-
-    @cached_property
-    def estimate(self) -> Estimate:
-        """The estimated time, memory and disk space of the dataset."""
-        return Estimate(self)
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
@@ -28,7 +23,7 @@ class Dataset(DatasetPaths):
         """
         if self.views_per_shard == "auto":
             count = shard_counts.noted(self.work_root, self.name, self.view_count)
-            count = count or self.estimate.shard_count
+            count = count or shard_count(self)
         else:
             count = math.ceil(self.view_count / self.views_per_shard)
         bounds = [self.view_count * number // count for number in range(count + 1)]

@@ -1,0 +1,494 @@
+"""What a job costs before it runs: seconds of one core, memory and disk space.
+
+`cost` answers for each stage of a dataset, in the units that this module's table lists. A probe, a
+calibration and an inventory replace guesses as soon as they exist.
+
+Every job reads this module with the rules, so it must import nothing that takes long.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
+from lightfield.core.errors import UserError
+from lightfield.core.files import DAMAGE, read_keys, reading
+from lightfield.formats import light_groups, passes
+from lightfield.planning import sampling
+
+if TYPE_CHECKING:
+    from lightfield.configuration.dataset_paths import DatasetPaths
+
+# What was measured. Seconds are those of one core of a 2-core x86-64 machine, most of them in the
+# garden, and bytes are bpy 5.0's. Reading and reprojection: benchmarks/reprojection.py with batches
+# of 16 views of 2048². Sensors: an image of 512², while the machine also did other work. Denoising:
+# views of the garden of 256² and more on an EPYC, 18 µs against 6. In small windows it costs up to
+# twice as much. A moving camera and compression: the three scenes. A calibration: the courtyard.
+
+# Seconds for a pixel.
+SAMPLE_SECONDS = 6e-6  # one sample of path tracing
+READ_SECONDS = 4e-8  # reading an EXR with depth
+REPROJECTION_SECONDS = 1.5e-7  # computing a pixel of a reprojected view
+SENSOR_SECONDS = 4e-7  # a sensor's noise and response
+BRACKET_SECONDS = 7e-7  # the same with the weights of a bracket
+CHECK_SECONDS = 1e-7  # the validation, and each export
+REPORT_SECONDS = 4e-7  # the figures, and the page
+# Seconds for a process.
+START_UP_SECONDS = 3.0  # bpy, the scene, and Cycles' acceleration structures
+JOB_SECONDS = 1.0  # a job without Blender
+_MEMBER_SECONDS = 0.5  # a member of a family, beside its views and checks
+_WINDOW_SECONDS = 0.07  # a window's render of a calibration, beside its samples
+# Relative to other units.
+DENOISING_SAMPLES = 3  # samples of a pixel that take as long as denoising it
+_CAMERA_MOTION_PART = 0.2  # of a view's time: 0.09 to 0.26 with 4 and 16 samples of 64²
+_SEARCH_RENDERS = 9  # renders of each window in a calibration's search
+_SEARCH_PART = 2.5  # samples of these renders together, relative to those that the target needs
+# Bytes on the disk for a pixel, before compression but for PNGs.
+COMPRESSED = 0.75  # an EXR's size, relative to its size without compression
+_DEPTH_BYTES = {"float": 4, "rounded": 3, "half": 2}
+_PNG_BYTES = 2  # 8 bits
+_NOISY_BYTES = 3  # 8 bits with noise, which a PNG cannot compress
+_WEIGHT_BYTES = 12  # the weights of a bracket
+# Bytes of memory for a pixel of a view that is rendered. They were 255 between 64² and 1024².
+PIXEL_MEMORY = 300
+DENOISED_PIXEL_MEMORY = 1000  # with OpenImageDenoise, which took 910
+_GROUP_PIXEL_MEMORY = 70  # more for each light group: 36 of Cycles and its file, 30 of arrays
+_PASSES_PIXEL_BYTES = 200  # a temporary file with all passes in 32-bit floats, and a reserve
+_GROUP_PASS_PIXEL_BYTES = 12  # more of it for each light group
+
+# What is guessed until it is known.
+UNKNOWN_SCENE = 6_000_000_000  # bytes of memory of a scene without an inventory
+_GUESSED_SAMPLES = 256  # a pixel's, with a target error or the .blend's own samples
+_GUESSED_LIGHT_GROUPS = 16
+# A scene is expected to take this much more memory than its inventory measured.
+_SCENE_RESERVE = 1.2
+
+# The page and the figures show at most so many views.
+_MOST_SHOWN_VIEWS = 120
+
+# Start-up takes at most this part of a shard's time.
+_START_UP_PART = 0.05
+# More jobs would lengthen the plan, but not render faster. A cluster may get more.
+_USUAL_SHARDS = 64
+# On a cluster each job is expected to take at most so long.
+_CLUSTER_JOB_MINUTES = 20
+# Planning more shards than this takes too long.
+_MOST_SHARDS = 10_000
+
+
+@dataclass(frozen=True)
+class Cost:
+    """The cost of work: seconds of one core, the memory of its largest process, and disk space."""
+
+    seconds: float = 0.0
+    memory_bytes: int = 0
+    disk_bytes: float = 0.0
+
+    def __add__(self, other: Cost) -> Cost:
+        """Return the cost of both, one after the other."""
+        return Cost(
+            self.seconds + other.seconds,
+            max(self.memory_bytes, other.memory_bytes),
+            self.disk_bytes + other.disk_bytes,
+        )
+
+    def __rmul__(self, count: int) -> Cost:
+        """Return the cost of doing it ``count`` times, one after the other."""
+        return Cost(count * self.seconds, self.memory_bytes, count * self.disk_bytes)
+
+    def megabytes(self, attempt: int = 1) -> int:
+        """Return the memory that a job requests. Each further attempt requests more."""
+        return math.ceil(self.memory_bytes / 1e6) * attempt
+
+    @property
+    def most_minutes(self) -> int:
+        """A job's time limit: several times its estimate, and at least half an hour."""
+        return 30 + math.ceil(5 * self.seconds / 60)
+
+    @property
+    def stall_seconds(self) -> int:
+        """Seconds after which the work counts as hung: ten times its estimate, and more."""
+        return 1800 + math.ceil(10 * self.seconds)
+
+
+_JOB = Cost(JOB_SECONDS)
+_BLENDER = Cost(START_UP_SECONDS)
+
+
+def cost(
+    stage: str,
+    dataset: DatasetPaths | None = None,
+    views: int | None = None,
+    reprojection: str = "",
+) -> Cost:
+    """Return the cost of a job.
+
+    ``stage`` is the name of its rule. The job makes this many ``views`` of the dataset, by default
+    all of them. A job that reprojects has the name of a ``reprojection``.
+    """
+    if stage in _BLENDER_STAGES:
+        return _BLENDER
+    if dataset is None or stage not in _STAGES:
+        return _JOB
+    return _STAGES[stage](dataset, dataset.view_count if views is None else views, reprojection)
+
+
+def view_cost(dataset: DatasetPaths) -> Cost:
+    """Return the cost of a rendered view, its flow and reprojections, without starts of jobs."""
+    reprojected = (_reprojected_view(dataset, name) for name in dataset.reprojections)
+    return sum(reprojected, _rendered_view(dataset) + _flow_of_view(dataset))
+
+
+def members_cost(datasets: Iterable[DatasetPaths], members: int) -> Cost:
+    """Return the cost of a job that builds members of a family, each with these ``datasets``."""
+    member = Cost(_MEMBER_SECONDS)
+    for dataset in datasets:
+        member += dataset.view_count * view_cost(dataset) + _checks(dataset)
+    return _BLENDER + members * member
+
+
+def cost_in_samples(samples: float, denoise: bool) -> float:
+    """Return the cost of a pixel in samples: ``samples``, and denoising if ``denoise``."""
+    return samples + DENOISING_SAMPLES * denoise
+
+
+def kwh(machine_seconds: float, watts: float) -> float:
+    """Return the energy of a machine that works for a time, and takes ``watts``."""
+    return watts * machine_seconds / 3.6e6
+
+
+def rendering_memory(scene: int, pixels: int, denoise: bool, groups: int = 0) -> int:
+    """Return the bytes of a process that renders views of this many pixels.
+
+    ``scene`` is the inventory's ``memory_bytes``: the memory for a view of very few pixels. The
+    views have this many light ``groups``.
+    """
+    pixel_bytes = DENOISED_PIXEL_MEMORY if denoise else PIXEL_MEMORY
+    return scene + pixels * (pixel_bytes + groups * _GROUP_PIXEL_MEMORY)
+
+
+def temporary_bytes(pixels: int, groups: int) -> int:
+    """Return the bytes of a view's temporary file with all passes and light groups."""
+    return pixels * (_PASSES_PIXEL_BYTES + groups * _GROUP_PASS_PIXEL_BYTES)
+
+
+def light_group_count(dataset: DatasetPaths) -> int:
+    """Return the number of light groups, by the scene YAML or the inventory, or as a guess."""
+    setting = dataset.render.light_groups
+    if setting is None:
+        return 0
+    names = light_groups.names_in(setting)
+    if names is not None:
+        return len(names) + 1
+    try:
+        return len(_content(dataset.inventory)["emitters"])
+    except (OSError, *DAMAGE):
+        return _GUESSED_LIGHT_GROUPS
+
+
+# Shards.
+
+
+def shard_count(dataset: DatasetPaths) -> int:
+    """Return how many shards a dataset gets before the first is rendered.
+
+    Shards are as short as possible, so that many processes can work at once. But start-up must stay
+    a small part of a shard's time. The count must depend only on the configuration and the probe.
+    """
+    view_count = dataset.view_count
+    probe = _probe_of(dataset)
+    seconds = probe.view_cost.seconds if probe else _planned_view_seconds(dataset)
+    shortest = math.ceil(START_UP_SECONDS / _START_UP_PART / max(seconds, 1e-6))
+    most = _USUAL_SHARDS
+    if dataset.cluster:
+        job_seconds = 60 * _CLUSTER_JOB_MINUTES * dataset.cluster.cores
+        short_jobs = math.ceil(view_count * seconds / job_seconds)
+        most = min(max(most, dataset.cluster.jobs, short_jobs), _MOST_SHARDS)
+    return min(math.ceil(view_count / shortest), most)
+
+
+def shard_threads(cores: int, shards: int, need: int, available: int) -> int:
+    """Return how many cores each of this many ``shards`` takes. Each needs ``need`` bytes.
+
+    A shard takes more than one core in two cases. There are fewer shards than cores, or a shard for
+    each core would not fit into the ``available`` memory. A tenth is left to other programs.
+    """
+    shards_that_fit = max(1, int(0.9 * available) // need)
+    return max(1, cores // max(1, shards), math.ceil(cores / shards_that_fit))
+
+
+def _planned_view_seconds(dataset: DatasetPaths) -> float:
+    """Return the seconds for a view without a probe, a calibration, and denoising."""
+    if dataset.imported:
+        reprojected = [_reprojected_view(dataset, name) for name in dataset.reprojections]
+        return _imported_view(dataset).seconds + sum(each.seconds for each in reprojected)
+    return dataset.pixels * _planned_samples(dataset) * _sample_seconds(dataset)
+
+
+# Probes.
+
+
+@dataclass(frozen=True)
+class ProbedViews:
+    """What scripts/probe.py measured: seconds of one core or of the GPU, and bytes, of some views.
+
+    ``views``, ``resolution`` and ``samples`` are the dataset's.
+    """
+
+    views: int
+    resolution: tuple[int, int]
+    samples: int
+    device: str
+    seconds: tuple[float, ...]
+    sizes: tuple[float, ...]
+
+    @property
+    def view_cost(self) -> Cost:
+        """The mean cost of a view."""
+        return Cost(fmean(self.seconds), disk_bytes=fmean(self.sizes))
+
+    @property
+    def view_error(self) -> float:
+        """The standard error of the mean seconds of a view."""
+        return sampling.standard_error(self.seconds)
+
+
+def read_probe(path: Path | str) -> ProbedViews:
+    """Return the result of scripts/probe.py. Raises `UserError` if the file is damaged."""
+    keys = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
+    content = read_keys(path, "probe.py", *keys)
+    with reading(path, "probe"):
+        views, (width, height), samples, device, seconds, sizes = (content[key] for key in keys)
+        if not all(0 < number < 1e12 for number in [*seconds, *sizes]):
+            raise ValueError("a number is not above 0, or far too large")
+        if not all(isinstance(n, int) and 0 <= n < 2**31 for n in (views, samples, width, height)):
+            raise ValueError("a count is not a whole number")
+        if not (seconds and sizes):
+            raise ValueError("no view was measured")
+        return ProbedViews(views, (width, height), samples, device, tuple(seconds), tuple(sizes))
+
+
+def _probe_of(dataset: DatasetPaths) -> ProbedViews | None:
+    """Return the probe of a dataset's settings on the processor. None without a valid one.
+
+    The probe of a sequence's first frame counts for all frames.
+    """
+    frames = [*dataset.rig.sequence.folders][:1] if dataset.rig.sequence else []
+    path = Path(dataset.work_root, dataset.scene_folder, dataset.rig_name, *frames, "probe.json")
+    try:
+        probe = _known_probe(path, path.stat().st_mtime_ns)
+    except (OSError, UserError):
+        return None
+    samples = dataset.render.samples or probe.samples
+    planned = (*dataset.rig.camera.resolution, samples, "CPU")
+    return probe if (*probe.resolution, probe.samples, probe.device) == planned else None
+
+
+@lru_cache
+def _known_probe(path: Path, _changed: int) -> ProbedViews:
+    return read_probe(path)
+
+
+# The views of a dataset, one at a time.
+
+
+def _rendered_view(dataset: DatasetPaths) -> Cost:
+    """Return the cost of a rendered view with its passes, by a probe or as a guess."""
+    memory = Cost(memory_bytes=_memory(dataset, dataset.pixels))
+    if probe := _probe_of(dataset):
+        return probe.view_cost + memory
+    seconds = dataset.pixels * _cost_samples(dataset) * _sample_seconds(dataset)
+    render = dataset.render
+    pixel_bytes = 6 * (1 + light_group_count(dataset))
+    pixel_bytes += sum(each.bytes for each in render.selected_passes if not passes.is_group(each))
+    if dataset.depth:
+        pixel_bytes += _DEPTH_BYTES[render.depth_precision]
+    return Cost(seconds, disk_bytes=dataset.pixels * pixel_bytes * COMPRESSED) + memory
+
+
+def _imported_view(dataset: DatasetPaths) -> Cost:
+    return Cost(dataset.pixels * READ_SECONDS)
+
+
+def _flow_of_view(dataset: DatasetPaths) -> Cost:
+    size = passes.FLOW.bytes * COMPRESSED * dataset.pixels if dataset.flow else 0.0
+    return Cost(disk_bytes=size)
+
+
+def _reprojected_view(dataset: DatasetPaths, name: str) -> Cost:
+    """Return the cost to read a view, to reproject it, and to develop it."""
+    reprojection = dataset.reprojections[name]
+    all_groups = light_group_count(dataset)
+    made_pixels = _reprojected_pixels(dataset, name)
+    if reprojection.relight == light_groups.EACH:
+        made_pixels *= all_groups
+    read_pixels = dataset.pixels
+    if reprojection.relight is not None:
+        read_pixels *= 1 + all_groups
+    pass_names = reprojection.passes
+    groups = all_groups if LIGHT_GROUPS in pass_names else 0
+    others = [passes.by_name(each) for each in pass_names if each != LIGHT_GROUPS]
+    # Light groups are resampled twice: once to add them up.
+    resampled_passes = 2 * groups + len(others)
+    read_pixels += dataset.pixels * resampled_passes
+    pixel_seconds = REPROJECTION_SECONDS * (1 + resampled_passes)
+    if sensor := reprojection.sensor:
+        pixel_seconds += SENSOR_SECONDS if sensor.bracket is None else BRACKET_SECONDS
+    pass_bytes = COMPRESSED * (6 * groups + sum(each.bytes for each in others))
+    pixel_bytes = _developed_bytes(reprojection) + pass_bytes
+    return Cost(
+        read_pixels * READ_SECONDS + made_pixels * pixel_seconds,
+        disk_bytes=made_pixels * pixel_bytes,
+    )
+
+
+def _developed_bytes(reprojection: Reprojection) -> float:
+    """Return the bytes of a pixel of a reprojection, without its passes."""
+    if reprojection.has_depth:
+        return 10 * COMPRESSED
+    sensor = reprojection.sensor
+    if sensor is None:
+        return _PNG_BYTES * reprojection.bits / 8
+    weights = 0.0 if sensor.bracket is None else _WEIGHT_BYTES * COMPRESSED
+    return _NOISY_BYTES * reprojection.bits / 8 + weights
+
+
+def _memory(dataset: DatasetPaths, pixels: int) -> int:
+    """Return the memory of a process that renders views of this many pixels."""
+    try:
+        scene = int(_SCENE_RESERVE * _content(dataset.inventory)["memory_bytes"])
+    except (OSError, *DAMAGE):
+        scene = UNKNOWN_SCENE
+    # Before the calibration, assume that it will choose to denoise.
+    denoise = dataset.render.given_denoise is not False
+    return rendering_memory(scene, pixels, denoise, light_group_count(dataset))
+
+
+def _sample_seconds(dataset: DatasetPaths) -> float:
+    """Return the seconds for a sample of a pixel."""
+    is_moving = dataset.render.camera_motion is not None
+    return SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1)
+
+
+def _planned_samples(dataset: DatasetPaths) -> int:
+    """Return a pixel's samples. With a target error, or the .blend's own, it is a fixed guess."""
+    render = dataset.render
+    if isinstance(render.samples, int):
+        return render.samples
+    return min(render.most_samples or _GUESSED_SAMPLES, _GUESSED_SAMPLES)
+
+
+def _cost_samples(dataset: DatasetPaths) -> float:
+    """Return a pixel's cost in samples, with denoising, by the calibration if it has run."""
+    try:
+        return float(_content(dataset.calibration)["cost_samples"])
+    except (OSError, *DAMAGE):
+        # There is no calibration, or it is broken, so that it will be made again.
+        return cost_in_samples(_planned_samples(dataset), dataset.render.denoise)
+
+
+def _reprojected_pixels(dataset: DatasetPaths, name: str) -> int:
+    """Return the pixels of a view's reprojection. A cube map has six images."""
+    camera = dataset.reprojections[name].camera or dataset.rig.camera
+    return math.prod(camera.resolution) * len(dataset.lens_maps(name))
+
+
+def _all_pixels(dataset: DatasetPaths) -> int:
+    """Return the pixels of a view and its reprojections."""
+    return dataset.pixels + sum(
+        _reprojected_pixels(dataset, name) for name in dataset.reprojections
+    )
+
+
+def _content(path: str | list[str]) -> Any:
+    """Return the content of a JSON file. Raises OSError if the dataset has no such file."""
+    if not isinstance(path, str):
+        raise FileNotFoundError
+    return _known_content(path, Path(path).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _known_content(path: str, _changed: int) -> Any:
+    """Return the content of a JSON file. A change of its time makes the cache read it again."""
+    return json.loads(Path(path).read_bytes())
+
+
+# The other stages of a dataset.
+
+
+def _checks(dataset: DatasetPaths) -> Cost:
+    """Return the cost to validate or export all views and reprojections."""
+    return Cost(dataset.view_count * _all_pixels(dataset) * CHECK_SECONDS)
+
+
+def _pictures(dataset: DatasetPaths) -> Cost:
+    """Return the cost to draw the figures, or to write the page."""
+    shown_views = min(dataset.view_count, _MOST_SHOWN_VIEWS)
+    return Cost(shown_views * _all_pixels(dataset) * REPORT_SECONDS)
+
+
+def _panorama(dataset: DatasetPaths) -> Cost:
+    """Return the cost of the panorama, which is twice as wide as high."""
+    pixels = dataset.panorama_width**2 // 2
+    seconds = _rendered_view(dataset).seconds * pixels / dataset.pixels
+    return Cost(seconds, _memory(dataset, pixels))
+
+
+def _calibration(dataset: DatasetPaths) -> Cost:
+    """Return the cost of the calibration of a scene, whose first rig's dataset this is.
+
+    The estimate takes the error of N samples a pixel as 1 / N. It is 0.4 / N in the courtyard,
+    1.4 / N in the barbershop, and 2.6 / N in the garden.
+    """
+    target = dataset.render.target_error
+    if target is None:
+        return Cost()
+    needed = 1 / target
+    seeds = sampling.FEWEST_SEEDS
+    reference_samples = sampling.REFERENCE_SAMPLES
+    while (
+        seeds < sampling.MOST_SEEDS and seeds * reference_samples * sampling.REFERENCE_PART < needed
+    ):
+        seeds *= 2
+    # Windows and held-out windows have references. Plain path tracing and the search add samples.
+    searched = min(needed, dataset.render.most_samples or needed)
+    samples = 2 * seeds * reference_samples + sum(sampling.PLAIN_SAMPLES) + _SEARCH_PART * searched
+    renders = 2 * seeds + _SEARCH_RENDERS
+    pixels = min(*dataset.rig.camera.resolution, sampling.WINDOW_SIZE) ** 2
+    window = renders * _WINDOW_SECONDS + pixels * samples * SAMPLE_SECONDS
+    return _BLENDER + sampling.PROBES * Cost(window)
+
+
+# Rules that start Blender, beside those that render.
+_BLENDER_STAGES = (
+    "build_scene",
+    "check_blend",
+    "check_cameras",
+    "free_places",
+    "import_model",
+    "inventory",
+    "mesh",
+    "probe_cameras",
+)
+# The cost of a job, from its dataset, its number of views, and the name of its reprojection.
+_STAGES: dict[str, Callable[[DatasetPaths, int, str], Cost]] = {
+    "calibrate": lambda dataset, views, name: _calibration(dataset),
+    "render": lambda dataset, views, name: _BLENDER + views * _rendered_view(dataset),
+    "import_views": lambda dataset, views, name: _JOB + views * _imported_view(dataset),
+    "flow": lambda dataset, views, name: _JOB + views * _flow_of_view(dataset),
+    "reproject": lambda dataset, views, name: _JOB + views * _reprojected_view(dataset, name),
+    "export": lambda dataset, views, name: _JOB + _checks(dataset),
+    "export_to_instant_ngp": lambda dataset, views, name: _JOB + _checks(dataset),
+    "validate": lambda dataset, views, name: _JOB + _checks(dataset),
+    "render_panorama": lambda dataset, views, name: _BLENDER + _panorama(dataset),
+    "figures": lambda dataset, views, name: _JOB + _pictures(dataset),
+    "page": lambda dataset, views, name: _JOB + _pictures(dataset),
+}
+STAGES = (*_BLENDER_STAGES, *_STAGES)
