@@ -45,7 +45,7 @@ from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
 from lightfield.stages import exports as export_stages
-from lightfield.stages import measurement
+from lightfield.stages import measurement, publishing
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
 from lightfield.stages.registry import BY_NAME
@@ -248,7 +248,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
             Section("validate.py", job_settings.ValidationSettings),
             Section("validate_sequence.py", job_settings.SequenceValidationSettings),
-            Section("package.py and publish.py", job_settings.PackSettings),
+            Section("package.py and publish.py", publishing.PackSettings),
             Section("package.py and publish.py: scene", scene_yaml.Credits),
             Section("report_figures.py", job_settings.FiguresSettings),
             Section("report_html.py", job_settings.PageSettings),

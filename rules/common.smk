@@ -49,13 +49,13 @@ from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.configuration.job_settings import (
     FiguresSettings,
     Measurement,
-    PackSettings,
     PageSettings,
     SequenceValidationSettings,
     ValidationSettings,
 )
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import SynthesisSettings
+from lightfield.stages.publishing import PackSettings
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.loading import (

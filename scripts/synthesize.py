@@ -13,47 +13,8 @@ Examples:
   synthesize.py results/garden/LFSphere_e100cm_d170cm --poses rig.yaml --video --output work/walk
 """
 
-import argparse
-from pathlib import Path
-
-from lightfield.core.cli import positive, run, stops
-from lightfield.synthesis.defaults import BEST
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    add = parser.add_argument
-    add("dataset", type=Path, help="folder of a dataset with depth")
-    add(
-        "--reprojection",
-        default="",
-        help="name of an EXR reprojection to use (default: the views as rendered)",
-    )
-    add(
-        "--poses",
-        type=Path,
-        help="cameras to synthesise: a lightfield.json, or a YAML with a rig and its camera "
-        "(default: the test views of the dataset's split, from its other views)",
-    )
-    help_text = f"views a picture is made of (default: {BEST})"
-    add("--best", type=positive, default=BEST, metavar="K", help=help_text)
-    add(
-        "--exposure",
-        type=stops,
-        help="exposure of the PNGs, in stops (default: chosen from the first picture)",
-    )
-    add("--video", action="store_true", help="also write the video walk.mp4, with ffmpeg")
-    add("--rate", type=positive, default=25, help="pictures per second of the video (default: 25)")
-    add("--output", type=Path, required=True, metavar="FOLDER", help="folder to write")
-    arguments = parser.parse_args()
-
-    # Only now, so that --help need not wait for it.
-    from lightfield.synthesis import job
-
-    job.run(arguments)
-
+from lightfield.core.flags import program
+from lightfield.stages.synthesis import Synthesize
 
 if __name__ == "__main__":
-    run(main)
+    program(Synthesize, __doc__)

@@ -527,7 +527,7 @@ def test_a_page_has_these_tables(measured):
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        (["--best", "0"], "--best: is 0; must be 1 or more"),
+        (["--best", "0"], "--best: is 0; must be a whole number at least 1"),
         (["--poses", "rig.yaml"], "camera: is missing"),
         (["--poses", "none.json"], "none.json"),
     ],

@@ -198,7 +198,12 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
 
 
 # The flags without which a stage does not look at the others.
-REQUIRED = {"export_instant_ngp.py": ["--input-cfg", "a", "--output", "b"]}
+REQUIRED = {
+    "export_instant_ngp.py": ["--input-cfg", "a", "--output", "b"],
+    "reproject.py": ["--output-dir", "a"],
+    "package.py": [*PACK, "--scene", "smoke"],
+    "publish.py": [*PUBLISH, "--scene", "smoke"],
+}
 
 
 @pytest.mark.parametrize(

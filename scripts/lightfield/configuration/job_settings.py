@@ -5,15 +5,13 @@ file with --settings. The settings of light fields are in `lightfield.configurat
 Reprojections and exports have modules of their own.
 """
 
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.family import Draw, Member
-from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.core.settings import Settings, read_settings
+from lightfield.core.settings import Settings
 from lightfield.geometry.rigs import AnyRig, as_written
 
 
@@ -81,38 +79,6 @@ class SequenceValidationSettings(Settings):
         description="Paths of the export.json of each export that the sequence must have. Without "
         "this key, any exports are allowed.",
     )
-
-
-class PackSettings(Settings):
-    """The settings of scripts/package.py and scripts/publish.py."""
-
-    datasets: list[str] = Field(
-        [],
-        description="Names of the datasets in the folder. If they change, the folder is packed "
-        "again.",
-    )
-    gigabytes: float | None = Field(
-        None,
-        gt=0,
-        description="Largest size of a package's part, or of a shard. Without this key, a package "
-        "is one file, and shards have at most 1 GB.",
-        json_schema_extra={"unit": "GB"},
-    )
-    scene: Credits = Field(
-        Credits(), description="What the card says about the scene, and what publishing needs."
-    )
-
-    @classmethod
-    def given(cls, path: Path | None, scene_name: str, gigabytes: float | None) -> Self:
-        """Return the settings of the file ``path``. Without one, those that the flags give."""
-        if path:
-            return read_settings(cls, path)
-        return cls.of(scene=load_scene(scene_name), gigabytes=gigabytes)
-
-    @property
-    def most_bytes(self) -> float | None:
-        """The largest size of a part, or of a shard, in bytes. None without ``gigabytes``."""
-        return self.gigabytes and self.gigabytes * 1e9
 
 
 class BatchSettings(Settings):

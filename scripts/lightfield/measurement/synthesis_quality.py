@@ -29,7 +29,7 @@ from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics, summaries
 from lightfield.measurement.summaries import PLACES, WHOLE
 from lightfield.stages.measurement import SynthesisQuality, SynthesisSettings
-from lightfield.synthesis.defaults import BEST
+from lightfield.stages.synthesis import BEST
 from lightfield.synthesis.view import Sources, reader
 
 # True views, and the dataset that has them.

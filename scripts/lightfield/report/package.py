@@ -16,10 +16,11 @@ import jinja2
 
 from lightfield.configuration.exports import MANIFEST
 from lightfield.configuration.scene_yaml import Credits
+from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_keys, sha256
+from lightfield.core.files import atomic_path, read_keys, sha256, write_json
 from lightfield.core.names import SEQUENCE_EXPORTS
-from lightfield.core.paths import files_below
+from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.export import transforms
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT
@@ -27,6 +28,8 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
+from lightfield.stages.publishing import Package
+from lightfield.workflow.view_store import ViewStore
 
 SILVR = (
     "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "
@@ -59,6 +62,25 @@ LOADERS = {
     "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')",
     "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
 }
+
+
+def write(job: Package) -> None:
+    """Pack the folder of a rig, and write a JSON with its card and its parts beside the archive."""
+    if job.output.suffix != ".tar":
+        raise UserError(f"--output {job.output}: must end in .tar; .json lies beside it")
+    if place_in(job.folder, job.output):
+        raise UserError(f"--output {job.output}: must not be in what it packs")
+    content = card(job.folder, job.output.stem, job.settings.scene)
+    written = pack(job.folder, content, job.output, job.settings.most_bytes)
+    parts = listed(written)
+    card_path = job.output.with_suffix(".json")
+    write_json(card_path, {**content, "parts": parts})
+    store = ViewStore.configured()
+    if store:
+        # The job declares the first part alone.
+        store.put_list(card_path, written[1:])
+    size = sum(part["bytes"] for part in parts)
+    print(f"{job.output}: {units.count(len(parts), 'part')}, {units.size(size)}")
 
 
 def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:

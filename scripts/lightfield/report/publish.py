@@ -7,14 +7,27 @@ from pathlib import Path
 
 from lightfield.configuration.publication import CARD, CROISSANT
 from lightfield.configuration.scene_yaml import Credits
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.core.paths import files_below
+from lightfield.core.paths import files_below, place_in
 from lightfield.formats.layout import SUMS
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import croissant, hugging_face, package, shards
 from lightfield.report.published import Published
+from lightfield.stages.publishing import Publish
 from lightfield.workflow.view_store import ViewStore
+
+
+def write(job: Publish) -> None:
+    """Publish the folder of a rig."""
+    if place_in(job.folder, job.output):
+        raise UserError(f"--output {job.output}: must not be in what it publishes")
+    settings = job.settings
+    name = job.output.resolve().name
+    published = publish(job.folder, name, settings.scene, job.output, settings.most_bytes)
+    size = sum(file["bytes"] for file in published.files)
+    print(f"{job.output}: {units.count(len(published.files), 'file')}, {units.size(size)}")
 
 
 def publish(folder: Path, name: str, scene: Credits, output: Path, most: float | None) -> Published:

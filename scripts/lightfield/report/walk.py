@@ -13,9 +13,9 @@ from scipy.spatial import ConvexHull, QhullError
 from lightfield.export.source import pixel_indices
 from lightfield.geometry.lenses import Lens
 from lightfield.report.packing import packed_bytes, webp
+from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels
 from lightfield.synthesis import view as synthesis
-from lightfield.synthesis.defaults import BEST
 
 Array = NDArray[Any]
 

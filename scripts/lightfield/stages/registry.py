@@ -3,7 +3,7 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import exports, lenses, measurement, rig, scene, views
+from lightfield.stages import exports, lenses, measurement, publishing, rig, scene, synthesis, views
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -23,6 +23,12 @@ STAGES: list[type[Stage[Any]]] = [
     exports.ExportViews,
     exports.ExportInstantNgp,
     exports.WriteSurface,
+    synthesis.Synthesize,
+    publishing.PublishChecksums,
+    publishing.Package,
+    publishing.Publish,
+    publishing.TakeDataset,
+    publishing.TakeViews,
     measurement.CheckDevice,
     measurement.Probe,
     measurement.Calibrate,

@@ -1,6 +1,5 @@
 """A run of scripts/synthesize.py: its cameras, and the files of each picture."""
 
-import argparse
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -17,15 +16,16 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
+from lightfield.stages.synthesis import Synthesize
 from lightfield.synthesis.view import Sources, reader
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(job: Synthesize) -> None:
     """Synthesise the views, and print how much of them are holes."""
-    keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
-    source = SourceDataset(arguments.dataset, arguments.reprojection, ".exr")
+    keep_apart("--output", job.output / NAME, job.dataset / NAME, job.poses)
+    source = SourceDataset(job.dataset, job.reprojection, ".exr")
     views = source.lightfield.views
-    targets = _poses(arguments.poses)
+    targets = _poses(job.poses)
     if targets is None:
         parts = splits(source.lightfield)
         views = parts.train
@@ -35,36 +35,32 @@ def run(arguments: argparse.Namespace) -> None:
         views,
         reader(source),
         fills_holes=not source.lightfield.transparent,
-        most=4 * arguments.best,
+        most=4 * job.best,
     )
     lens = targets.lens
     depth = targets.lens.usual_depth
-    targets.changed(depth=depth).write(arguments.output / NAME)
+    targets.changed(depth=depth).write(job.output / NAME)
     rays = lens.pixel_rays()
-    exposure = arguments.exposure
+    exposure = job.exposure
     holes = []
-    path = arguments.output / "walk.mp4"
+    path = job.output / "walk.mp4"
     progress = Progress(len(targets.views), "synthesize", "views")
     size = (lens.width, lens.height)
-    with video(path, size, arguments.rate) if arguments.video else nullcontext() as add_to_video:
+    with video(path, size, job.rate) if job.video else nullcontext() as add_to_video:
         for view in targets.views:
-            made = sources.synthesise(view.matrix, lens, arguments.best)
+            made = sources.synthesise(view.matrix, lens, job.best)
             if exposure is None:
                 exposure = pictures.exposure_for(made.colour[~made.holes])
-            images.write_exr(
-                arguments.output / "exr" / f"{view.name}.exr", made.channels(depth, rays)
-            )
+            images.write_exr(job.output / "exr" / f"{view.name}.exr", made.channels(depth, rays))
             picture = pictures.develop(np.nan_to_num(made.colour), exposure)
             opaque = np.where(np.isfinite(made.colour[..., 0]), 255, 0).astype(np.uint8)
-            images.write_png(
-                arguments.output / "png" / f"{view.name}.png", np.dstack([picture, opaque])
-            )
+            images.write_png(job.output / "png" / f"{view.name}.png", np.dstack([picture, opaque]))
             if add_to_video:
                 add_to_video(picture)
             holes.append(made.hole_fraction(rays))
             progress.done()
     print(
-        f"{count(len(holes), 'view')} of {min(arguments.best, len(views))} each; "
+        f"{count(len(holes), 'view')} of {min(job.best, len(views))} each; "
         f"holes: {np.mean(holes):.3%} of their pixels, at most {max(holes):.3%} of one"
     )
 

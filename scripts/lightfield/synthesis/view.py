@@ -21,8 +21,8 @@ from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
+from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels
-from lightfield.synthesis.defaults import BEST
 
 # Views are chosen by how well they see points at two distances that are typical of the scene. The
 # points lie in this many directions across and down the picture.

@@ -5,6 +5,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, write_bytes
+from lightfield.stages.publishing import PublishChecksums
+
 # How many problems of a check are printed. validation.json has all of them.
 _LINES_A_CHECK = 20
 # So many failed checks are named, each with its first problem.
@@ -93,3 +97,17 @@ def causes(validation: Mapping[str, Any]) -> str:
     if other_problems:
         parts.append(f"and {other_problems} more")
     return "; ".join(parts)
+
+
+def publish(job: PublishChecksums) -> None:
+    """Publish the checksums of a valid dataset.
+
+    Removes those of an invalid one, so that the next run validates it again. Raises `UserError`.
+    """
+    validation = read_keys(job.validation, "validate.py", "valid", "dataset", "checks")
+    if not validation["valid"]:
+        job.sums.unlink()
+        raise UserError(
+            f"{validation['dataset']} is not valid: {causes(validation)}: see {job.page}"
+        )
+    write_bytes(job.output, job.sums.read_bytes())

@@ -1,0 +1,120 @@
+"""The stages that publish finished datasets, and those that fetch them from a storage."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from lightfield.configuration.scene_yaml import Credits, load_scene
+from lightfield.core.settings import Settings
+from lightfield.core.stage import ByHand, NoSettings, Stage, option, reads, writes
+from lightfield.workflow.view_store import VARIABLE
+
+FOLDER = "folder of a rig, with one or more datasets"
+
+
+class PublishChecksums(Stage[NoSettings]):
+    """Publishes the checksums of a valid dataset."""
+
+    name = "publish_checksums"
+    function = "lightfield.validation.result:publish"
+
+    validation: Path = reads("validation.json of the dataset")
+    page: Path = option("page of the dataset, to name in the error message")
+    sums: Path = reads("checksums that scripts/validate.py wrote")
+    output: Path = writes("sha256sums.txt to write")
+
+
+class PackSettings(Settings):
+    """The settings of scripts/package.py and scripts/publish.py."""
+
+    datasets: list[str] = Field(
+        [],
+        description="Names of the datasets in the folder. If they change, the folder is packed "
+        "again.",
+    )
+    gigabytes: float | None = Field(
+        None,
+        gt=0,
+        description="Largest size of a package's part, or of a shard. Without this key, a package "
+        "is one file, and shards have at most 1 GB.",
+        json_schema_extra={"unit": "GB"},
+    )
+    scene: Credits = Field(
+        Credits(), description="What the card says about the scene, and what publishing needs."
+    )
+
+    @property
+    def most_bytes(self) -> float | None:
+        """The largest size of a part, or of a shard, in bytes. None without ``gigabytes``."""
+        return self.gigabytes and self.gigabytes * 1e9
+
+
+class PackageByHand(ByHand):
+    """The scene of a package, and the size of its parts."""
+
+    scene: str = option("name of the file in configs/scenes/ that gives the licence and credit")
+    gigabytes: Annotated[float, Field(gt=0)] | None = option(
+        "largest size of a part (default: no limit, one part)", None
+    )
+
+    def settings(self, given: Mapping[str, Any]) -> PackSettings:
+        return PackSettings.of(scene=load_scene(self.scene), gigabytes=self.gigabytes)
+
+
+class PublishByHand(PackageByHand):
+    """The scene of a published dataset, and the size of its shards."""
+
+    scene: str = option("name of the file in configs/scenes/ that has the key publish")
+    gigabytes: Annotated[float, Field(gt=0)] | None = option(
+        "largest size of a shard (default: 1)", None
+    )
+
+
+class Package(Stage[PackSettings]):
+    """Packs a finished dataset as tar archives with a card."""
+
+    name = "package"
+    function = "lightfield.report.package:write"
+    by_hand = PackageByHand
+
+    folder: Path = reads(FOLDER)
+    output: Path = writes("archive to write, <scene>_<rig>.tar; a .json is written beside it")
+
+
+class Publish(Stage[PackSettings]):
+    """Writes a finished dataset as WebDataset shards, with descriptions of them."""
+
+    name = "publish"
+    function = "lightfield.report.publish:write"
+    by_hand = PublishByHand
+
+    folder: Path = reads(FOLDER)
+    output: Path = writes("folder to write")
+
+
+class TakeDataset(Stage[NoSettings]):
+    """Copies finished datasets from a storage."""
+
+    name = "take_dataset"
+    function = "lightfield.report.taking:take_datasets"
+
+    datasets: list[Path] = writes("folders to copy, such as results/scene/rig", positional=True)
+    store: str = option("URL or folder of the storage")
+
+
+class TakeViews(Stage[NoSettings]):
+    """Copies the files that records and exports list from the view store."""
+
+    name = "take_views"
+    function = "lightfield.report.taking:take_views"
+
+    lists: list[Path] = reads("records of shards, and lists of exports", positional=True)
+    store: str | None = option(f"URL or folder of the store (default: ${VARIABLE})", None)
+    results: Path = option("folder of the datasets")
+    work: Path = option("folder of intermediate files, with the records")
+    mend: bool = option(
+        "remove lists of lost files from the storage, so that the next run makes these files again",
+        False,
+    )
