@@ -14,7 +14,7 @@ from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
-from lightfield.planning.cost import ProbedViews, read_probe
+from lightfield.planning.cost import ProbedViews, cost, read_probe
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Probe, ProbeSettings
 from lightfield.workflow import shard_counts
@@ -91,6 +91,23 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
     # Ten views are the fewest for which the start is a small part.
     assert count(cluster=Cluster(jobs=100, cores=16)) == 65
     assert count(cluster=Cluster(jobs=50, cores=16)) == 64
+
+
+def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
+    datasets = scene_datasets("garden_sequence")
+    frames = [
+        replace(dataset, work_root=str(tmp_path))
+        for dataset in datasets
+        if dataset.rig_name == datasets[0].rig_name
+    ]
+    width, height = frames[0].rig.camera.resolution
+    probe = {"device": "CPU", "resolution": [width, height], "samples": frames[0].render.samples}
+    probe |= {"views": 9, "view_seconds": [6.0, 8.0], "view_bytes": [1e7]}
+    write_json(Path(frames[0].work, "probe.json"), probe)
+    for frame in frames:
+        ten_views, twenty_views = (cost("render", frame, views) for views in (10, 20))
+        assert twenty_views.seconds - ten_views.seconds == pytest.approx(70)
+        assert ten_views.disk_bytes == pytest.approx(1e8)
 
 
 def test_a_dataset_in_progress_keeps_its_shards(sphere):

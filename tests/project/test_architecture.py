@@ -109,6 +109,20 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
         files += [helpers[name] for name in helpers.keys() & modules if helpers[name] not in files]
 
 
+# A figure that is divided by a unit, or that has digits and a unit behind them.
+UNITS = re.compile(
+    r"\{[^{}\n]*/ ?(?:1e[369]|3600|60|1024)[^{}\n]*:[^{}\n]*\}"
+    r"|:[,.]*\d[fg]\} (?:s|min|h|hours|kB|MB|GB|TB)\b"
+)
+# The second writes lines that the terminal's display reads.
+WRITES_UNITS = {LIBRARY / "core/units.py", LIBRARY / "core/progress.py"}
+
+
+def test_one_module_writes_times_and_sizes():
+    files = [*(ROOT / "scripts").rglob("*.py"), *(ROOT / "rules").rglob("*.smk")]
+    assert {file for file in files if UNITS.search(file.read_text())} == WRITES_UNITS
+
+
 # Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 MODULES = r"\b(?:from|import) snakemake\b(?!\.utils import min_version)"

@@ -6,10 +6,12 @@ import math
 def duration(seconds: float) -> str:
     """Return a time with two or three digits: ``4.2 s``, ``3 min 05 s``, ``2 h 07 min``, ``15 h``.
 
-    Times to which a person waits, or that were estimated, are never more exact.
+    More digits would change from run to run.
     """
+    if 0 < seconds < 0.0995:
+        return f"{1000 * seconds:.2g} ms"
     if seconds < 9.95:
-        return f"{round(seconds, 3):.2g} s"
+        return f"{seconds:.2g} s"
     if seconds < 99.5:
         return f"{seconds:.0f} s"
     minutes = seconds / 60

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import write_csv, write_json, write_text
+from lightfield.core.units import duration
 from lightfield.formats.render_block import RenderBlock
 from lightfield.imaging import plots
 from lightfield.measurement import advice, metrics, strata, trials
@@ -484,7 +485,7 @@ def _equal_table(name: str, content: Mapping[str, Any]) -> list[str]:
         "The error is the relative mean squared error of all but the worst thousandth of pixels.",
         "Seconds are those of a megapixel. — is outside what was measured.",
         "",
-        f"| method | error at {seconds:.3g} s | seconds at error {error:.2g} | times faster |",
+        f"| method | error at {duration(seconds)} | seconds at error {error:.2g} | times faster |",
         "| --- | ---: | ---: | ---: |",
         *(
             _row(m["method"], m["error"], m["seconds_at_equal_error"], m["times_faster"])
@@ -500,8 +501,8 @@ def _figures_table(content: Mapping[str, Any]) -> list[str]:
     }
     lines = [
         "",
-        f"Each method's point nearest to {content['methods'][0]['seconds']:.3g} s. Bias (squared) "
-        "and variance add",
+        f"Each method's point nearest to {duration(content['methods'][0]['seconds'])}.",
+        "Bias (squared) and variance add",
         "up to the error of all pixels. × s is that error times the seconds. A bias below 0 is",
         "within the noise of 0. In common is the correlation of the bias with the neighbouring",
         "view's. Texture has 1.",

@@ -203,7 +203,7 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             f"{_MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard "
             f"errors (at most {_MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by "
             f"more than a part of {SAME_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
-            f"A sample of a megapixel takes {content['gpu_seconds']:.3g} s on the GPU, "
+            f"A sample of a megapixel takes {units.duration(content['gpu_seconds'])} on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",
             f"| dataset at full size, {content['samples']} samples | GPU hours |",
