@@ -1,4 +1,4 @@
-"""Times, sizes, counts and numbers for people."""
+"""Times, sizes, energies, counts and numbers for people."""
 
 import pytest
 
@@ -41,6 +41,13 @@ def test_a_duration_is_as_exact_as_a_person_needs(seconds, text):
 )
 def test_sizes_go_from_bytes_to_petabytes(size, text):
     assert units.size(size) == text
+
+
+@pytest.mark.parametrize(
+    ("kwh", "text"), [(0, "0 kWh"), (144.2, "144 kWh"), (0.25, "0.25 kWh"), (0.0025, "2.5 Wh")]
+)
+def test_small_energies_are_watt_hours(kwh, text):
+    assert units.energy(kwh) == text
 
 
 def test_counts_name_what_they_count():

@@ -112,7 +112,7 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
 # A figure that is divided by a unit, or that has digits and a unit behind them.
 UNITS = re.compile(
     r"\{[^{}\n]*/ ?(?:1e[369]|3600|60|1024)[^{}\n]*:[^{}\n]*\}"
-    r"|:[,.]*\d[fg]\} (?:s|min|h|hours|kB|MB|GB|TB)\b"
+    r"|:[,.]*\d[fg]\} (?:s|min|h|hours|kWh|kB|MB|GB|TB)\b"
 )
 # The second writes lines that the terminal's display reads.
 WRITES_UNITS = {LIBRARY / "core/units.py", LIBRARY / "core/progress.py"}

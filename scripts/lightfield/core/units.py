@@ -1,4 +1,4 @@
-"""Writes times, sizes, counts and numbers as a person reads them."""
+"""Writes times, sizes, energy, counts and numbers as a person reads them."""
 
 import math
 
@@ -38,6 +38,11 @@ def size(size_bytes: float) -> str:
             return f"{size_bytes:.3g} {unit}"
         size_bytes /= 1000
     return f"{size_bytes:.3g} PB"
+
+
+def energy(kwh: float) -> str:
+    """Return an energy with three digits: ``144 kWh``, ``2.5 Wh``."""
+    return f"{kwh:.3g} kWh" if kwh >= 0.01 or not kwh else f"{1000 * kwh:.3g} Wh"
 
 
 def count(number_of: int, name: str) -> str:

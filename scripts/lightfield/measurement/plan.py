@@ -169,12 +169,14 @@ def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
         )
     seconds = sum(dataset.cost.seconds for dataset in expected)
     if names:
-        return f"Times of the graphics card, with {kwh(seconds, energy.watts):.3g} kWh together."
+        return (
+            f"Times of the graphics card, with {units.energy(kwh(seconds, energy.watts))} together."
+        )
     cores = processors.available()
     used = kwh(seconds / energy.core_count, energy.watts)
     return (
         f"Times of one processor core; this machine's {cores} take "
-        f"{units.duration(seconds / cores)} and {used:.3g} kWh."
+        f"{units.duration(seconds / cores)} and {units.energy(used)}."
     )
 
 

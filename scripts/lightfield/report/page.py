@@ -144,7 +144,7 @@ def cell(value: Any) -> str:
 _UNITS: dict[str, Callable[[float], str]] = {
     "seconds": units.duration,
     "bytes": units.size,
-    "kwh": lambda value: f"{value:.3g} kWh",
+    "kwh": units.energy,
     "gigabytes": lambda value: units.size(1e9 * value),
     "hours": lambda value: f"{number(value)} h",
     "watts": lambda value: f"{value:g} W",
