@@ -45,7 +45,7 @@ from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
 from lightfield.stages import exports as export_stages
-from lightfield.stages import measurement, publishing
+from lightfield.stages import measurement, publishing, report
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
 from lightfield.stages.registry import BY_NAME
@@ -250,9 +250,9 @@ KEY_PAGES: dict[str, Page] = {
             Section("validate_sequence.py", job_settings.SequenceValidationSettings),
             Section("package.py and publish.py", publishing.PackSettings),
             Section("package.py and publish.py: scene", scene_yaml.Credits),
-            Section("report_figures.py", job_settings.FiguresSettings),
-            Section("report_html.py", job_settings.PageSettings),
-            Section("report_html.py: measurements", job_settings.Measurement),
+            Section("report_figures.py", report.FiguresSettings),
+            Section("report_html.py", report.PageSettings),
+            Section("report_html.py: measurements", report.Measurement),
         ],
     ),
     "measurement-keys.md": Page(

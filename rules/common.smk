@@ -47,15 +47,13 @@ from lightfield.configuration.description import Cluster
 from lightfield.configuration.exports import MANIFEST, InstantNgp, export_settings_of
 from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
 from lightfield.configuration.job_settings import (
-    FiguresSettings,
-    Measurement,
-    PageSettings,
     SequenceValidationSettings,
     ValidationSettings,
 )
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import SynthesisSettings
 from lightfield.stages.publishing import PackSettings
+from lightfield.stages.report import FiguresSettings, Measurement, PageSettings
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.loading import (

@@ -40,6 +40,8 @@ class MakePot(Stage[PotSettings]):
     size: tuple[float, float] | None = option("its sides", None)
     feet: Literal[3, 4] = option("how many feet it has", 3)
     marks: list[str] | None = option("marks on it", None, may_be_empty=True)
+    lid: Path | None = reads("its lid", None, may_be_empty=True)
+    pot_name: str = option("its name", "", flag="--name")
     bands: list[tuple[str, int]] = option("bands around it", [], metavar=("COLOUR", "WIDTH"))
 
 
@@ -59,9 +61,12 @@ def test_flags_become_the_fields_of_the_stage_and_the_keys_of_its_settings():
     assert paths_of(pot, "written") == [Path("c")]
 
 
-def test_a_flag_of_a_list_may_be_empty_or_given_again():
+def test_a_flag_may_be_empty_given_again_or_have_another_name():
     assert make("a", "-o", "c", "--clay", "red").marks is None
     assert make("a", "-o", "c", "--clay", "red", "--marks").marks == []
+    assert make("a", "-o", "c", "--clay", "red", "--lid").lid is None
+    assert make("a", "-o", "c", "--clay", "red", "--lid", "d").lid == Path("d")
+    assert make("a", "-o", "c", "--clay", "red", "--name", "e").pot_name == "e"
     words = ["--marks", "x", "y", "--marks", "z", "--bands", "red", "2", "--bands", "grey", "3"]
     pot = make("a", "-o", "c", "--clay", "red", "--feet", "4", *words)
     assert (pot.feet, pot.marks, pot.bands) == (4, ["x", "y", "z"], [("red", 2), ("grey", 3)])

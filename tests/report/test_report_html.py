@@ -30,6 +30,13 @@ from lightfield.report import (
     page,
     pass_pictures,
 )
+from lightfield.stages.report import (
+    FiguresSettings,
+    Measurement,
+    PageSettings,
+    ReportFigures,
+    ReportHtml,
+)
 
 SPHERE = {
     "type": "sphere",
@@ -72,14 +79,20 @@ def channels_of(colour, **others):
 
 def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
     output = folder / "report" / "index.html"
-    rig = rigs.from_settings(rig)
-    origin = dataset_page.Origin(rig, YAML, "snakemake --cores all", panorama, measurements)
-    dataset_page.write(output, folder, name, origin)
+    settings = PageSettings(
+        rig=rigs.from_settings(rig),
+        yaml=YAML,
+        command="snakemake --cores all",
+        panorama=panorama,
+        measurements=[Measurement(file=str(file)) for file in measurements],
+    )
+    ReportHtml(settings=settings, dataset=folder, dataset_name=name, output=output).run()
     return output
 
 
 def draw(folder, rig, output, panorama=None):
-    figures.draw(folder, rigs.from_settings(rig), panorama, output)
+    settings = FiguresSettings(rig=rigs.from_settings(rig))
+    ReportFigures(settings=settings, dataset=folder, panorama=panorama, output=output).run()
 
 
 @pytest.fixture(scope="module")

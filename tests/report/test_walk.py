@@ -18,7 +18,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import pictures
-from lightfield.report import dataset_page
+from lightfield.stages.report import PageSettings, ReportHtml
 from lightfield.synthesis.view import Sources, reader
 
 RIG = {
@@ -124,11 +124,14 @@ def written_page(folder, camera, rig, see):
     write_views(folder, camera, rig, see=see)
     field = LightField.read(folder / "lightfield.json")
     field.changed(frame=1, scene={"name": "ball"}, render={"samples": 1}).write(field.path)
-    origin = dataset_page.Origin(
-        rigs.from_settings(rig | {"camera": camera}), "", "snakemake", False
-    )
-    dataset_page.write(folder / "index.html", folder, "ball/sphere", origin)
-    return folder / "index.html"
+    rig = rigs.from_settings(rig | {"camera": camera})
+    return make_page(folder, rig, "ball/sphere", folder / "index.html")
+
+
+def make_page(folder, rig, name, output):
+    settings = PageSettings(rig=rig, yaml="", command="snakemake")
+    ReportHtml(settings=settings, dataset=folder, dataset_name=name, output=output).run()
+    return output
 
 
 def look_at_ball_alone(lens, matrix):
@@ -389,8 +392,7 @@ def test_another_frame_of_a_sequence_keeps_the_eyes_place(small, show, tmp_path)
     for name in rig.sequence.folders:
         folder = tmp_path / "ball" / name
         shutil.copytree(small, folder)
-        origin = dataset_page.Origin(rig, "", "snakemake", False)
-        dataset_page.write(folder / "report/index.html", folder, f"ball/{name}", origin)
+        make_page(folder, rig, f"ball/{name}", folder / "report/index.html")
     opened = show(tmp_path / "ball/f00001/report/index.html")
     wait(opened)
     slider = opened.locator("#walk-frame")

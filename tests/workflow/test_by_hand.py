@@ -200,6 +200,7 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
 # The flags without which a stage does not look at the others.
 REQUIRED = {
     "export_instant_ngp.py": ["--input-cfg", "a", "--output", "b"],
+    "evaluate.py": [".", "--dataset", "a", "--output", "b"],
     "reproject.py": ["--output-dir", "a"],
     "package.py": [*PACK, "--scene", "smoke"],
     "publish.py": [*PUBLISH, "--scene", "smoke"],
@@ -209,6 +210,8 @@ REQUIRED = {
 @pytest.mark.parametrize(
     ("program", "flag", "values"),
     [
+        ("evaluate.py", "--reinhard", ["0", "-1", "-1e-05", "1e-30", "nan", "inf", "1e400"]),
+        ("evaluate.py", "--exposure", ["101", "-1e+03", "nan", "inf", "-1e400"]),
         ("reproject.py", "--reinhard", ["0", "nan", "1e400"]),
         ("reproject.py", "--scale", ["0", "-1e-05", "nan", "inf"]),
         ("reproject.py", "--depth-png", ["0", "-1e-05", "nan", "inf"]),
@@ -221,21 +224,6 @@ def test_a_number_that_would_spoil_everything_is_refused(refused, program, flag,
     for value in values:
         said = refused(program, *REQUIRED.get(program, ()), flag, value)
         assert said.removeprefix("argument ").startswith(f"{flag}: is ")
-        assert "; must be " in said
-
-
-@pytest.mark.parametrize(
-    ("flag", "values"),
-    [
-        ("--reinhard", ["0", "-1", "-1e-05", "1e-30", "nan", "inf", "1e400"]),
-        ("--exposure", ["101", "-1e+03", "nan", "inf", "-1e400"]),
-    ],
-)
-def test_a_number_that_would_spoil_an_evaluation_is_refused(refused, tmp_path, flag, values):
-    arguments = [tmp_path, "--dataset", tmp_path, "--output", tmp_path / "made"]
-    for value in values:
-        said = refused("evaluate.py", *arguments, flag, value)
-        assert said.startswith(f"{flag}: is ")
         assert "; must be " in said
 
 

@@ -5,47 +5,13 @@ file with --settings. The settings of light fields are in `lightfield.configurat
 Reprojections and exports have modules of their own.
 """
 
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import Field, PlainSerializer
+from pydantic import Field
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.family import Draw, Member
 from lightfield.core.settings import Settings
-from lightfield.geometry.rigs import AnyRig, as_written
-
-
-class FiguresSettings(Settings):
-    """The settings of scripts/report_figures.py."""
-
-    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
-
-
-class Measurement(Settings):
-    """A file that a measurement wrote, and that the page shows."""
-
-    file: str = Field(description="Path of the file.")
-    modified_ns: int | None = Field(
-        None,
-        description="When the file was modified, in nanoseconds. If it changes, the page is made "
-        "again.",
-    )
-
-
-class PageSettings(Settings):
-    """The settings of scripts/report_html.py."""
-
-    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
-    yaml: str = Field(description="Text of the scene YAML.")
-    command: str = Field(description="Command that builds the dataset again.")
-    panorama: bool = Field(
-        False,
-        description="Whether the overview is a panorama. false: it is the view in the rig's "
-        "middle.",
-    )
-    measurements: list[Measurement] = Field(
-        [], description="Files of measurements that the page shows."
-    )
 
 
 class ValidationSettings(Settings):

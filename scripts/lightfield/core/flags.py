@@ -1,10 +1,10 @@
 """The program of a stage: its flags follow from the fields of the stage and of its settings.
 
 A field may have these keys in its ``json_schema_extra``: ``short``, a list of short flags;
-``metavar``; ``positional``; ``commas``, for a list in one word; and ``may_be_empty``, for a list
-that a flag without values makes empty. A flag of a list may be given again, for more values. A list
-of tuples takes one tuple each time. ``group`` is a title in --help. Of all flags with the same
-``one_of``, only one may be given.
+``flag``, in place of the field's name; ``metavar``; ``positional``; ``commas``, for a list in one
+word; and ``may_be_empty``: the flag without a value means an empty list, or None. A flag of a list
+may be given again, for more values. A list of tuples takes one tuple each time. ``group`` is a
+title in --help. Of all flags with the same ``one_of``, only one may be given.
 """
 
 import argparse
@@ -150,7 +150,8 @@ def _add(parser: Any, name: str, field: FieldInfo, may_be_required: bool) -> Non
         return
     if may_be_required and field.is_required():
         keywords["required"] = True
-    parser.add_argument(*extra.get("short", ()), _flag(name), **keywords)
+    flag = extra.get("flag", _flag(name))
+    parser.add_argument(*extra.get("short", ()), flag, dest=name, **keywords)
 
 
 def help_of(field: FieldInfo) -> str:
@@ -193,7 +194,10 @@ def _values(field: FieldInfo, extra: Mapping[str, Any]) -> dict[str, Any]:
         return {"action": "extend", "nargs": count, **_one(inner[0])}
     if origin is tuple:
         return {"nargs": len(inner), **_one(inner[0])}
-    return _one(kind)
+    keywords = _one(kind)
+    if extra.get("may_be_empty"):
+        keywords["nargs"] = "?"
+    return keywords
 
 
 def _one(kind: Any) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """Writes a dataset's page: one file with its pictures, its quality and its cost."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from lightfield.core import units
 from lightfield.core.files import absolute_path
 from lightfield.export import transforms
 from lightfield.formats import blend
+from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import IMAGES, REPORT, SUMS
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
@@ -23,6 +23,7 @@ from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
 from lightfield.report.packing import webp
+from lightfield.stages.report import ReportHtml
 
 PICTURES = ("overview", "contact_sheet")
 PLOTS = ("depth", "noise")
@@ -33,32 +34,15 @@ _SHEET_QUALITY = 84
 DEPTHS = {"z": "Z-depth, metres", "distance": "distance, metres"}
 
 
-@dataclass(frozen=True)
-class Origin:
-    """How the dataset was made, as far as its files do not say it.
-
-    - ``yaml``: the text of the scene YAML.
-    - ``command``: the command that makes the dataset.
-    - ``has_panorama``: whether the overview is a panorama from the rig's centre.
-    - ``measurements``: files of measurements to show.
-    - ``inventory``: the inventory of a user's own .blend. None for scenes that are built.
-    """
-
-    rig: rigs.Rig
-    yaml: str
-    command: str
-    has_panorama: bool
-    measurements: Sequence[Path] = ()
-    inventory: Mapping[str, Any] | None = None
-
-
-def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
-    """Write the page of the dataset in ``folder``, which is called ``name``: scene/rig.
+def write(job: ReportHtml) -> None:
+    """Write the page of a dataset.
 
     Leaves out the sections for which files are missing: validation, measurements, depth, costs.
     """
+    folder = job.dataset
+    name = job.dataset_name
     lightfield = LightField.read(folder / NAME)
-    rig = origin.rig
+    rig = job.settings.rig
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     packed = views.collect(
@@ -73,18 +57,18 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     if lights:
         packed.data["lights"] = lights
     report = folder / REPORT
-    measurements = _measurements(origin, folder, lightfield)
+    measurements = _measurements(job, lightfield)
     page.write(
-        output,
+        job.output,
         "page.html.j2",
         name=name,
         home="../" * (name.count("/") + 2) + "index.html",
         facts=facts(folder, lightfield, rig, packed.missed),
-        middle=None if origin.has_panorama else middle.name,
+        middle=None if job.settings.panorama else middle.name,
         passes_of=middle.name,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
-        taken=_taken(origin, lightfield),
+        taken=_taken(job, lightfield),
         packed=packed,
         lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
@@ -101,8 +85,8 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         costs=tables.costs(report / "costs.json"),
         files=files(folder, lightfield, valid=not validation or validation["valid"]),
         transforms=[path.relative_to(folder).as_posix() for path in transforms(folder)],
-        yaml=origin.yaml,
-        command=origin.command,
+        yaml=job.settings.yaml,
+        command=job.settings.command,
     )
 
 
@@ -122,12 +106,10 @@ def _sensor_folder(folder: Path, lightfield: LightField) -> Path | None:
     return min(stops_of_folder, key=stops_of_folder.__getitem__, default=None)
 
 
-def _measurements(
-    origin: Origin, folder: Path, lightfield: LightField
-) -> dict[str, tables.Measurement]:
+def _measurements(job: ReportHtml, lightfield: LightField) -> dict[str, tables.Measurement]:
     """Return the measurements that exist, by their names in the template."""
-    files = origin.measurements
-    dataset = absolute_path(folder)
+    files = [Path(measurement.file) for measurement in job.settings.measurements]
+    dataset = absolute_path(job.dataset)
     name = f"{dataset.parent.name}/{dataset.name}"
     candidates = {
         "error_vs_time": tables.error_vs_time(files, str(lightfield.scene["name"])),
@@ -139,14 +121,15 @@ def _measurements(
     return {title: measurement for title, measurement in candidates.items() if measurement}
 
 
-def _taken(origin: Origin, lightfield: LightField) -> list[str]:
+def _taken(job: ReportHtml, lightfield: LightField) -> list[str]:
     """Return which settings came from the user's own .blend. Empty for scenes that are built."""
-    if origin.inventory is None:
+    if job.inventory is None:
         return []
-    uses_camera = isinstance(origin.rig, rigs.BlendCamera)
+    inventory = read_inventory(job.inventory, "blend", "missing")
+    uses_camera = isinstance(job.settings.rig, rigs.BlendCamera)
     followed = lightfield.scene.get("followed_camera")
     return blend.usage_notes(
-        origin.inventory, [lightfield.frame], lightfield.render, uses_camera, followed
+        inventory, [lightfield.frame], lightfield.render, uses_camera, followed
     )
 
 

@@ -26,6 +26,7 @@ from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
 from lightfield.measurement import noise
 from lightfield.report import contact_sheet
+from lightfield.stages.report import ReportFigures
 
 # The viewpoint of the rig's drawing, in degrees: round the rig from −Y, and above the ground.
 _AZIMUTH = 30.0
@@ -47,8 +48,11 @@ class Overview:
     depth_label: str
 
 
-def draw(dataset: Path, rig: Rig, panorama: Path | None, output: Path) -> None:
-    """Write all pictures of the dataset in the folder ``dataset`` to ``output``."""
+def draw(job: ReportFigures) -> None:
+    """Write all pictures of a dataset."""
+    dataset = job.dataset
+    rig = job.settings.rig
+    output = job.output
     lightfield = LightField.read(dataset / NAME)
     lightfield.require_rig(rig)
     views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
@@ -58,8 +62,8 @@ def draw(dataset: Path, rig: Rig, panorama: Path | None, output: Path) -> None:
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
     draw_rig(output / "rig", rig, lightfield.matrices, parts)
-    if panorama:
-        overview = _read_panorama(panorama)
+    if job.panorama:
+        overview = _read_panorama(job.panorama)
     else:
         overview = read_view(views[middle_view(rig)], lightfield)
     exposure = pictures.exposure_for(overview.colour)

@@ -12,17 +12,21 @@ from lightfield.core.paths import files_below
 from lightfield.formats.layout import REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables
+from lightfield.stages.report import ReportIndex
 
 THUMBNAIL = 480
 _PAGE = (REPORT, "index.html")
 
 
-def write(output: Path, results: Path) -> None:
-    """Write the index of the datasets below ``results``.
+def write(job: ReportIndex) -> None:
+    """Write the index of the datasets below a folder.
 
     Leaves out, with a warning, a dataset that cannot be read. Raises `UserError` for a damaged
-    corpus.json.
+    corpus.json, or if there is no such folder.
     """
+    results = job.results
+    if not results.is_dir():
+        raise UserError(f"{results}: no such folder")
     corpora = sorted(path.parent for path in results.glob(f"*/{CORPUS}"))
     pages = [path for path in files_below(results, strict=False) if path.parts[-2:] == _PAGE]
     datasets = []
@@ -36,7 +40,7 @@ def write(output: Path, results: Path) -> None:
             # One broken dataset must not hide the others.
             print(f"warning: left out: {error}", file=sys.stderr)
     families = [_family(results, folder) for folder in corpora]
-    page.write(output, "index.html.j2", datasets=datasets, families=families)
+    page.write(job.output, "index.html.j2", datasets=datasets, families=families)
 
 
 def _family(results: Path, folder: Path) -> dict[str, Any]:

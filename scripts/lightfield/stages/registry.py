@@ -3,7 +3,17 @@
 from typing import Any
 
 from lightfield.core.stage import Stage
-from lightfield.stages import exports, lenses, measurement, publishing, rig, scene, synthesis, views
+from lightfield.stages import (
+    exports,
+    lenses,
+    measurement,
+    publishing,
+    report,
+    rig,
+    scene,
+    synthesis,
+    views,
+)
 
 STAGES: list[type[Stage[Any]]] = [
     scene.BuildScene,
@@ -29,6 +39,9 @@ STAGES: list[type[Stage[Any]]] = [
     publishing.Publish,
     publishing.TakeDataset,
     publishing.TakeViews,
+    report.ReportFigures,
+    report.ReportHtml,
+    report.ReportIndex,
     measurement.CheckDevice,
     measurement.Probe,
     measurement.Calibrate,

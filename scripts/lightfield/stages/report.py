@@ -1,0 +1,83 @@
+"""The stages that draw a dataset's pictures and write the pages."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, PlainSerializer
+
+from lightfield.core.settings import Settings
+from lightfield.core.stage import PlainStage, Stage, option, reads, writes
+from lightfield.geometry.rigs import AnyRig, as_written
+
+
+class FiguresSettings(Settings):
+    """The settings of scripts/report_figures.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+
+
+class ReportFigures(Stage[FiguresSettings]):
+    """Draws a dataset's pictures: an overview, the contact sheet, its rig, depth and noise."""
+
+    name = "report_figures"
+    function = "lightfield.report.figures:draw"
+
+    dataset: Path = reads("folder of the dataset")
+    panorama: Path | None = reads(
+        "EXR of a panorama from the rig's centre, for the overview (default: the view in the rig's "
+        "middle)",
+        None,
+        may_be_empty=True,
+    )
+    output: Path = writes("folder to write")
+
+
+class Measurement(Settings):
+    """A file that a measurement wrote, and that the page shows."""
+
+    file: str = Field(description="Path of the file.")
+    modified_ns: int | None = Field(
+        None,
+        description="When the file was modified, in nanoseconds. If it changes, the page is made "
+        "again.",
+    )
+
+
+class PageSettings(Settings):
+    """The settings of scripts/report_html.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+    yaml: str = Field(description="Text of the scene YAML.")
+    command: str = Field(description="Command that builds the dataset again.")
+    panorama: bool = Field(
+        False,
+        description="Whether the overview is a panorama. false: it is the view in the rig's "
+        "middle.",
+    )
+    measurements: list[Measurement] = Field(
+        [], description="Files of measurements that the page shows."
+    )
+
+
+class ReportHtml(Stage[PageSettings]):
+    """Makes a dataset's page: one file that shows its views, their quality, and their cost."""
+
+    name = "report_html"
+    function = "lightfield.report.dataset_page:write"
+
+    dataset: Path = reads("folder of the dataset")
+    dataset_name: str = option("name of the dataset, scene/rig", flag="--name", metavar="NAME")
+    inventory: Path | None = reads(
+        "JSON that scripts/inventory.py wrote for the scene, if it is a user's .blend", None
+    )
+    output: Path = writes("HTML file to write")
+
+
+class ReportIndex(PlainStage):
+    """Makes the page with links to the pages of all datasets in a results folder."""
+
+    name = "report_index"
+    function = "lightfield.report.index_page:write"
+
+    results: Path = reads("folder of the datasets")
+    output: Path = writes("HTML file to write, in that folder")
