@@ -168,16 +168,13 @@ def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
             "the others. They have no sum."
         )
     seconds = sum(dataset.cost.seconds for dataset in expected)
+    machine_seconds = seconds if names else seconds / energy.core_count
+    used = units.energy(kwh(machine_seconds, energy.watts))
     if names:
-        return (
-            f"Times of the graphics card, with {units.energy(kwh(seconds, energy.watts))} together."
-        )
+        return f"Times of the graphics card, with {used} together."
     cores = processors.available()
-    used = kwh(seconds / energy.core_count, energy.watts)
-    return (
-        f"Times of one processor core; this machine's {cores} take "
-        f"{units.duration(seconds / cores)} and {units.energy(used)}."
-    )
+    taken = units.duration(seconds / cores)
+    return f"Times of one processor core; this machine's {cores} take {taken} and {used}."
 
 
 def cheaper_parts(
