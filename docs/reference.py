@@ -32,11 +32,12 @@ from lightfield.configuration import (
     scene_yaml,
 )
 from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.json_schema import Generator
 from lightfield.core import flags
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
-from lightfield.core.names import ROOT, SEQUENCE_EXPORTS
+from lightfield.core.names import ROOT
 from lightfield.core.settings import MEANINGS
 from lightfield.core.units import limit
 from lightfield.formats import render_block, sensors

@@ -44,8 +44,13 @@ from lightfield.configuration.scene_yaml import load_scene, scene_content, scene
 from lightfield.configuration.config_file import load_config
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS
 from lightfield.configuration.description import Cluster
-from lightfield.configuration.exports import MANIFEST, InstantNgp, export_settings_of
-from lightfield.core.names import MESH, SEQUENCE_EXPORTS, VIEWS
+from lightfield.configuration.exports import (
+    MANIFEST,
+    SEQUENCE_EXPORTS,
+    InstantNgp,
+    export_settings_of,
+)
+from lightfield.core.names import MESH, VIEWS
 from lightfield.configuration.job_settings import (
     SequenceValidationSettings,
     ValidationSettings,

@@ -19,11 +19,10 @@ from scipy.spatial.transform import Rotation
 from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
 
 from lightfield import export
-from lightfield.configuration.exports import Exports, settings_of
+from lightfield.configuration.exports import EXPORTS, Exports, settings_of
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.core.names import EXPORTS
 from lightfield.export import disparity
 from lightfield.export.points import evenly, one_a_voxel
 from lightfield.export.source import SourceDataset, Surface

@@ -564,3 +564,10 @@ def settings_of(name: str) -> type[Export]:
     annotation = Exports.model_fields[name].annotation
     model: type[Export] = next(kind for kind in get_args(annotation) if kind is not type(None))
     return model
+
+
+# The formats of scripts/export.py. instant-ngp has a program of its own.
+EXPORTS = tuple(name for name in Exports.model_fields if name != "instant_ngp")
+
+# Those of them that are made of a whole sequence.
+SEQUENCE_EXPORTS = tuple(name for name in EXPORTS if settings_of(name).is_of_sequence)

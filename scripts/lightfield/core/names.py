@@ -8,30 +8,7 @@ VIEWS = "views"
 # The folder of a dataset with the surface that its cameras can see.
 MESH = "mesh"
 
-# The formats of scripts/export.py. instant-ngp has a program of its own.
-EXPORTS = (
-    "colmap",
-    "nerfstudio",
-    "nerf_synthetic",
-    "opendibr",
-    "miv",
-    "hci",
-    "scannetpp",
-    "ncore",
-    "lichtfeld",
-    "coco",
-    "poses_csv",
-    "point_cloud",
-    "dnerf",
-    "neural_3d_video",
-    "colmap_frames",
-    "multipleview",
-    "scene_flow",
-)
-
-# Those of them that are made of a whole sequence.
-SEQUENCE_EXPORTS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview", "scene_flow")
-
+# What the programs' flags --inventory are for.
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 # The formats of model files that scripts/import_model.py reads.

@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import MANIFEST, Export, ExportSettings
+from lightfield.configuration.exports import MANIFEST, SEQUENCE_EXPORTS, Export, ExportSettings
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.core.names import MESH, SEQUENCE_EXPORTS
+from lightfield.core.names import MESH
 from lightfield.export import instant_ngp
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset

@@ -14,12 +14,11 @@ from typing import Any
 
 import jinja2
 
-from lightfield.configuration.exports import MANIFEST
+from lightfield.configuration.exports import MANIFEST, SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256, write_json
-from lightfield.core.names import SEQUENCE_EXPORTS
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.export import transforms

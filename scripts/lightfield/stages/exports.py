@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, InstanceOf, TypeAdapter
 
 from lightfield.configuration.exports import (
+    EXPORTS,
     Export,
     ExportSettings,
     InstantNgp,
@@ -14,7 +15,7 @@ from lightfield.configuration.exports import (
 )
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
-from lightfield.core.names import EXPORTS, INVENTORY, VIEWS
+from lightfield.core.names import INVENTORY, VIEWS
 from lightfield.core.settings import Settings, checked
 from lightfield.core.stage import ByHand, Stage, option, reads, writes
 from lightfield.geometry.rigs.rig import Frame
