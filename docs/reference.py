@@ -46,6 +46,7 @@ from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
 from lightfield.stages import exports as export_stages
+from lightfield.stages import family as family_stages
 from lightfield.stages import measurement, publishing, report
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
@@ -144,10 +145,10 @@ KEY_PAGES: dict[str, Page] = {
             Section("family: corpus", corpus.CorpusOptions),
             Section("family: corpus: splits", corpus.Shares),
             # The settings files of its jobs.
-            Section("The settings file of build_members.py", job_settings.BatchSettings),
+            Section("The settings file of build_members.py", family_stages.BatchSettings),
             Section("The settings file of build_members.py: members", family.Member),
-            Section("The settings file of count_members.py", job_settings.CountSettings),
-            Section("The settings file of corpus.py", corpus.CorpusSettings),
+            Section("The settings file of count_members.py", family_stages.CountSettings),
+            Section("The settings file of corpus.py", family_stages.CorpusSettings),
         ],
     ),
     "render-keys.md": Page(

@@ -1,8 +1,8 @@
 # Functions for the rules of family.smk.
 from lightfield.configuration import keys
-from lightfield.configuration.corpus import CORPUS_FILES, CorpusSettings
+from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.family import RECORD, outdated_members
-from lightfield.configuration.job_settings import BatchSettings, CountSettings
+from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
 from lightfield.core.names import SOFTBOXES
 
 # The names of the chosen families, by their folders.

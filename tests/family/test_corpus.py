@@ -12,12 +12,13 @@ import families
 import pytest
 from faults import CORPUS_KINDS, FAULTS, spoil
 
-from lightfield.configuration.corpus import CorpusSettings, Shares
+from lightfield.configuration.corpus import Shares
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
-from lightfield.report import corpus, status
+from lightfield.report import status
+from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.validation.corpus_integrity import corpus_faults
 
 CAUSE = "models/broken.glb: is empty; must be a model"
@@ -25,7 +26,8 @@ CAUSE = "models/broken.glb: is empty; must be a model"
 
 def make(folder, cache=None, **settings):
     settings = CorpusSettings(family="chairs", **settings)
-    return corpus.write(folder, settings, cache or folder.parent / "looks.json")
+    cache = cache or folder.parent / "looks.json"
+    return Corpus(settings=settings, folder=folder, cache=cache).run()
 
 
 def files(folder):

@@ -12,12 +12,12 @@ import pytest
 from checkouts import checkout, snakemake
 
 from lightfield.configuration.family import Family, Member, drawn, member_content, outdated_members
-from lightfield.configuration.job_settings import BatchSettings
 from lightfield.configuration.scene_yaml import check_member
 from lightfield.core.errors import UserError
 from lightfield.core.files import size_and_time
 from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.imaging.images import write_png
+from lightfield.stages.family import BatchSettings
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,10 +5,10 @@ import pytest
 
 from lightfield.configuration import keys
 from lightfield.configuration.family import Member
-from lightfield.configuration.job_settings import BatchSettings
 from lightfield.core.files import sha256
 from lightfield.geometry.lenses import from_camera
 from lightfield.imaging import images
+from lightfield.stages.family import BatchSettings
 
 # A thin pole with a wide foot, off its own origin.
 POLE = """

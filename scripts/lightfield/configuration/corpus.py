@@ -57,14 +57,3 @@ class CorpusOptions(Settings):
     shard_gigabytes: float = Field(
         1, gt=0, description="Largest size of a shard.", json_schema_extra={"unit": "GB"}
     )
-
-
-class CorpusSettings(CorpusOptions):
-    """The settings of scripts/corpus.py."""
-
-    family: str = Field(description="Name of the corpus, which is that of the family's scene YAML.")
-    members: list[str] | None = Field(
-        None,
-        description="Names of the members. Without this key, the corpus has all members that have "
-        "a record.",
-    )

@@ -21,7 +21,6 @@ from typing import Any
 import psutil
 
 from lightfield.configuration.family import Member
-from lightfield.configuration.job_settings import BatchSettings
 from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
@@ -34,6 +33,7 @@ from lightfield.core.files import (
 from lightfield.core.paths import place_in
 from lightfield.core.progress import Progress
 from lightfield.family.member import MemberBuild
+from lightfield.stages.family import BuildMembers
 from lightfield.workflow.failures import signal_cause
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 from lightfield.workflow.view_store import ViewStore
@@ -44,12 +44,13 @@ _STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _MOST_DEATHS = 3
 
 
-def run(settings: BatchSettings, record: Path, device: str, threads: int) -> None:
+def run(job: BuildMembers) -> None:
     """Build the members of a batch that are not finished, and write its record.
 
     Raises `UserError` if nothing can be written, or if the run is stopped.
     """
-    journal = _brought_journal(record, Path(settings.work))
+    settings = job.settings
+    journal = _brought_journal(job.record, Path(settings.work))
     builds = {member.name: MemberBuild(settings, member) for member in settings.members}
     leftovers.remove()
     failed: list[str] = []
@@ -65,14 +66,14 @@ def run(settings: BatchSettings, record: Path, device: str, threads: int) -> Non
         _note(journal, {"failed": name})
     started = {"started": round(time.time(), 3), "host": socket.gethostname(), "pid": os.getpid()}
     _note(journal, started)
-    while signal_number := _work(settings, journal, failed, last, device, threads):
+    while signal_number := _work(job, journal, failed, last):
         name = member_at_hand(read_json_lines(journal))
         if name is None or signal_number in _STOPS:
             raise UserError(f"killed by {signal.Signals(signal_number).name}")
         builds[name].fail(builds[name].last_stage(), signal_cause(signal_number))
         _note(journal, {"failed": name})
         failed.append(name)
-    write_json(record, _content(builds))
+    write_json(job.record, _content(builds))
     _note(journal, {"ended": round(time.time(), 3)})
 
 
@@ -98,21 +99,14 @@ def _note(journal: Path, entry: Mapping[str, Any]) -> None:
         store.send(str(journal))
 
 
-def _work(
-    settings: BatchSettings,
-    journal: Path,
-    failed: Sequence[str],
-    last: str | None,
-    device: str,
-    threads: int,
-) -> int:
+def _work(job: BuildMembers, journal: Path, failed: Sequence[str], last: str | None) -> int:
     """Let a worker build the members but for ``failed``, and the ``last`` one at the end.
 
     Returns the signal that ended the worker, or 0.
     """
-    members = [member for member in settings.members if member.name not in failed]
+    members = [member for member in job.settings.members if member.name not in failed]
     members.sort(key=lambda member: member.name == last)
-    arguments = (settings, members, journal, device, threads)
+    arguments = (job, members, journal)
     worker = get_context("spawn").Process(target=build_members, args=arguments)
     worker.start()
     worker.join()
@@ -123,20 +117,16 @@ def _work(
     return -worker.exitcode
 
 
-def build_members(
-    settings: BatchSettings, members: Sequence[Member], journal: Path, device: str, threads: int
-) -> None:
+def build_members(job: BuildMembers, members: Sequence[Member], journal: Path) -> None:
     """Build the members that are not finished, and journal each. This is the worker's process."""
-    cli.guarded(lambda: _build_members(settings, members, journal, device, threads))
+    cli.guarded(lambda: _build_members(job, members, journal))
 
 
-def _build_members(
-    settings: BatchSettings, members: Sequence[Member], journal: Path, device: str, threads: int
-) -> None:
-    builds = [MemberBuild(settings, member) for member in members]
+def _build_members(job: BuildMembers, members: Sequence[Member], journal: Path) -> None:
+    builds = [MemberBuild(job.settings, member) for member in members]
     missing = [build for build in builds if not build.is_finished()]
     progress = Progress(
-        len(missing), f"build {settings.family}", "members", already=len(builds) - len(missing)
+        len(missing), f"build {job.settings.family}", "members", already=len(builds) - len(missing)
     )
     parent = os.getppid()
     for build in missing:
@@ -144,7 +134,7 @@ def _build_members(
             raise UserError("the run has ended")
         _note(journal, {"member": build.member.name, "began": round(time.time(), 3)})
         began = time.process_time()
-        record = build.build(device, threads)
+        record = build.build(job.device, job.threads)
         _note(
             journal,
             {

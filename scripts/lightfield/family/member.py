@@ -14,7 +14,6 @@ from typing import Any
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
-from lightfield.configuration.job_settings import BatchSettings
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import LESS_MEMORY, UserError
@@ -23,6 +22,7 @@ from lightfield.formats.layout import SUMS, read_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import SPLITS, splits_content
 from lightfield.rendering import model_files
+from lightfield.stages.family import BatchSettings
 from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import datasets_of
 from lightfield.workflow.view_store import ViewStore

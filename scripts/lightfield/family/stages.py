@@ -14,7 +14,6 @@ from lightfield import export
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
 from lightfield.configuration.family import SOURCES
-from lightfield.configuration.job_settings import BatchSettings
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -25,6 +24,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import inventory_file
 from lightfield.stages.exports import ExportInstantNgp, ExportViews
+from lightfield.stages.family import BatchSettings
 from lightfield.stages.lenses import Reproject
 from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
 from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings

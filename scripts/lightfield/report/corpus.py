@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.corpus import CORPUS, PAGE, THUMBNAILS, CorpusSettings
+from lightfield.configuration.corpus import CORPUS, PAGE, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
@@ -15,6 +15,7 @@ from lightfield.formats.layout import SUMS
 from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import corpus_looks, corpus_page, corpus_shards, corpus_store
 from lightfield.report.corpus_looks import Look
+from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.workflow.member_record import MemberRecord, read_members
 from lightfield.workflow.view_store import ViewStore
 
@@ -23,19 +24,20 @@ FORMAT = "plenoforge corpus"
 _BINS = 20
 
 
-def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]:
-    """Write the corpus of the family in ``folder``. Return the content of its corpus.json.
+def write(job: Corpus) -> dict[str, Any]:
+    """Write the corpus of a family. Return the content of its corpus.json.
 
-    ``cache`` is the file that keeps the members' looks. Equal members and settings give equal
-    bytes. The sums come last: they exist only when everything else does. Raises `UserError` for a
-    member whose files are missing or damaged.
+    Equal members and settings give equal bytes. The sums come last: they exist only when everything
+    else does. Raises `UserError` for a member whose files are missing or damaged.
     """
+    folder = job.folder
+    settings = job.settings
     (folder / SUMS).unlink(missing_ok=True)
     store = ViewStore.configured()
     if store:
         corpus_store.bring(folder, settings, store)
     members = read_members(folder, settings.members)
-    looks = corpus_looks.looks(folder, members, cache)
+    looks = corpus_looks.looks(folder, members, job.cache)
     content = describe(settings, members, looks)
     write_json(folder / CORPUS, content)
     corpus_page.write(folder, content)
@@ -43,6 +45,7 @@ def write(folder: Path, settings: CorpusSettings, cache: Path) -> dict[str, Any]
     write_sums(folder, members, looks)
     if store:
         corpus_store.send(folder, store)
+    print(summary(content, folder))
     return content
 
 

@@ -5,13 +5,14 @@ Without a shared folder, members lie in the storage under their own paths.
 
 from pathlib import Path
 
-from lightfield.configuration.corpus import SHARDS, THUMBNAILS, CorpusSettings
+from lightfield.configuration.corpus import SHARDS, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report.corpus_looks import chosen_views
+from lightfield.stages.family import CorpusSettings
 from lightfield.workflow.member_record import read_member
 from lightfield.workflow.view_store import ViewStore
 

@@ -5,6 +5,7 @@ from typing import Any
 from lightfield.core.stage import Stage
 from lightfield.stages import (
     exports,
+    family,
     lenses,
     measurement,
     publishing,
@@ -52,5 +53,8 @@ STAGES: list[type[Stage[Any]]] = [
     measurement.Evaluate,
     measurement.EvaluateSurface,
     measurement.SynthesisQuality,
+    family.BuildMembers,
+    family.Corpus,
+    family.CountMembers,
 ]
 BY_NAME = {stage.name: stage for stage in STAGES}

@@ -1,0 +1,94 @@
+"""The stages that build the members of a family, collect them, and count them."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.corpus import CorpusOptions
+from lightfield.configuration.family import Draw, Member
+from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.settings import Settings
+from lightfield.core.stage import Stage, cause, option, writes
+
+
+class BatchSettings(Settings):
+    """The settings of scripts/build_members.py."""
+
+    family: str = Field(description="Name of the family's scene YAML.")
+    scene: dict[str, Any] = Field(
+        description="Content of the family's scene YAML, without the block `family`."
+    )
+    values: dict[str, Draw] = Field({}, description="As in the block `family`.")
+    members: list[Member] = Field(min_length=1, description="Members to build.")
+    preset: str = Field(
+        "full", description="Name of the preset, which becomes part of the folder's name."
+    )
+    limits: Preset = Field(Preset(), description="Limits of the preset.")
+    results: str = Field("results", description="Folder in which the datasets are built.")
+    work: str = Field("work", description="Folder for intermediate files.")
+    fingerprint: str | None = Field(
+        None,
+        description="Hash of the builder's code, or version of the importer of models. If it "
+        "changes, the members are built again.",
+    )
+    bpy: str | None = cause("Version of Blender. If it changes, the job runs again.")
+
+
+class BuildMembers(Stage[BatchSettings]):
+    """Builds a batch of a family's members: all their datasets, one member after the other."""
+
+    name = "build_members"
+    function = "lightfield.family.batch:run"
+
+    device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = option(
+        "device on which Cycles renders", "auto"
+    )
+    threads: AtLeastOne = option("CPU threads", 1)
+    record: Path = writes("JSON to write: the state of each member")
+
+
+class CorpusSettings(CorpusOptions):
+    """The settings of scripts/corpus.py."""
+
+    family: str = Field(description="Name of the corpus, which is that of the family's scene YAML.")
+    members: list[str] | None = Field(
+        None,
+        description="Names of the members. Without this key, the corpus has all members that have "
+        "a record.",
+    )
+
+
+class Corpus(Stage[CorpusSettings]):
+    """Writes a family's members as one corpus."""
+
+    name = "corpus"
+    function = "lightfield.report.corpus:write"
+
+    folder: Path = writes(
+        "folder of the family, which holds a folder for each member", positional=True
+    )
+    cache: Path = writes(
+        "JSON that keeps what was computed from the views, so that it is not computed again",
+        metavar="JSON",
+    )
+
+
+class CountSettings(Settings):
+    """The settings of scripts/count_members.py."""
+
+    family: str = Field(description="Name of the family's scene YAML.")
+    records: list[str] = Field(
+        min_length=1, description="Paths of the records of the family's batches."
+    )
+
+
+class CountMembers(Stage[CountSettings]):
+    """Counts the members of a family that are built, and fails if any has failed."""
+
+    name = "count_members"
+    function = "lightfield.family.count:count"
+
+    failed: Path = writes("text file to write: the failed members, with their errors")
+    output: Path = writes("JSON to write if no member failed")
