@@ -17,7 +17,6 @@ from lightfield.core.setting_types import (
     unique_names,
 )
 from lightfield.core.settings import Name, Settings, checked, pattern
-from lightfield.core.yaml_files import read_yaml
 
 # Folders of the project, of a user's inputs, and of programs such as Snakemake.
 _RESERVED = {
@@ -215,6 +214,9 @@ def load_config(content: Any) -> Configuration:
 
 def read_config(path: Path) -> dict[str, Any]:
     """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
+    # Only now, because stages have settings of this module, and their --help needs no YAML.
+    from lightfield.core.yaml_files import read_yaml
+
     content = read_yaml(path, path.name)
     if not isinstance(content, dict):
         raise UserError(f"{path}: must be a mapping of keys to values")

@@ -43,6 +43,7 @@ STAGES: list[type[Stage[Any]]] = [
     report.ReportFigures,
     report.ReportHtml,
     report.ReportIndex,
+    report.WriteSchemas,
     measurement.CheckDevice,
     measurement.Probe,
     measurement.Calibrate,

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import Field, PlainSerializer
 
+from lightfield.core.names import ROOT
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, option, reads, writes
 from lightfield.geometry.rigs import AnyRig, as_written
@@ -81,3 +82,12 @@ class ReportIndex(PlainStage):
 
     results: Path = reads("folder of the datasets")
     output: Path = writes("HTML file to write, in that folder")
+
+
+class WriteSchemas(PlainStage):
+    """Writes the JSON schemas, with which editors complete and check YAML files."""
+
+    name = "schema"
+    function = "lightfield.report.schemas:write"
+
+    folder: Path = writes("folder to write (default: configs/schema)", ROOT / "configs" / "schema")
