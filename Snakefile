@@ -132,7 +132,7 @@ rule all:
 
 rule report_html:
     input:
-        [dataset.page for dataset in CHOSEN],
+        [dataset.paths.page for dataset in CHOSEN],
         f"{RESULTS}/index.html",
 
 
@@ -143,5 +143,5 @@ rule smoke:
 
 rule package:
     input:
-        [dataset.package for dataset in CHOSEN],
+        [dataset.sequence_paths.package for dataset in CHOSEN],
         documents_to_publish(),

@@ -30,12 +30,12 @@ from checkouts import jobs_on
 
 from lightfield.configuration import config_file as configuration
 from lightfield.configuration import keys
+from lightfield.configuration.dataset import Dataset
 from lightfield.core.files import read_json, sha256, write_json, write_text
 from lightfield.core.names import ROOT
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
-from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import chosen_families, load_datasets
 
 SCENE = """
@@ -143,14 +143,14 @@ def a_build(views: int) -> None:
     row("run with nothing to do")
     row("plan with nothing to do", "--dry-run")
     print("| its stage | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |")
-    for stage in read_json(Path(dataset.folder, "report", "costs.json"))["stages"]:
+    for stage in read_json(Path(dataset.paths.costs))["stages"]:
         print(
             f"| {stage['stage']}, {stage['jobs']} jobs | {stage['wall_seconds']:.1f} "
             f"| {stage['cpu_seconds']:.1f} | {stage['peak_memory_bytes'] / 1e6:.0f} |"
         )
     wall, cpu, memory = job_times(Path(f"work/benchmarks/{dataset.name}/report/page.tsv"))
     print(f"| page | {wall:.1f} | {cpu:.1f} | {memory / 1e6:.0f} |")
-    page = Path(dataset.page)
+    page = Path(dataset.paths.page)
     print(f"{1000 * seconds / count:.0f} ms a view; the page has {page.stat().st_size} bytes")
 
 
@@ -217,8 +217,8 @@ def simulate() -> None:
     """Write all files of a finished build: views of one pixel, and correct records."""
     (dataset,) = chosen()
     lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin)
-    lightfield.write(f"{dataset.folder}/lightfield.json")
-    folder = Path(dataset.folder, "exr")
+    lightfield.write(dataset.paths.lightfield)
+    folder = Path(dataset.paths.views)
     folder.mkdir()
     # Views differ by the key in the header alone.
     pattern = "0" * 64
@@ -236,7 +236,7 @@ def simulate() -> None:
             files.append((f"exr/{path.name}", key, sums))
         record = bookkeeping.shard(dataset.name, "render", f"{first}-{end}")
         bookkeeping.write_shard(Path(record), files)
-    finish(dict.fromkeys(dataset.all_records, dataset.folder))
+    finish(dict.fromkeys(dataset.all_records, dataset.paths.folder))
 
 
 def simulate_family() -> None:

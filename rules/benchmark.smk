@@ -76,7 +76,7 @@ rule check_gpu:
         check=of_first("blend_check"),
         blend=of_first("blend"),
         inventory=of_first("inventory"),
-        lightfield=f"{WORK}/{{scene}}/probes.json",
+        lightfield=PATHS.probes,
         calibration=of_first("calibration"),
     output:
         multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
@@ -90,7 +90,7 @@ rule check_gpu:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=of_first("trials"),
+        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

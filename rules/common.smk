@@ -42,8 +42,8 @@ from lightfield.workflow import ledger, presence, shard_counts
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
 from lightfield.configuration.config_file import load_config
-from lightfield.configuration.dataset_paths import PICTURES, PLOTS
-from lightfield.configuration.description import Cluster
+from lightfield.configuration.dataset_paths import PICTURES, PLOTS, Paths
+from lightfield.configuration.dataset import Cluster
 from lightfield.configuration.exports import (
     MANIFEST,
     SEQUENCE_EXPORTS,
@@ -68,9 +68,7 @@ from lightfield.workflow.loading import (
     rendered_frames,
     scene_datasets,
 )
-from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
-from lightfield.formats.splits_file import SPLITS
 from lightfield.workflow.view_store import ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
@@ -120,13 +118,8 @@ SEQUENCES = (
     or "(?!)"
 )
 
-# `folder` and `work` of a Dataset, with wildcards.
-DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
-MADE = f"{WORK}/{{scene}}/{{rig}}"
-PANORAMA = f"{MADE}/panorama"
-REPROJECTED = f"{DATASET}/{{reprojection}}"
-# Each face of a cube map has one, with _f, _b, … before the suffix.
-LENS_MAP = f"{MADE}/{{reprojection}}/lens_map.npy"
+# The paths of a dataset, with wildcards.
+PATHS = Paths(RESULTS, WORK)
 LEDGER = f"{WORK}/{ledger.NAME}"
 # Damaged files are moved here, so that nobody loses anything.
 REMOVED = f"{WORK}/removed"
@@ -195,12 +188,19 @@ def reprojection_of(wildcards):
     dataset, name = dataset_of(wildcards), stage_of(wildcards)
     if name == "render":
         return None
-    return one_of(dataset.reprojections, name, dataset.folder, "reprojection of it")
+    return one_of(
+        dataset.reprojections, name, dataset.paths.folder, "reprojection of it"
+    )
 
 
 def of_dataset(attribute):
-    """Return an input function: it returns an attribute of the job's dataset."""
-    return of_each_shard(lambda wildcards: getattr(dataset_of(wildcards), attribute))
+    """Return an input function: it returns an attribute of the job's dataset.
+
+    A file that the dataset lacks is an empty list.
+    """
+    return of_each_shard(
+        lambda wildcards: getattr(dataset_of(wildcards), attribute) or []
+    )
 
 
 def stage_of(wildcards):

@@ -14,21 +14,21 @@ rule costs:
                 "reprojections": [*dataset.reprojections],
             },
         ),
-        validation=f"{DATASET}/validation.json",
+        validation=PATHS.validation,
         records=stored_records,
         published=of_dataset("published"),
-        pictures=of_dataset("pictures"),
+        pictures=PATHS.pictures,
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
     output:
-        f"{DATASET}/report/costs.json",
+        PATHS.costs,
     log:
         log_of("{scene}/{rig}/costs"),
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         # These folders hold the journals and benchmarks of all earlier runs.
-        journals=f"{MADE}/render",
+        journals=f"{PATHS.work}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
         # A calibration belongs to the preset, the scene itself to all of them.
         scene_benchmarks=lambda wildcards: [

@@ -226,8 +226,8 @@ def print_pages():
     prefix = f"{STORE}/" if STORE else ""
     pages = []
     for dataset in DATASETS.values():
-        if stored(f"{dataset.folder}/sha256sums.txt") in outputs:
-            pages.append(f"{prefix}{dataset.page}")
+        if stored(dataset.paths.sums) in outputs:
+            pages.append(f"{prefix}{dataset.paths.page}")
     if len(pages) > MOST_PAGES:
         pages = [f"{len(pages)} datasets: {prefix}{RESULTS}/index.html"]
     for page in pages:

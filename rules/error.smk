@@ -12,7 +12,7 @@ rule probe_cameras:
         model=of_first("model_record"),
         places=of_first("places"),
     output:
-        f"{WORK}/{{scene}}/probes.json",
+        PATHS.probes,
     log:
         log_of("{scene}/probe_cameras"),
     localrule: True
@@ -34,9 +34,9 @@ rule calibrate:
         check=of_first("blend_check"),
         blend=of_first("blend"),
         inventory=of_first("inventory"),
-        lightfield=f"{WORK}/{{scene}}/probes.json",
+        lightfield=PATHS.probes,
     output:
-        f"{WORK}/{{scene}}/calibration.json",
+        PATHS.calibration,
     log:
         log_of("{scene}/calibrate"),
     benchmark:
@@ -48,8 +48,8 @@ rule calibrate:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=of_first("trials"),
-        seconds=f"{WORK}/{{scene}}/calibration_seconds.json",
+        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
+        seconds=PATHS.calibration_seconds,
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
     shell:
@@ -64,7 +64,7 @@ rule measure_error:
         check=of_first("blend_check"),
         blend=of_first("blend"),
         inventory=of_first("inventory"),
-        lightfield=f"{WORK}/{{scene}}/probes.json",
+        lightfield=PATHS.probes,
         calibration=of_first("calibration"),
     output:
         multiext(
@@ -85,7 +85,7 @@ rule measure_error:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=of_first("trials"),
+        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

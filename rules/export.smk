@@ -8,10 +8,10 @@ rule export_to_instant_ngp:
     input:
         settings=export_settings,
         records=records,
-        lightfield=f"{DATASET}/{{source}}lightfield.json",
+        lightfield=PATHS.source_lightfield(),
         trained=trained_by,
     output:
-        f"{DATASET}/{{source}}transforms.json",
+        PATHS.transforms(),
     log:
         log_of("{scene}/{rig}/{source}export_instant_ngp"),
     benchmark:
@@ -33,7 +33,7 @@ rule export_sequence:
         settings=sequence_export_settings,
         views=exported_frames,
     output:
-        f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
+        PATHS.export_list(),
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:
@@ -45,7 +45,7 @@ rule export_sequence:
         mem_mb=4000,
         runtime=240,
     params:
-        rig=DATASET,
+        rig=PATHS.folder,
         folder=subpath(output[0], parent=True),
     message:
         "Exporting the sequence {wildcards.scene}/{wildcards.rig} for {wildcards.format}"
@@ -59,10 +59,10 @@ rule export:
     input:
         settings=export_settings,
         views=exported_views,
-        lightfield=f"{DATASET}/{{source}}lightfield.json",
-        dataset=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.source_lightfield(),
+        dataset=PATHS.lightfield,
     output:
-        f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
+        PATHS.export_list(),
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:

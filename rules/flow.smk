@@ -5,9 +5,9 @@ rule flow:
     input:
         # A neighbour may belong to another shard.
         records=records,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        f"{MADE}/flow/{{first}}-{{end}}.json",
+        PATHS.record("flow"),
     log:
         log_of("{scene}/{rig}/flow/{first}-{end}"),
     benchmark:
@@ -15,7 +15,7 @@ rule flow:
     resources:
         mem_mb=2000,
     params:
-        folder=f"{DATASET}/flow",
+        folder=PATHS.reprojected("flow"),
     message:
         "Computing the flow of views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}"

@@ -77,7 +77,7 @@ def restore_time(path):
 def dataset_settings(dataset, stage, content):
     """Write a dataset's settings of a stage. Return their file as an input."""
     mark_stale_files(dataset.name)
-    return settings_file(f"{dataset.work}/settings/{stage}.json", content)
+    return settings_file(dataset.paths.settings(stage), content)
 
 
 def settings_of(stage, content):
@@ -102,7 +102,7 @@ def scene_settings_of(stage, content):
     def input_function(wildcards):
         dataset = scene_of(wildcards)
         mark_stale_files(dataset.name)
-        folder = f"{dataset.scene_work}/settings"
+        folder = f"{dataset.paths.scene_work}/settings"
         return settings_file(f"{folder}/{stage}.json", content(dataset))
 
     return input_function
@@ -208,7 +208,9 @@ def listed_files(job):
         listed = content.get("files") if isinstance(content, dict) else None
         if isinstance(listed, dict):
             is_record = output.name != MANIFEST
-            folder = dataset_of(job.wildcards).folder if is_record else output.parent
+            folder = (
+                dataset_of(job.wildcards).paths.folder if is_record else output.parent
+            )
             for name, entry in listed.items():
                 digest = entry["sha256"] if is_record else entry
                 files[os.path.normpath(f"{folder}/{name}")] = digest

@@ -11,7 +11,7 @@ rule mesh:
         blend=of_dataset("blend"),
         inventory=of_dataset("inventory"),
     output:
-        f"{DATASET}/{MESH}/{MANIFEST}",
+        PATHS.mesh_list,
     log:
         log_of("{scene}/{rig}/mesh"),
     benchmark:

@@ -9,12 +9,12 @@ rule pack:
         settings=pack_settings,
         sums=packed_sums,
     output:
-        archive=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
-        card=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.json",
+        archive=PATHS.package,
+        card=PATHS.card,
     log:
         log_of("{scene}/{rig}/package"),
     params:
-        folder=f"{RESULTS}/{{scene}}/{{rig}}",
+        folder=PATHS.folder,
     message:
         "Packing {output.archive}"
     shell:
@@ -28,11 +28,11 @@ rule publish:
         settings=pack_settings,
         sums=packed_sums,
     output:
-        [f"{PUBLISHED}/{{scene}}_{{rig}}/{name}" for name in DOCUMENTS],
+        PATHS.documents,
     log:
         log_of("{scene}/{rig}/publish"),
     params:
-        folder=f"{RESULTS}/{{scene}}/{{rig}}",
+        folder=PATHS.folder,
         output=subpath(output[0], parent=True),
     message:
         "Publishing {wildcards.scene}/{wildcards.rig} in {params.output}"

@@ -9,9 +9,9 @@ rule probe:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("inventory"),
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        f"{MADE}/probe.json",
+        PATHS.probe,
     log:
         log_of("{scene}/{rig}/probe"),
     resources:

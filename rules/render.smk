@@ -10,9 +10,9 @@ ruleorder: import_views > render
 
 rule import_views:
     input:
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        f"{MADE}/render/{{first}}-{{end}}.json",
+        PATHS.record("render"),
     log:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     wildcard_constraints:
@@ -21,7 +21,7 @@ rule import_views:
     localrule: bool(STORE)
     params:
         dataset=of_dataset("imported"),
-        folder=f"{DATASET}/exr",
+        folder=PATHS.views,
     message:
         "Importing views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -36,10 +36,10 @@ rule render:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("inventory"),
-        lightfield=f"{DATASET}/lightfield.json",
-        cameras=f"{MADE}/cameras.json",
+        lightfield=PATHS.lightfield,
+        cameras=PATHS.cameras,
     output:
-        f"{MADE}/render/{{first}}-{{end}}.json",
+        PATHS.record("render"),
     log:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     benchmark:
@@ -51,8 +51,8 @@ rule render:
         gpu=GPUS,
         stall_seconds=stall_seconds,
     params:
-        folder=f"{DATASET}/exr",
-        journal=f"{MADE}/render/{{first}}-{{end}}.journal.jsonl",
+        folder=PATHS.views,
+        journal=f"{PATHS.work}/render/{{first}}-{{end}}.journal.jsonl",
         device=SETTINGS.device,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"

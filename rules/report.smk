@@ -11,7 +11,7 @@ rule panorama_lightfield:
         model=of_dataset("model_record"),
         calibration=of_dataset("calibration"),
     output:
-        f"{PANORAMA}/lightfield.json",
+        PATHS.panorama_lightfield,
     log:
         log_of("{scene}/{rig}/panorama/lightfield"),
     benchmark:
@@ -34,9 +34,9 @@ rule render_panorama:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("inventory"),
-        lightfield=f"{PANORAMA}/lightfield.json",
+        lightfield=PATHS.panorama_lightfield,
     output:
-        f"{PANORAMA}/exr/view_0000f.exr",
+        PATHS.panorama,
     log:
         log_of("{scene}/{rig}/panorama/render"),
     benchmark:
@@ -46,7 +46,7 @@ rule render_panorama:
         runtime=120,
         gpu=GPUS,
     params:
-        folder=f"{PANORAMA}/exr",
+        folder=PATHS.panorama_views,
         device=SETTINGS.device,
     message:
         "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
@@ -64,19 +64,19 @@ rule figures:
             lambda dataset: FiguresSettings(rig=dataset.placed_rig).as_json(),
         ),
         records=records,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
         panorama=of_dataset("panorama"),
     output:
         [
             report(
-                f"{DATASET}/report/{picture}.png",
+                f"{PATHS.folder}/report/{picture}.png",
                 category="{scene}",
                 subcategory="{rig}",
                 caption=f"../captions/{picture}.rst",
             )
             for picture in PICTURES
         ],
-        [f"{DATASET}/report/{plot}.svg" for plot in PLOTS],
+        [f"{PATHS.folder}/report/{plot}.svg" for plot in PLOTS],
     log:
         log_of("{scene}/{rig}/figures"),
     benchmark:
@@ -96,13 +96,13 @@ rule page:
     input:
         records=stored_records,
         published=of_dataset("published"),
-        pictures=of_dataset("pictures"),
-        validation=f"{DATASET}/validation.json",
-        costs=f"{DATASET}/report/costs.json",
+        pictures=PATHS.pictures,
+        validation=PATHS.validation,
+        costs=PATHS.costs,
         inventory=of_dataset("blend_inventory"),
         settings=page_settings,
     output:
-        f"{DATASET}/report/index.html",
+        PATHS.page,
     log:
         log_of("{scene}/{rig}/page"),
     benchmark:
@@ -123,9 +123,9 @@ rule page:
 rule index:
     input:
         settings=lambda wildcards: settings_file(
-            f"{WORK}/settings/index.json", {"pages": [d.page for d in CHOSEN]}
+            f"{WORK}/settings/index.json", {"pages": [d.paths.page for d in CHOSEN]}
         ),
-        pages=[dataset.page for dataset in CHOSEN],
+        pages=[dataset.paths.page for dataset in CHOSEN],
         corpora=corpora(),
     output:
         f"{RESULTS}/index.html",

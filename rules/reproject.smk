@@ -15,17 +15,17 @@ reproject_settings = reprojection_settings_of(
 rule reprojected_lightfield:
     input:
         settings=reproject_settings,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        f"{REPROJECTED}/lightfield.json",
+        PATHS.source_lightfield("{reprojection}/"),
     log:
         log_of("{scene}/{rig}/{reprojection}/lightfield"),
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lightfield")
     localrule: True
     params:
-        views=f"{DATASET}/exr",
-        folder=REPROJECTED,
+        views=PATHS.views,
+        folder=PATHS.reprojected(),
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
@@ -38,16 +38,16 @@ rule reprojected_lightfield:
 rule lens_map:
     input:
         settings=lens_map_settings,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        LENS_MAP,
+        PATHS.lens_map(),
     log:
         log_of("{scene}/{rig}/{reprojection}/lens_map"),
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lens_map")
     localrule: True
     params:
-        file=LENS_MAP,
+        file=PATHS.lens_map(),
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
@@ -57,21 +57,17 @@ rule lens_map:
 
 use rule lens_map as lens_maps with:
     output:
-        expand(
-            f"{MADE}/{{reprojection}}/lens_map_{{face}}.npy",
-            face=CUBE_FACES,
-            allow_missing=True,
-        ),
+        [PATHS.lens_map(face=face) for face in CUBE_FACES],
 
 
 rule reproject:
     input:
-        record=f"{MADE}/render/{{first}}-{{end}}.json",
-        lightfield=f"{DATASET}/lightfield.json",
+        record=PATHS.record("render"),
+        lightfield=PATHS.lightfield,
         lens_maps=lens_maps_of,
         settings=reproject_settings,
     output:
-        f"{MADE}/{{reprojection}}/{{first}}-{{end}}.json",
+        PATHS.record(),
     log:
         log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
     benchmark:
@@ -79,9 +75,9 @@ rule reproject:
     resources:
         mem_mb=2000,
     params:
-        views=f"{DATASET}/exr",
-        lens_map=LENS_MAP,
-        folder=REPROJECTED,
+        views=PATHS.views,
+        lens_map=PATHS.lens_map(),
+        folder=PATHS.reprojected(),
     message:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"

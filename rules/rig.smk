@@ -12,7 +12,7 @@ rule free_places:
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
     output:
-        f"{MADE}/places.json",
+        PATHS.places,
     log:
         log_of("{scene}/{rig}/free_places"),
     benchmark:
@@ -38,7 +38,7 @@ rule lightfield:
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
     output:
-        f"{DATASET}/lightfield.json",
+        PATHS.lightfield,
     log:
         log_of("{scene}/{rig}/lightfield"),
     benchmark:
@@ -62,9 +62,9 @@ rule check_cameras:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
-        f"{MADE}/cameras.json",
+        PATHS.cameras,
     log:
         log_of("{scene}/{rig}/check_cameras"),
     benchmark:
@@ -87,7 +87,7 @@ rule splits:
         settings=splits_settings,
         lightfields=split_rigs,
     output:
-        f"{RESULTS}/{{scene}}/{SPLITS}",
+        PATHS.splits,
     log:
         log_of("{scene}/splits"),
     localrule: True

@@ -8,7 +8,7 @@ rule build_scene:
     input:
         settings=scene_settings_of("build_scene", build_settings),
     output:
-        f"{WORK}/{{name}}/scene.blend",
+        PATHS.built_blend,
     log:
         log_of("{name}/build_scene"),
     benchmark:
@@ -28,8 +28,8 @@ rule import_model:
         settings=scene_settings_of("import_model", import_settings),
         model=lambda wildcards: local(scene_of(wildcards).source.model),
     output:
-        blend=f"{WORK}/{{name}}/model.blend",
-        record=f"{WORK}/{{name}}/model.json",
+        blend=PATHS.model_blend,
+        record=PATHS.model_record,
     log:
         log_of("{name}/import_model"),
     benchmark:
@@ -60,7 +60,7 @@ rule check_blend:
         ),
         blend=lambda wildcards: local(scene_of(wildcards).blend),
     output:
-        f"{WORK}/{{name}}/blend.json",
+        PATHS.blend_check,
     log:
         log_of("{name}/check_blend"),
     benchmark:
@@ -77,10 +77,10 @@ rule check_blend:
 rule inventory:
     input:
         settings=scene_settings_of("inventory", inventory_settings),
-        check=lambda wildcards: scene_of(wildcards).blend_check,
+        check=lambda wildcards: scene_of(wildcards).blend_check or [],
         blend=blend_of,
     output:
-        f"{WORK}/{{name}}/inventory.json",
+        PATHS.inventory,
     log:
         log_of("{name}/inventory"),
     benchmark:

@@ -39,7 +39,9 @@ def check_disk_space():
     """Warn of disks that this run nearly fills. Raise `UserError` for a disk that is too small."""
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if is_of(job, "render")]
-    datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
+    datasets = {
+        d.paths.folder: d for d in (dataset_of(job.wildcards) for job in renders)
+    }
     needs = []
     for dataset in datasets.values():
         views = presence.missing_views(dataset)

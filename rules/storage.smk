@@ -79,8 +79,7 @@ def bring_settings():
             dataset.places,
         ]
         for path in (*files, *dataset.published, *dataset.sequence_exports):
-            # A file that a dataset lacks is an empty list.
-            if isinstance(path, str):
+            if path is not None:
                 ViewStore(STORE).bring(path)
 
 

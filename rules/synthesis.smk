@@ -9,7 +9,7 @@ rule measure_synthesis:
         settings=settings_of("synthesis", synthesis_settings),
         records=lambda wildcards: dataset_of(wildcards).records("render"),
         truth=truth_records,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=PATHS.lightfield,
     output:
         multiext(
             f"{RESULTS}/benchmarks/synthesis/{{scene}}/{{rig}}", ".csv", ".svg", ".png"

@@ -22,8 +22,8 @@ rule validate:
         inventory=of_dataset("inventory"),
         splits=of_dataset("splits"),
     output:
-        validation=f"{DATASET}/validation.json",
-        sums=f"{MADE}/checksums.txt",
+        validation=PATHS.validation,
+        sums=PATHS.checksums,
     log:
         log_of("{scene}/{rig}/validate"),
     benchmark:
@@ -35,7 +35,7 @@ rule validate:
         mem_mb=4000,
         runtime=120,
     params:
-        dataset=DATASET,
+        dataset=PATHS.folder,
         optional=optional("inventory", "splits", clearance="cameras"),
         removed=REMOVED,
         # The storage has its own copies of what other machines made.
@@ -51,17 +51,17 @@ rule validate:
 
 rule checksums:
     input:
-        validation=f"{DATASET}/validation.json",
-        sums=f"{MADE}/checksums.txt",
+        validation=PATHS.validation,
+        sums=PATHS.checksums,
     output:
-        f"{DATASET}/sha256sums.txt",
+        PATHS.sums,
     log:
         log_of("{scene}/{rig}/checksums"),
     wildcard_constraints:
         scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
     localrule: True
     params:
-        page=f"{DATASET}/report/index.html",
+        page=PATHS.page,
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -77,8 +77,8 @@ rule validate_sequence:
         exports=sequence_exports,
         views=validated_frames,
     output:
-        validation=f"{DATASET}/validation.json",
-        sums=f"{DATASET}/sha256sums.txt",
+        validation=PATHS.validation,
+        sums=PATHS.sums,
     log:
         log_of("{scene}/{rig}/validate"),
     benchmark:
@@ -90,7 +90,7 @@ rule validate_sequence:
         mem_mb=4000,
         runtime=120,
     params:
-        rig=DATASET,
+        rig=PATHS.folder,
         removed=REMOVED,
     message:
         "Validating the sequence {wildcards.scene}/{wildcards.rig}"

@@ -13,11 +13,11 @@ import bookkeeping
 import numpy as np
 from checkouts import jobs_on, snakemake
 
+from lightfield.configuration.dataset import Dataset
 from lightfield.core.files import sha256, write_json, write_text
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import scene_datasets
 
 WHEN = 1_700_000_000
@@ -32,13 +32,13 @@ def build(folder: Path) -> list[Dataset]:
             if not (folder / name).exists():
                 _write(folder / name, number)
         sums = sorted(
-            (path.relative_to(folder / dataset.folder).as_posix(), sha256(path))
-            for path in (folder / dataset.folder).rglob("*")
+            (path.relative_to(folder / dataset.paths.folder).as_posix(), sha256(path))
+            for path in (folder / dataset.paths.folder).rglob("*")
             if path.is_file() and "report" not in path.parts and path.name != "sha256sums.txt"
         )
         text = "".join(f"{digest}  {name}\n" for name, digest in sums)
-        write_text(folder / dataset.folder / "sha256sums.txt", text)
-        write_text(folder / dataset.work / "checksums.txt", text)
+        write_text(folder / dataset.paths.sums, text)
+        write_text(folder / dataset.paths.checksums, text)
     # The plan writes the settings of every job.
     plan = snakemake(folder, "--dry-run", "--forceall", "--logger", "jobs", "--", "smoke")
     assert plan.returncode == 0, plan.stderr
@@ -46,7 +46,9 @@ def build(folder: Path) -> list[Dataset]:
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
-    shards = {record: dataset.folder for dataset in datasets for record in dataset.all_records}
+    shards = {
+        record: dataset.paths.folder for dataset in datasets for record in dataset.all_records
+    }
     bookkeeping.note_build(folder, inputs, shards, WHEN)
     return datasets
 
@@ -62,11 +64,11 @@ def planned(folder: Path, *arguments: str) -> set[str]:
 def _views(folder: Path, dataset: Dataset) -> None:
     """Write the views and their records. The views differ in colour."""
     lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin)
-    lightfield.write(folder / dataset.folder / "lightfield.json")
+    lightfield.write(folder / dataset.paths.lightfield)
     for name, reprojection in dataset.reprojections.items():
         lens = (reprojection.camera or dataset.rig.camera).make()
         made = lightfield.changed(lens, reprojection=reprojection.published)
-        made.write(folder / dataset.folder / name / "lightfield.json")
+        made.write(folder / dataset.paths.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"
         options = dataset.exports.selected[kind].recorded
@@ -74,7 +76,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     for stage in ("render", *dataset.reprojections):
         reprojection = dataset.reprojections.get(stage)
         suffix = reprojection.suffix if reprojection else ".exr"
-        images_folder = folder / dataset.folder / (stage if reprojection else "exr")
+        images_folder = folder / dataset.paths.folder / (stage if reprojection else "exr")
         for first, end in dataset.shards:
             files = [images_folder / f"{v.name}{suffix}" for v in lightfield.views[first:end]]
             for number, file in enumerate(files):
@@ -84,7 +86,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
                 else:
                     key = {images.KEY_ATTRIBUTE: stage}
                     images.write_exr(file, {"R": pixels.astype(np.float16)}, key)
-            record = folder / dataset.record(stage, first, end)
+            record = folder / dataset.paths.record(stage, first, end)
             bookkeeping.note_shard(record, images_folder, files, stage)
 
 

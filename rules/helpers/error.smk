@@ -19,7 +19,7 @@ def first_dataset(folder):
 
 def of_first(attribute):
     """Return an input function: it returns an attribute of that dataset."""
-    return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
+    return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute) or []
 
 
 def probe_settings(wildcards):

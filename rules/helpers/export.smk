@@ -4,7 +4,7 @@
 def export_of(wildcards):
     """Return the options of an export."""
     dataset = dataset_of(wildcards)
-    folder = f"{dataset.folder}/exports"
+    folder = f"{dataset.paths.folder}/exports"
     return one_of(dataset.exports.selected, wildcards.format, folder, "export of it")
 
 
@@ -35,7 +35,7 @@ def views_of_source(dataset, wildcards):
     """Return the records and light fields of a dataset's views, and of those of the source."""
     files = [*dataset.records("render"), *dataset.records(stage_of(wildcards))]
     for source in ("", wildcards.source):
-        files.append(f"{dataset.folder}/{source}lightfield.json")
+        files.append(dataset.paths.source_lightfield(source))
     return files
 
 
@@ -78,8 +78,10 @@ def sequence_export_settings(wildcards):
     settings = export_settings_of(wildcards.format)(
         options=options.model_copy(update={"sources": [source]}),
         suffix=first.reprojections[source].suffix if source != VIEWS else ".exr",
-        tested_by={d.rig_name: d.rig_home for d in testing(first, options)},
-        frames=[Path(dataset.folder).name for dataset in frames],
+        tested_by={
+            d.rig_name: d.sequence_paths.folder for d in testing(first, options)
+        },
+        frames=[Path(dataset.paths.folder).name for dataset in frames],
     )
     folder = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/exports"
     return settings_file(
@@ -99,7 +101,7 @@ def trained_by(wildcards):
 def folder_of_views(wildcards):
     """Return the folder of the views that an export reads."""
     source = wildcards.source.rstrip("/")
-    return f"{dataset_of(wildcards).folder}/{source or 'exr'}"
+    return f"{dataset_of(wildcards).paths.folder}/{source or 'exr'}"
 
 
 def export_settings(wildcards):
@@ -110,7 +112,9 @@ def export_settings(wildcards):
     if "format" in wildcards.keys():
         name = wildcards.format
         options = export_of(wildcards)
-        roles = {"tested_by": {d.rig_name: d.folder for d in tested_by(wildcards)}}
+        roles = {
+            "tested_by": {d.rig_name: d.paths.folder for d in tested_by(wildcards)}
+        }
     else:
         name = "instant_ngp"
         # A user may name a transforms.json that the scene YAML does not export.

@@ -5,7 +5,7 @@ def mesh_settings(dataset):
     """Return the settings of a dataset's meshes. Ends the run for a dataset without any."""
     if not dataset.mesh:
         sys.exit(
-            f"error: {dataset.folder}/{MESH}: the scene YAML asks for no mesh of it"
+            f"error: {dataset.paths.folder}/{MESH}: the scene YAML asks for no mesh of it"
         )
     passes = dataset.render.passes or ()
     settings = MeshSettings.of(

@@ -1,15 +1,12 @@
 # Functions for the rules of package.smk.
 
-# The folder of the scene's datasets as they are published.
-PUBLISHED = f"{RESULTS}/{{scene}}/{PUBLISHED_FOLDER}"
-
 
 def documents_to_publish():
     """Return the descriptions of the chosen datasets whose scene YAML says how to publish them."""
     files = []
     for dataset in CHOSEN:
         if load_scene(dataset.scene_name).publish:
-            files += dataset.published_documents
+            files += dataset.sequence_paths.documents
     return files
 
 
@@ -29,15 +26,15 @@ def packed_sums(wildcards):
     With a store, also return its files and their lists.
     """
     datasets = packed(wildcards)
-    files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
+    files = [dataset.paths.sums for dataset in datasets]
     if datasets[0].sequence_exports:
         files.append(datasets[0].sequence_sums)
     if STORE:
         if datasets[0].sequence_exports:
-            files.append(f"{datasets[0].rig_home}/validation.json")
+            files.append(datasets[0].sequence_paths.validation)
             files += datasets[0].sequence_exports
         for dataset in datasets:
-            files += [f"{dataset.folder}/validation.json", *dataset.published]
+            files += [dataset.paths.validation, *dataset.published]
             files += dataset.all_records
     return files
 

@@ -27,6 +27,6 @@ def probes():
             name = f"{dataset.scene_folder}/{dataset.rig_name}"
             frames_of_rig.setdefault(name, []).append(dataset)
     return [
-        (name, len(datasets), f"{datasets[0].work}/probe.json")
+        (name, len(datasets), datasets[0].paths.probe)
         for name, datasets in frames_of_rig.items()
     ]

@@ -5,7 +5,7 @@ def free_places_settings(dataset):
     """Return the settings of a random rig's places. Ends the run for another rig."""
     if not dataset.places:
         sys.exit(
-            f"error: {dataset.work}/places.json: is for rigs of type random; "
+            f"error: {dataset.paths.work}/places.json: is for rigs of type random; "
             f"{dataset.rig_name} has type {dataset.rig.type}"
         )
     settings = FreePlacesSettings.of(
@@ -36,7 +36,7 @@ def lightfield_settings(dataset):
 def split_rigs(wildcards):
     """Return the light fields of those rigs of a scene that have a split."""
     return [
-        f"{dataset.folder}/lightfield.json"
+        dataset.paths.lightfield
         for dataset in DATASETS.values()
         if dataset.scene_folder == wildcards.scene and dataset.splits
     ]

@@ -5,7 +5,7 @@ def build_settings(dataset):
     """Return the settings of a built scene. Ends the run for a scene without a builder."""
     if dataset.source.builder is None:
         sys.exit(
-            f"error: {dataset.scene_work}/scene.blend: the scene YAML has no builder that makes it"
+            f"error: {dataset.paths.scene_work}/scene.blend: the scene YAML has no builder that makes it"
         )
     settings = BuildSettings(
         builder=dataset.source.builder,
@@ -20,7 +20,7 @@ def import_settings(dataset):
     source = load_scene(dataset.scene_name).scene
     if source.model is None:
         sys.exit(
-            f"error: {dataset.scene_work}/model.blend: the scene YAML has no model that makes it"
+            f"error: {dataset.paths.scene_work}/model.blend: the scene YAML has no model that makes it"
         )
     return ImportSettings.of_source(source).as_json()
 
@@ -53,4 +53,4 @@ def inventory_settings(dataset):
 def blend_of(wildcards):
     """Return a scene's .blend. A user's own file is on the machine that runs Snakemake."""
     dataset = scene_of(wildcards)
-    return local(dataset.blend) if dataset.source.blend else dataset.blend
+    return local(dataset.blend) if dataset.source.blend else dataset.blend or []

@@ -27,7 +27,7 @@ def held_out(dataset):
 def synthesis_settings(dataset):
     """Return the settings of a measurement: the datasets to compare synthesised views with."""
     truths = held_out(dataset)
-    return SynthesisSettings(truth=[truth.folder for truth in truths]).as_json()
+    return SynthesisSettings(truth=[truth.paths.folder for truth in truths]).as_json()
 
 
 def truth_records(wildcards):

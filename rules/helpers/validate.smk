@@ -24,7 +24,7 @@ def sequence_exports(wildcards):
 def sequence_validation_settings(wildcards):
     """Return the settings file of the validation of a sequence's exports."""
     settings = SequenceValidationSettings(
-        frames=[Path(dataset.folder).name for dataset in frames_of(wildcards)],
+        frames=[Path(dataset.paths.folder).name for dataset in frames_of(wildcards)],
         exports=sequence_exports(wildcards),
     )
     folder = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings"
@@ -35,7 +35,7 @@ def verified_folders():
     """Return the folders of the chosen datasets, of sequences with exports, and of families."""
     folders = []
     for dataset in CHOSEN:
-        folders.append(dataset.folder)
+        folders.append(dataset.paths.folder)
         if dataset.sequence_exports:
-            folders.append(dataset.rig_home)
+            folders.append(dataset.sequence_paths.folder)
     return list(dict.fromkeys([*folders, *family_results()]))

@@ -247,13 +247,13 @@ def test_a_view_replaced_by_an_older_file_of_equal_size_is_imported_again(
         os.utime(view, (old_time, old_time))
     (dataset,) = scene_datasets("theirs")
     (path,) = dataset.records("render")
-    record = ShardRecord(Path(path), Path(dataset.folder, "exr"))
+    record = ShardRecord(Path(path), Path(dataset.paths.views))
     views = sorted((published / "exr").iterdir())
     for view in views:
-        imported = Path(dataset.folder, "exr", view.name)
+        imported = Path(dataset.paths.views, view.name)
         link_or_copy(view, imported)
         record.add(imported, view.name)
-    record.write(Path(dataset.folder, "exr", view.name) for view in views)
+    record.write(Path(dataset.paths.views, view.name) for view in views)
     assert outgrown_records(dataset) == []
     # As rsync does with --archive.
     new_view = tmp_path / "new.exr"

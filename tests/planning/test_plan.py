@@ -9,7 +9,7 @@ import pytest
 from checkouts import checkout, planned
 
 from lightfield.configuration.config_file import Energy
-from lightfield.configuration.description import Cluster
+from lightfield.configuration.dataset import Cluster
 from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
@@ -87,7 +87,7 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
     assert count(cluster=Cluster(jobs=100, cores=1000)) == 100
     probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
     probe |= {"views": 642, "view_seconds": [6.0], "view_bytes": [1e7]}
-    write_json(Path(sphere.work, "probe.json"), probe)
+    write_json(Path(sphere.paths.probe), probe)
     # Ten views are the fewest for which the start is a small part.
     assert count(cluster=Cluster(jobs=100, cores=16)) == 65
     assert count(cluster=Cluster(jobs=50, cores=16)) == 64
@@ -103,7 +103,7 @@ def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
     width, height = frames[0].rig.camera.resolution
     probe = {"device": "CPU", "resolution": [width, height], "samples": frames[0].render.samples}
     probe |= {"views": 9, "view_seconds": [6.0, 8.0], "view_bytes": [1e7]}
-    write_json(Path(frames[0].work, "probe.json"), probe)
+    write_json(Path(frames[0].paths.probe), probe)
     for frame in frames:
         ten_views, twenty_views = (cost("render", frame, views) for views in (10, 20))
         assert twenty_views.seconds - ten_views.seconds == pytest.approx(70)

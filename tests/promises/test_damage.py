@@ -63,7 +63,7 @@ class Damaged:
         """Return the files in which `snakemake verify` finds a fault."""
         monkeypatch.chdir(self.root)
         datasets = scene_datasets("smoke")
-        return bookkeeping.problems(dataset.folder for dataset in datasets).keys()
+        return bookkeeping.problems(dataset.paths.folder for dataset in datasets).keys()
 
 
 def has_same_bytes(first, second, path):
@@ -160,11 +160,11 @@ def test_a_scene_damaged_before_it_is_noted_is_built_again(tmp_path):
 def test_a_single_dataset_notices_a_changed_yaml_and_damage(tmp_path):
     folder = checkout(tmp_path)
     first, second, _ = simulated.build(folder)
-    targets = [f"{first.folder}/sha256sums.txt", second.package]
+    targets = [f"{first.paths.folder}/sha256sums.txt", second.sequence_paths.package]
     assert not simulated.planned(folder, targets[0])
     path = folder / "configs/scenes/smoke.yaml"
     path.write_text(re.sub(r"samples: \d+", "samples: 3", path.read_text(), count=1))
     (folder / second.inventory).write_text("{")
     os.utime(folder / second.inventory, (simulated.WHEN, simulated.WHEN))
-    expected = {f"{d.folder}/lightfield.json" for d in (first, second)} | {second.inventory}
+    expected = {f"{d.paths.folder}/lightfield.json" for d in (first, second)} | {second.inventory}
     assert expected <= simulated.planned(folder, *targets)

@@ -35,7 +35,7 @@ def copy(built, tmp_path, monkeypatch):
 
 
 def faults(datasets, work="work"):
-    return bookkeeping.problems((dataset.folder for dataset in datasets), work)
+    return bookkeeping.problems((dataset.paths.folder for dataset in datasets), work)
 
 
 def test_a_build_and_its_copy_have_no_fault(copy):
@@ -46,7 +46,7 @@ def test_a_build_and_its_copy_have_no_fault(copy):
 def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
     rng = random.Random(2)
     for dataset in copy:
-        files = [path for path in sorted(Path(dataset.folder).rglob("*")) if path.is_file()]
+        files = [path for path in sorted(Path(dataset.paths.folder).rglob("*")) if path.is_file()]
         # A copy has no checksums of its report, and none of the checksums.
         published = [path for path in files if "report" not in path.parts and path.name != SUMS]
         chosen = rng.sample(published, 6)
@@ -57,16 +57,16 @@ def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
 
 @pytest.mark.parametrize("name", ["../outside.txt", "exr/../../outside.txt", "/outside.txt", ""])
 def test_a_list_that_names_a_file_outside_the_dataset_is_refused(copy, run_program, name):
-    with Path(copy[0].folder, SUMS).open("a") as sums:
+    with Path(copy[0].paths.folder, SUMS).open("a") as sums:
         sums.write(f"{'0' * 64}  {name}\n")
-    result = run_program("verify.py", copy[0].folder, check=False)
+    result = run_program("verify.py", copy[0].paths.folder, check=False)
     assert result.returncode == 1
     (line,) = result.stderr.splitlines()
     assert re.search(rf"{SUMS}: line \d+: is {re.escape(repr(name))}; must be the path of", line)
 
 
 def test_files_behind_links_are_checked(copy, run_program, tmp_path):
-    folder = Path(copy[0].folder)
+    folder = Path(copy[0].paths.folder)
     disk = tmp_path / "disk"
     disk.mkdir()
     for path in [path for path in folder.iterdir() if path.is_dir()]:
@@ -90,10 +90,10 @@ def test_a_link_to_a_foreign_folder_is_one_fault(copy, run_program, tmp_path):
     notes.mkdir()
     for name in ("a.txt", "b.txt"):
         (notes / name).write_text("mine")
-    link = Path(copy[0].folder, "notes")
+    link = Path(copy[0].paths.folder, "notes")
     link.symlink_to(notes)
     assert faults(copy[:1]).keys() == {str(link)}
-    run_program("verify.py", copy[0].folder, "--work", "work", "--mend", check=False)
+    run_program("verify.py", copy[0].paths.folder, "--work", "work", "--mend", check=False)
     assert not link.exists()
     assert sorted(path.name for path in notes.iterdir()) == ["a.txt", "b.txt"]
 
@@ -147,24 +147,27 @@ def test_a_copy_is_checked_from_its_own_folder(one_view, monkeypatch):
 
 def test_repaired_files_are_planned_and_no_others(copy, run_program):
     first, second, third = copy
-    view = next(Path(first.folder, "exr").iterdir())
-    picture = next(Path(second.folder, "perspective").glob("*.png"))
+    view = next(Path(first.paths.folder, "exr").iterdir())
+    picture = next(Path(second.paths.folder, "perspective").glob("*.png"))
+    (lens_map,) = second.lens_maps("perspective")
+    picture_of_report = f"{first.paths.folder}/report/rig.svg"
+    record = second.records("render")[0]
     spoilt = {
-        str(view): first.record("render", *first.shards[0]),
-        str(picture): second.record("perspective", *second.shards[0]),
-        f"{second.work}/perspective/lens_map.npy": f"{second.work}/perspective/lens_map.npy",
-        f"{first.folder}/report/rig.svg": f"{first.folder}/report/rig.svg",
-        second.record("render", *second.shards[0]): second.record("render", *second.shards[0]),
+        str(view): first.records("render")[0],
+        str(picture): second.records("perspective")[0],
+        lens_map: lens_map,
+        picture_of_report: picture_of_report,
+        record: record,
     }
     rng = random.Random(3)
     for name in spoilt:
         spoil(Path(name), replace, rng)
-    Path(first.folder, "notes.txt").write_text("a stray")
-    arguments = ("verify.py", first.folder, second.folder, third.folder)
+    Path(first.paths.folder, "notes.txt").write_text("a stray")
+    arguments = ("verify.py", first.paths.folder, second.paths.folder, third.paths.folder)
     result = run_program(*arguments, "--work", "work", check=False)
     assert result.returncode == 1
     assert sorted(line.split(": ")[0] for line in result.stdout.splitlines()) == sorted(
-        [*spoilt, f"{first.folder}/notes.txt"]
+        [*spoilt, f"{first.paths.folder}/notes.txt"]
     )
     result = run_program(*arguments, "--work", "work", "--mend", check=False)
     assert result.stderr == (
@@ -172,10 +175,10 @@ def test_repaired_files_are_planned_and_no_others(copy, run_program):
     )
     planned = simulated.planned(Path(), "smoke")
     assert set(spoilt.values()) <= planned
-    assert not any(name.startswith((third.folder, third.work)) for name in planned)
+    assert not any(name.startswith((third.paths.folder, third.paths.work)) for name in planned)
     assert second.inventory not in planned and second.blend not in planned
-    assert f"{second.folder}/lightfield.json" not in planned
-    assert Path("work/removed", first.folder, "notes.txt").read_text() == "a stray"
+    assert f"{second.paths.folder}/lightfield.json" not in planned
+    assert Path("work/removed", first.paths.folder, "notes.txt").read_text() == "a stray"
 
 
 @pytest.mark.slow
@@ -188,10 +191,10 @@ def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
     scene.unlink()
     scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
     planned = simulated.planned(Path(), "smoke")
-    assert {f"{second.folder}/lightfield.json", *second.all_records} <= planned
-    others = {name for name in planned if name.startswith((first.folder, third.folder))}
+    assert {f"{second.paths.folder}/lightfield.json", *second.all_records} <= planned
+    others = {name for name in planned if name.startswith((first.paths.folder, third.paths.folder))}
     # A page shows the scene YAML.
-    assert others == {first.page, third.page}
+    assert others == {first.paths.page, third.paths.page}
     scene.write_text(text.replace("samples: 4", "samples: 2"))
     planned = simulated.planned(Path(), "smoke")
-    assert all({f"{d.folder}/lightfield.json", *d.all_records} <= planned for d in copy)
+    assert all({f"{d.paths.folder}/lightfield.json", *d.all_records} <= planned for d in copy)

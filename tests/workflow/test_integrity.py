@@ -32,7 +32,7 @@ def test_a_damaged_ledger_is_named_and_written_anew(copy):
     path.write_text("".join([lines[0].replace("0", "1", 1), *lines[1:]]))
     for dataset in copy:
         assert "work/ledger.txt" in problems_of(dataset.name)
-    absolute = Integrity(Path(copy[0].folder).absolute(), Path("work").absolute())
+    absolute = Integrity(Path(copy[0].paths.folder).absolute(), Path("work").absolute())
     damaged = next(fault for fault in absolute.faults() if fault.path.name == "ledger.txt")
     assert "1" in damaged.problem
     absolute.mend(damaged)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.configuration import scene_yaml
+from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import FORMAT, RECORD, SOURCES, Member, drawn, member_content
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.disk_space import obstacle
@@ -23,7 +24,6 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import SPLITS, splits_content
 from lightfield.rendering import model_files
 from lightfield.stages.family import BatchSettings
-from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import datasets_of
 from lightfield.workflow.view_store import ViewStore
 
@@ -208,7 +208,7 @@ class MemberBuild:
     def _remove_sums(self, datasets: list[Dataset]) -> None:
         """Remove the checksums of earlier datasets. A dataset without them is not valid."""
         for dataset in datasets:
-            Path(dataset.folder, SUMS).unlink(missing_ok=True)
+            Path(dataset.paths.sums).unlink(missing_ok=True)
 
     def fail(self, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member. Removes what is half-written of it."""
@@ -274,7 +274,7 @@ def _sum(path: Path) -> str | None:
 
 def _listing(dataset: Dataset) -> dict[str, Any]:
     """Return what the record of a member says of a valid dataset."""
-    folder = Path(dataset.folder)
+    folder = Path(dataset.paths.folder)
     sums = folder / SUMS
     split = dataset.rig.split
     size = sum((folder / name).stat().st_size for name in read_sums(sums))

@@ -12,6 +12,8 @@ from typing import Any
 
 from lightfield import export
 from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.dataset_paths import prefix_of
 from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
 from lightfield.configuration.family import SOURCES
 from lightfield.configuration.scene_yaml import Scene
@@ -32,7 +34,6 @@ from lightfield.stages.views import RenderShard
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
 from lightfield.validation.validate import validate
-from lightfield.workflow.dataset import Dataset
 
 
 class Stages:
@@ -60,9 +61,10 @@ class Stages:
         self.stage = ""
         self.seconds: dict[str, float] = {}
         first = datasets[0]
-        self.blend = Path(str(first.blend))
-        self.inventory = Path(str(first.inventory))
-        self.model_record = Path(str(first.model_record)) if first.source.model else None
+        paths = first.paths
+        self.blend = Path(paths.model_blend if first.source.model else paths.built_blend)
+        self.inventory = Path(paths.inventory)
+        self.model_record = Path(first.model_record) if first.model_record else None
 
     @contextmanager
     def _stage(self, name: str) -> Iterator[None]:
@@ -114,8 +116,8 @@ class Stages:
             )
 
     def _place_cameras(self, dataset: Dataset) -> None:
-        places = Path(str(dataset.places)) if dataset.places else None
-        lightfield = Path(dataset.folder, "lightfield.json")
+        places = Path(dataset.places) if dataset.places else None
+        lightfield = Path(dataset.paths.lightfield)
         if places:
             with self._stage("free_places"):
                 settings = FreePlacesSettings.of(rig=dataset.rig, frame=dataset.source.frame)
@@ -134,7 +136,7 @@ class Stages:
             CheckCameras(
                 blend=self.blend,
                 lightfield=lightfield,
-                output=Path(str(dataset.cameras)),
+                output=Path(dataset.paths.cameras),
             ).run()
 
     def _render(self, dataset: Dataset) -> None:
@@ -142,9 +144,9 @@ class Stages:
             (record,) = dataset.records("render")
             RenderShard(
                 blend=self.blend,
-                lightfield=Path(dataset.folder, "lightfield.json"),
+                lightfield=Path(dataset.paths.lightfield),
                 inventory=self.inventory,
-                output=Path(dataset.folder, "exr"),
+                output=Path(dataset.paths.views),
                 record=Path(record),
                 journal=Path(record).with_suffix(".journal.jsonl"),
                 device=self.device,
@@ -155,11 +157,11 @@ class Stages:
         """Make the images of a reprojection, and its lightfield.json."""
         (source_record,) = dataset.records("render")
         (record,) = dataset.records(name)
-        folder = Path(dataset.folder, name)
+        folder = Path(dataset.paths.reprojected(name))
         Reproject(
             settings=dataset.reprojections[name],
-            input_cfg=Path(dataset.folder, "lightfield.json"),
-            input_dir=Path(dataset.folder, "exr"),
+            input_cfg=Path(dataset.paths.lightfield),
+            input_dir=Path(dataset.paths.views),
             output_dir=folder,
             output_cfg=folder / "lightfield.json",
             source_record=Path(source_record),
@@ -173,10 +175,10 @@ class Stages:
         if not with_split:
             return None
         lightfields = {
-            dataset.rig_folder: LightField.read(Path(dataset.folder, "lightfield.json"))
+            dataset.rig_folder: LightField.read(Path(dataset.paths.lightfield))
             for dataset in with_split
         }
-        path = Path(str(with_split[0].splits))
+        path = Path(with_split[0].paths.splits)
         write_json(path, splits_content(lightfields))
         return path
 
@@ -187,15 +189,15 @@ class Stages:
                 self._export_source(dataset, name, options, source)
 
     def _export_source(self, dataset: Dataset, name: str, options: Export, source: str) -> None:
-        folder = Path(dataset.folder, "" if source == VIEWS else source)
+        folder = Path(dataset.paths.folder, prefix_of(source))
         roles: dict[str, Any] = {}
         if isinstance(options, InstantNgp):
             if dataset.trained_by:
-                rig = Path(dataset.folder).parent / dataset.trained_by
-                trained = rig / ("" if source == VIEWS else source) / "transforms.json"
+                rig = Path(dataset.paths.scene_results, dataset.trained_by)
+                trained = rig / prefix_of(source) / "transforms.json"
                 roles["trained_by"] = str(trained)
         elif options.is_for_training:
-            rigs = Path(dataset.folder).parent
+            rigs = Path(dataset.paths.scene_results)
             roles["tested_by"] = {rig: str(rigs / rig) for rig in dataset.tested_by}
         is_rendered = source == VIEWS
         settings: Any = export_settings_of(name).of(
@@ -208,13 +210,15 @@ class Stages:
                 settings=settings,
                 input_cfg=folder / "lightfield.json",
                 output=folder / "transforms.json",
-                image_dir=Path(dataset.folder, "exr" if is_rendered else source),
+                image_dir=Path(
+                    dataset.paths.views if is_rendered else dataset.paths.reprojected(source)
+                ),
             ).run()
         else:
             ExportViews(
                 settings=settings,
                 format=name,
-                dataset=Path(dataset.folder),
+                dataset=Path(dataset.paths.folder),
                 output=folder / export.FOLDER / name,
             ).run()
 
@@ -223,7 +227,7 @@ class Stages:
 
         Raises `UserError` with the first problems if it is not valid.
         """
-        folder = Path(dataset.folder)
+        folder = Path(dataset.paths.folder)
         reprojections = list(dataset.reprojections)
         export_lists = [Path(path).resolve() for path in dataset.export_lists]
         removed = Path(self.settings.work, "removed")
@@ -232,7 +236,7 @@ class Stages:
             folder,
             reprojections,
             [Path(record) for record in dataset.all_records],
-            Path(str(dataset.cameras)),
+            Path(dataset.paths.cameras),
             self.inventory,
             1,
             MANIFESTS,

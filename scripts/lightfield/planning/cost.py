@@ -24,7 +24,7 @@ from lightfield.formats import light_groups, passes
 from lightfield.planning import sampling
 
 if TYPE_CHECKING:
-    from lightfield.configuration.dataset_paths import DatasetPaths
+    from lightfield.configuration.dataset import Dataset
 
 # What was measured. Seconds are those of one core of a 2-core x86-64 machine, most of them in the
 # garden, and bytes are bpy 5.0's. Reading and reprojection: benchmarks/reprojection.py with batches
@@ -124,7 +124,7 @@ _BLENDER = Cost(START_UP_SECONDS)
 
 def cost(
     stage: str,
-    dataset: DatasetPaths | None = None,
+    dataset: Dataset | None = None,
     views: int | None = None,
     reprojection: str = "",
 ) -> Cost:
@@ -140,13 +140,13 @@ def cost(
     return _STAGES[stage](dataset, dataset.view_count if views is None else views, reprojection)
 
 
-def view_cost(dataset: DatasetPaths) -> Cost:
+def view_cost(dataset: Dataset) -> Cost:
     """Return the cost of a rendered view, its flow and reprojections, without starts of jobs."""
     reprojected = (_reprojected_view(dataset, name) for name in dataset.reprojections)
     return sum(reprojected, _rendered_view(dataset) + _flow_of_view(dataset))
 
 
-def members_cost(datasets: Iterable[DatasetPaths], members: int) -> Cost:
+def members_cost(datasets: Iterable[Dataset], members: int) -> Cost:
     """Return the cost of a job that builds members of a family, each with these ``datasets``."""
     member = Cost(_MEMBER_SECONDS)
     for dataset in datasets:
@@ -179,7 +179,7 @@ def temporary_bytes(pixels: int, groups: int) -> int:
     return pixels * (_PASSES_PIXEL_BYTES + groups * _GROUP_PASS_PIXEL_BYTES)
 
 
-def light_group_count(dataset: DatasetPaths) -> int:
+def light_group_count(dataset: Dataset) -> int:
     """Return the number of light groups, by the scene YAML or the inventory, or as a guess."""
     setting = dataset.render.light_groups
     if setting is None:
@@ -196,7 +196,7 @@ def light_group_count(dataset: DatasetPaths) -> int:
 # Shards.
 
 
-def shard_count(dataset: DatasetPaths) -> int:
+def shard_count(dataset: Dataset) -> int:
     """Return how many shards a dataset gets before the first is rendered.
 
     Shards are as short as possible, so that many processes can work at once. But start-up must stay
@@ -224,7 +224,7 @@ def shard_threads(cores: int, shards: int, need: int, available: int) -> int:
     return max(1, cores // max(1, shards), math.ceil(cores / shards_that_fit))
 
 
-def _planned_view_seconds(dataset: DatasetPaths) -> float:
+def _planned_view_seconds(dataset: Dataset) -> float:
     """Return the seconds for a view without a probe, a calibration, and denoising."""
     if dataset.imported:
         reprojected = [_reprojected_view(dataset, name) for name in dataset.reprojections]
@@ -275,7 +275,7 @@ def read_probe(path: Path | str) -> ProbedViews:
         return ProbedViews(views, (width, height), samples, device, tuple(seconds), tuple(sizes))
 
 
-def _probe_of(dataset: DatasetPaths) -> ProbedViews | None:
+def _probe_of(dataset: Dataset) -> ProbedViews | None:
     """Return the probe of a dataset's settings on the processor. None without a valid one.
 
     The probe of a sequence's first frame counts for all frames.
@@ -299,7 +299,7 @@ def _known_probe(path: Path, _changed: int) -> ProbedViews:
 # The views of a dataset, one at a time.
 
 
-def _rendered_view(dataset: DatasetPaths) -> Cost:
+def _rendered_view(dataset: Dataset) -> Cost:
     """Return the cost of a rendered view with its passes, by a probe or as a guess."""
     memory = Cost(memory_bytes=_memory(dataset, dataset.pixels))
     if probe := _probe_of(dataset):
@@ -313,16 +313,16 @@ def _rendered_view(dataset: DatasetPaths) -> Cost:
     return Cost(seconds, disk_bytes=dataset.pixels * pixel_bytes * COMPRESSED) + memory
 
 
-def _imported_view(dataset: DatasetPaths) -> Cost:
+def _imported_view(dataset: Dataset) -> Cost:
     return Cost(dataset.pixels * READ_SECONDS)
 
 
-def _flow_of_view(dataset: DatasetPaths) -> Cost:
+def _flow_of_view(dataset: Dataset) -> Cost:
     size = passes.FLOW.bytes * COMPRESSED * dataset.pixels if dataset.flow else 0.0
     return Cost(disk_bytes=size)
 
 
-def _reprojected_view(dataset: DatasetPaths, name: str) -> Cost:
+def _reprojected_view(dataset: Dataset, name: str) -> Cost:
     """Return the cost to read a view, to reproject it, and to develop it."""
     reprojection = dataset.reprojections[name]
     all_groups = light_group_count(dataset)
@@ -360,7 +360,7 @@ def _developed_bytes(reprojection: Reprojection) -> float:
     return _NOISY_BYTES * reprojection.bits / 8 + weights
 
 
-def _memory(dataset: DatasetPaths, pixels: int) -> int:
+def _memory(dataset: Dataset, pixels: int) -> int:
     """Return the memory of a process that renders views of this many pixels."""
     try:
         scene = int(_SCENE_RESERVE * _content(dataset.inventory)["memory_bytes"])
@@ -371,13 +371,13 @@ def _memory(dataset: DatasetPaths, pixels: int) -> int:
     return rendering_memory(scene, pixels, denoise, light_group_count(dataset))
 
 
-def _sample_seconds(dataset: DatasetPaths) -> float:
+def _sample_seconds(dataset: Dataset) -> float:
     """Return the seconds for a sample of a pixel."""
     is_moving = dataset.render.camera_motion is not None
     return SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1)
 
 
-def _planned_samples(dataset: DatasetPaths) -> int:
+def _planned_samples(dataset: Dataset) -> int:
     """Return a pixel's samples. With a target error, or the .blend's own, it is a fixed guess."""
     render = dataset.render
     if isinstance(render.samples, int):
@@ -385,7 +385,7 @@ def _planned_samples(dataset: DatasetPaths) -> int:
     return min(render.most_samples or _GUESSED_SAMPLES, _GUESSED_SAMPLES)
 
 
-def _cost_samples(dataset: DatasetPaths) -> float:
+def _cost_samples(dataset: Dataset) -> float:
     """Return a pixel's cost in samples, with denoising, by the calibration if it has run."""
     try:
         return float(_content(dataset.calibration)["cost_samples"])
@@ -394,22 +394,22 @@ def _cost_samples(dataset: DatasetPaths) -> float:
         return cost_in_samples(_planned_samples(dataset), dataset.render.denoise)
 
 
-def _reprojected_pixels(dataset: DatasetPaths, name: str) -> int:
+def _reprojected_pixels(dataset: Dataset, name: str) -> int:
     """Return the pixels of a view's reprojection. A cube map has six images."""
     camera = dataset.reprojections[name].camera or dataset.rig.camera
     return math.prod(camera.resolution) * len(dataset.lens_maps(name))
 
 
-def _all_pixels(dataset: DatasetPaths) -> int:
+def _all_pixels(dataset: Dataset) -> int:
     """Return the pixels of a view and its reprojections."""
     return dataset.pixels + sum(
         _reprojected_pixels(dataset, name) for name in dataset.reprojections
     )
 
 
-def _content(path: str | list[str]) -> Any:
+def _content(path: str | None) -> Any:
     """Return the content of a JSON file. Raises OSError if the dataset has no such file."""
-    if not isinstance(path, str):
+    if path is None:
         raise FileNotFoundError
     return _known_content(path, Path(path).stat().st_mtime_ns)
 
@@ -423,25 +423,25 @@ def _known_content(path: str, _changed: int) -> Any:
 # The other stages of a dataset.
 
 
-def _checks(dataset: DatasetPaths) -> Cost:
+def _checks(dataset: Dataset) -> Cost:
     """Return the cost to validate or export all views and reprojections."""
     return Cost(dataset.view_count * _all_pixels(dataset) * CHECK_SECONDS)
 
 
-def _pictures(dataset: DatasetPaths) -> Cost:
+def _pictures(dataset: Dataset) -> Cost:
     """Return the cost to draw the figures, or to write the page."""
     shown_views = min(dataset.view_count, _MOST_SHOWN_VIEWS)
     return Cost(shown_views * _all_pixels(dataset) * REPORT_SECONDS)
 
 
-def _panorama(dataset: DatasetPaths) -> Cost:
+def _panorama(dataset: Dataset) -> Cost:
     """Return the cost of the panorama, which is twice as wide as high."""
     pixels = dataset.panorama_width**2 // 2
     seconds = _rendered_view(dataset).seconds * pixels / dataset.pixels
     return Cost(seconds, _memory(dataset, pixels))
 
 
-def _calibration(dataset: DatasetPaths) -> Cost:
+def _calibration(dataset: Dataset) -> Cost:
     """Return the cost of the calibration of a scene, whose first rig's dataset this is.
 
     The estimate takes the error of N samples a pixel as 1 / N. It is 0.4 / N in the courtyard,
@@ -478,7 +478,7 @@ _BLENDER_STAGES = (
     "probe_cameras",
 )
 # The cost of a job, from its dataset, its number of views, and the name of its reprojection.
-_STAGES: dict[str, Callable[[DatasetPaths, int, str], Cost]] = {
+_STAGES: dict[str, Callable[[Dataset, int, str], Cost]] = {
     "calibrate": lambda dataset, views, name: _calibration(dataset),
     "render": lambda dataset, views, name: _BLENDER + views * _rendered_view(dataset),
     "import_views": lambda dataset, views, name: _JOB + views * _imported_view(dataset),

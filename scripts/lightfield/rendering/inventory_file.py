@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.configuration import scene_yaml
+from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -27,7 +28,6 @@ from lightfield.rendering import (
 )
 from lightfield.rendering.inventory import FEATURES, inventory
 from lightfield.stages.scene import Inventory
-from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.loading import rendered_frames, scene_datasets
 from lightfield.workflow.view_store import ViewStore
 

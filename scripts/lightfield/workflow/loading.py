@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Configuration, Preset
-from lightfield.configuration.description import Cluster
+from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CHOSEN, Render
@@ -20,7 +20,7 @@ from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
-from lightfield.workflow.dataset import Dataset
+from lightfield.workflow.shard_counts import shard_count
 
 # A rig whose split is one of these tests what is trained on another rig.
 _TESTED_WITH = ("validation", "test")
@@ -132,7 +132,7 @@ def datasets_of(
 ) -> list[Dataset]:
     """Resolve every dataset of a scene as it is ``written``, under the ``limits`` of a preset.
 
-    ``places`` are fields of `Description`: folders, shards, the cluster, and the member.
+    ``places`` are fields of `Dataset`: folders, shards, the cluster, and the member.
     """
     source = written.scene
     if source.blend:
@@ -156,6 +156,7 @@ def datasets_of(
                 exports=_exports_of(rig, written, reprojections),
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
+                shard_count=shard_count,
                 **_split_partners(rig, written, folder.removeprefix(name)),
                 **places,
             )
@@ -229,7 +230,7 @@ def _has_panorama(rig: Rig, written: scene_yaml.Scene) -> bool:
 
 
 def _split_partners(rig: Rig, written: scene_yaml.Scene, frame_folder: str) -> dict[str, Any]:
-    """Return `Description.tested_by` of a rig that trains, or `trained_by` of one that tests."""
+    """Return `Dataset.tested_by` of a rig that trains, or `trained_by` of one that tests."""
     split_of_rig = {name: other_rig.split for name, other_rig in written.rigs.items()}
     if rig.split == "train":
         testing = [name for name, split in split_of_rig.items() if split in _TESTED_WITH]

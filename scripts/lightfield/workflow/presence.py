@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.configuration import scene_yaml
+from lightfield.configuration.dataset import Dataset
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, is_outdated, size_and_time, unreadable
 from lightfield.workflow import shard_files
-from lightfield.workflow.dataset import Dataset
 from lightfield.workflow.view_store import ViewStore
 
 # Some file systems keep times to two seconds.
@@ -19,7 +19,7 @@ _TIME_PRECISION_NS = 2 * 10**9
 
 def missing_views(dataset: Dataset) -> int:
     """Return how many views do not exist yet."""
-    existing = sum(entry.name.endswith(".exr") for entry in _entries(dataset.folder, "exr"))
+    existing = sum(entry.name.endswith(".exr") for entry in _entries(dataset.paths.folder, "exr"))
     return max(0, dataset.view_count - existing)
 
 
@@ -27,9 +27,9 @@ def broken_files(dataset: Dataset) -> Iterator[tuple[str, str]]:
     """Yield each view and journal that cannot be read as a file, and why."""
     entries = []
     for name in dataset.image_folders:
-        entries += _entries(dataset.folder, name)
+        entries += _entries(dataset.paths.folder, name)
     for stage in dataset.stages:
-        entries += _entries(dataset.work, stage)
+        entries += _entries(dataset.paths.work, stage)
     for entry in entries:
         is_view_or_journal = entry.name.endswith((".exr", ".png", ".jsonl"))
         if is_view_or_journal and (problem := unreadable(entry.path)):
@@ -49,13 +49,13 @@ def _is_outgrown(dataset: Dataset, record: Path) -> bool:
     The imported file has the size and time of its source, but a source may be replaced by an older
     file. A source file that no longer exists does not count, because the import has its copy.
     """
-    sizes = shard_files.recorded_sizes(record, dataset.folder)
+    sizes = shard_files.recorded_sizes(record, dataset.paths.folder)
     if not sizes:
         return False
     import_time = record.stat().st_mtime_ns
     for name, size in sizes.items():
         source = size_and_time(Path(str(dataset.imported), name))
-        imported = size_and_time(Path(dataset.folder, name))
+        imported = size_and_time(Path(dataset.paths.folder, name))
         if source is None or imported is None:
             continue
         source_size, source_time = source
@@ -82,7 +82,7 @@ def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
                 return True
         return False
 
-    return is_outdated(Path(str(dataset.inventory)), differs)
+    return is_outdated(Path(dataset.paths.inventory), differs)
 
 
 def model_changed(dataset: Dataset) -> bool:
@@ -91,7 +91,7 @@ def model_changed(dataset: Dataset) -> bool:
         return False
     home = Path(dataset.source.model).parent
     return is_outdated(
-        Path(str(dataset.model_record)),
+        Path(dataset.paths.model_record),
         lambda record: any(_has_changed(home, file) for file in record["external_files"]),
     )
 
@@ -132,7 +132,7 @@ def check_external_files(dataset: Dataset) -> None:
     if not source.blend or source.allow_missing:
         return
     try:
-        inventory = json.loads(Path(str(dataset.inventory)).read_bytes())
+        inventory = json.loads(Path(dataset.paths.inventory).read_bytes())
         home = Path(source.blend).parent
         paths = [
             Path(os.path.normpath(home / file["path"]))

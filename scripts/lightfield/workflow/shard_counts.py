@@ -1,4 +1,4 @@
-"""Notes the number of shards of each dataset when the first shard is rendered.
+"""The number of shards of each dataset. It is noted when the first shard is rendered.
 
 In work/shards.json, "datasets" has the "views" and "shards" of each dataset, and "sha256" is the
 checksum of "datasets". A damaged file is ignored. The count depends on --jobs or a probe, which may
@@ -7,13 +7,24 @@ change later, or be unknown to a job. So a dataset that was begun keeps its coun
 
 import hashlib
 import json
+import math
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration.dataset import Dataset
 from lightfield.core.files import DAMAGE, write_json_if_changed
+from lightfield.planning import cost
 
 NAME = "shards.json"
+
+
+def shard_count(dataset: Dataset) -> int:
+    """Return the number of shards of a dataset. One that was begun keeps its number."""
+    if dataset.views_per_shard != "auto":
+        return math.ceil(dataset.view_count / dataset.views_per_shard)
+    noted_count = noted(dataset.work_root, dataset.name, dataset.view_count)
+    return noted_count or cost.shard_count(dataset)
 
 
 def noted(work: str, dataset: str, views: int) -> int | None:

@@ -1,0 +1,331 @@
+"""A dataset: what is rendered, what the views become, and the files of both."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from lightfield.configuration import scene_yaml
+from lightfield.configuration.capture import Capture
+from lightfield.configuration.config_file import Preset
+from lightfield.configuration.dataset_paths import Paths, prefix_of
+from lightfield.configuration.exports import MANIFEST, Exports
+from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
+from lightfield.formats import passes
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.geometry.rigs import BlendCamera, Random, Rig
+from lightfield.geometry.rigs.split_setting import PARTS
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster that renders: how many jobs run at once, and the cores of each job."""
+
+    jobs: int
+    cores: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dataset(Capture):
+    """One scene seen by one rig, with every default filled in and the preset applied.
+
+    It is made shard by shard. ``rig_folder`` is the rig's name. In a sequence the frame's folder
+    follows, as in LFSphere/f00001. ``paths`` says where all files lie. A property with the same
+    name is None for a dataset that lacks the file.
+    """
+
+    preset: str
+    rig_name: str
+    rig_folder: str
+    reprojections: dict[str, Reprojection]
+    flow: scene_yaml.Flow | None
+    mesh: scene_yaml.MeshFiles | None
+    exports: Exports
+    # Whether the report shows a panorama from the rig's centre.
+    has_panorama: bool
+    limits: Preset
+    # Returns the number of shards, which depends on costs and on earlier runs.
+    shard_count: Callable[["Dataset"], int]
+    # The folders of the rigs that test what is trained on this rig.
+    tested_by: tuple[str, ...] = ()
+    # The folder of the rig that trains what this rig tests.
+    trained_by: str | None = None
+    results_root: str = "results"
+    work_root: str = "work"
+    views_per_shard: int | Literal["auto"] = "auto"
+    # None if this machine renders.
+    cluster: Cluster | None = None
+    # The member of a family of scenes whose dataset this is.
+    member: str | None = None
+
+    @property
+    def scene_folder(self) -> str:
+        """The folder of the scene under its preset: garden, garden_tiny, or garden_tiny/0007."""
+        is_full = self.preset == "full"
+        folder = self.scene_name if is_full else f"{self.scene_name}_{self.preset}"
+        return f"{folder}/{self.member}" if self.member else folder
+
+    @property
+    def name(self) -> str:
+        """Scene and rig, as in garden_tiny/LFSphere."""
+        return f"{self.scene_folder}/{self.rig_folder}"
+
+    @cached_property
+    def paths(self) -> Paths:
+        """Where the dataset's files lie."""
+        return self._paths_of(self.rig_folder)
+
+    @property
+    def sequence_paths(self) -> Paths:
+        """Where the files of the whole sequence lie, whose frames are datasets."""
+        return self._paths_of(self.rig_name)
+
+    def _paths_of(self, rig: str) -> Paths:
+        # Each member of a family has a scene of its own. Presets share one.
+        name = self.scene_folder if self.member else self.scene_name
+        return Paths(self.results_root, self.work_root, self.scene_folder, rig, name)
+
+    @cached_property
+    def view_count(self) -> int:
+        """Number of views of the rig."""
+        return self.rig.view_count
+
+    @property
+    def pixels(self) -> int:
+        """The number of pixels of a view."""
+        return math.prod(self.rig.camera.resolution)
+
+    @property
+    def panorama_width(self) -> int:
+        """The panorama's width: twice a 180 degree fisheye's angular resolution, at most 4096."""
+        return min(4 * self.rig.camera.resolution[0], 4096)
+
+    # Files that a dataset may lack.
+
+    @property
+    def blend(self) -> str | None:
+        """The .blend of a builder, of a model, or of the user. An import has none."""
+        if self.imported:
+            return None
+        if self.source.model:
+            return self.paths.model_blend
+        return self.source.blend or self.paths.built_blend
+
+    @property
+    def blend_check(self) -> str | None:
+        """The proof that the user's .blend has the recorded SHA-256. A built scene needs none."""
+        return self.paths.blend_check if self.source.blend else None
+
+    @property
+    def model_record(self) -> str | None:
+        return self.paths.model_record if self.source.model else None
+
+    @property
+    def inventory(self) -> str | None:
+        """The list of what the scene contains. An import has none."""
+        return None if self.imported else self.paths.inventory
+
+    @property
+    def blend_inventory(self) -> str | None:
+        """The inventory of the user's own .blend, on which its datasets depend."""
+        return self.inventory if self.source.blend else None
+
+    @property
+    def lightfield_inventory(self) -> str | None:
+        """The inventory on which lightfield.json depends: also for the names of light groups."""
+        return self.inventory if self.render.light_groups else self.blend_inventory
+
+    @property
+    def calibration(self) -> str | None:
+        """The settings chosen for the target error under the preset, if the scene has one."""
+        return None if self.render.target_error is None else self.paths.calibration
+
+    @property
+    def places(self) -> str | None:
+        """The free places for a random rig's cameras. Other rigs need no such file."""
+        return self.paths.places if isinstance(self.rig, Random) else None
+
+    @property
+    def cameras(self) -> str | None:
+        """The list of what surrounds each camera. An import has none."""
+        return None if self.imported else self.paths.cameras
+
+    @property
+    def panorama(self) -> str | None:
+        """The report's panorama. An import has none, because it has no scene to render."""
+        return self.paths.panorama if self.has_panorama and not self.imported else None
+
+    @property
+    def splits(self) -> str | None:
+        """The list of the views that train, validate and test, if this rig has a split."""
+        return self.paths.splits if self.rig.split else None
+
+    @property
+    def mesh_list(self) -> str | None:
+        return self.paths.mesh_list if self.mesh else None
+
+    @property
+    def sequence_sums(self) -> str | None:
+        """The checksums of the exports of the whole sequence, if it has any."""
+        return self.sequence_paths.sums if self.sequence_exports else None
+
+    # Files of which there are several.
+
+    @cached_property
+    def shards(self) -> list[tuple[int, int]]:
+        """The views in runs (first, end) of nearly equal length."""
+        count = self.shard_count(self)
+        bounds = [self.view_count * number // count for number in range(count + 1)]
+        return list(pairwise(bounds))
+
+    @property
+    def stages(self) -> list[str]:
+        """The stages that make the dataset's images, shard by shard."""
+        stages = ["render", *self.reprojections]
+        if self.flow:
+            stages.append(passes.FLOW.name)
+        return stages
+
+    def records(self, stage: str) -> list[str]:
+        """Return the records of all shards at one of the ``stages``."""
+        return [self.paths.record(stage, first, end) for first, end in self.shards]
+
+    @property
+    def all_records(self) -> list[str]:
+        """The records of all stages."""
+        return [file for stage in self.stages for file in self.records(stage)]
+
+    def lens_maps(self, name: str) -> list[str]:
+        """Return the lens maps of a reprojection: one, or one for each face of a cube map."""
+        faces = CUBE_FACES if self.reprojections[name].cube_map else ("",)
+        return [self.paths.lens_map(name, face) for face in faces]
+
+    @property
+    def lightfields(self) -> list[str]:
+        """The lightfield.json of the dataset and of each of its reprojections."""
+        prefixes = ["", *map(prefix_of, self.reprojections)]
+        return [self.paths.source_lightfield(prefix) for prefix in prefixes]
+
+    @property
+    def image_folders(self) -> list[str]:
+        """The names of the folders that hold views, their passes and reprojections."""
+        folders = ["exr", *(view_pass.name for view_pass in self.render.selected_passes)]
+        if self.render.light_groups:
+            # Only lightfield.json names all of them.
+            present = Path(self.paths.folder).glob(f"{passes.GROUP_PREFIX}*")
+            folders = list(dict.fromkeys([*folders, *sorted(path.name for path in present)]))
+        if self.flow:
+            folders.append(passes.FLOW.name)
+        folders += self.reprojections
+        for name, reprojection in self.reprojections.items():
+            for pass_name in reprojection.passes:
+                if pass_name == LIGHT_GROUPS:
+                    groups = [each for each in folders if each.startswith(passes.GROUP_PREFIX)]
+                    folders += [f"{name}/{group}" for group in groups]
+                else:
+                    folders.append(f"{name}/{pass_name}")
+        return folders
+
+    @property
+    def exported(self) -> list[str]:
+        """The file of each export and source that its job writes last."""
+        return [
+            self.paths.transforms(prefix_of(source))
+            if name == "instant_ngp"
+            else self.paths.export_list(name, prefix_of(source))
+            for name, export in self.exports.selected.items()
+            if not export.is_of_sequence
+            for source in export.sources
+        ]
+
+    @property
+    def sequence_exports(self) -> list[str]:
+        """The list of each export that is made of the whole sequence, which all frames share."""
+        return [
+            self.sequence_paths.export_list(name, prefix_of(source))
+            for name, export in self.exports.selected.items()
+            if export.is_of_sequence
+            for source in export.sources
+        ]
+
+    @property
+    def export_lists(self) -> list[str]:
+        """All files in which exports list their files. With a split, each part has one, too."""
+        lists = [*self.exported, *_present(self.mesh_list)]
+        if self.rig.split:
+            for path in self.exported:
+                if not path.endswith(MANIFEST):
+                    stem = path.removesuffix(".json")
+                    lists += [f"{stem}_{part}.json" for part in PARTS]
+        return lists
+
+    @property
+    def published(self) -> list[str]:
+        """The files that have a job each: all but views and reports."""
+        return [*self.lightfields, *self.exported, *_present(self.mesh_list)]
+
+    @property
+    def files(self) -> list[str]:
+        """All files of the finished dataset, as a target rule names them.
+
+        The records are among them, although other files depend on them: Snakemake makes a missing
+        file again only if a target rule names it.
+        """
+        paths = self.paths
+        return [
+            paths.validation,
+            paths.sums,
+            *_present(self.splits),
+            *self.published,
+            *self.sequence_exports,
+            *_present(self.sequence_sums),
+            *paths.pictures,
+            paths.costs,
+            paths.page,
+            *self.all_records,
+        ]
+
+    @property
+    def intermediates(self) -> list[str]:
+        """The intermediate files, which a target rule names, too: a missing one is made again."""
+        files = _present(
+            self.blend_check or self.blend,
+            self.model_record,
+            self.inventory,
+            self.calibration,
+            self.places,
+            self.cameras,
+        )
+        files.append(self.paths.checksums)
+        if self.panorama:
+            files += [self.paths.panorama_lightfield, self.panorama]
+        for name in self.reprojections:
+            files += self.lens_maps(name)
+        return files
+
+    # The rig. A file may hold its places.
+
+    @property
+    def placed_rig(self) -> Rig:
+        """The rig. A random rig and a .blend's camera have the path of the file of their places."""
+        if isinstance(self.rig, BlendCamera):
+            frame = self.source.frame
+            inventory = self.paths.inventory
+            return self.rig.placed(inventory, frame if isinstance(frame, int) else None)
+        if isinstance(self.rig, Random):
+            return self.rig.placed(self.paths.places)
+        return self.rig
+
+    @property
+    def camera_frames(self) -> list[float | None]:
+        """The frames of a rig of the .blend's camera. None is the file's own frame."""
+        rig = self.placed_rig
+        return rig.path if isinstance(rig, BlendCamera) else []
+
+
+def _present(*paths: str | None) -> list[str]:
+    """Return the paths of the files that a dataset has."""
+    return [path for path in paths if path is not None]
