@@ -205,54 +205,35 @@ def _latest_device(runs: Sequence[journal.Run]) -> str | None:
 
 def write(job: measurement.Costs) -> None:
     """Write the costs.json of a dataset."""
-    settings = job.settings
-    full = settings.full.model_dump()
-    if full["samples"] == FILE:
-        full["samples"] = _samples_of_blend(job.inventory)
-    content = costs(
-        job.dataset,
-        job.blend,
-        job.journals,
-        job.benchmarks,
-        job.scene_benchmarks,
-        settings.energy,
-        full,
-        settings.reprojections,
-    )
-    write_json(job.output, content)
+    write_json(job.output, costs(job))
 
 
-def _samples_of_blend(inventory: Path | None) -> Any:
-    if inventory is None:
+def _full_size(job: measurement.Costs) -> measurement.FullSize:
+    """Return the size of the full dataset, with the samples of its .blend."""
+    full = job.settings.full
+    if full.samples != FILE:
+        return full
+    if job.inventory is None:
         raise UserError("--inventory: is missing; it has the samples of the .blend")
-    return read_inventory(inventory, "blend")["blend"]["samples"]
+    inventory = read_inventory(job.inventory, "blend")
+    return full.model_copy(update={"samples": inventory["blend"]["samples"]})
 
 
-def costs(
-    dataset: Path,
-    blend: Path | None,
-    journals: Path,
-    benchmarks: Path,
-    scene_benchmarks: Iterable[Path],
-    energy: Energy,
-    full: Mapping[str, Any],
-    reprojections: Iterable[str],
-) -> dict[str, Any]:
-    """Return the content of costs.json for the dataset in the folder ``dataset``.
-
-    ``journals`` is the folder of its journals. ``benchmarks`` and ``scene_benchmarks`` are the
-    folders of its jobs' and its scene's TSVs. ``full`` has the ``views``, ``resolution``,
-    ``samples`` and ``denoise`` of the full dataset. Null stands for this dataset's value.
-    """
+def costs(job: measurement.Costs) -> dict[str, Any]:
+    """Return the content of a dataset's costs.json."""
+    energy = job.settings.energy
+    full = _full_size(job)
     by_shard = {
         path.name.removesuffix(JOURNAL_SUFFIX): journal.read(path)
-        for path in sorted(journals.glob(journal.JOURNALS))
+        for path in sorted(job.journals.glob(journal.JOURNALS))
     }
     runs = [run for runs_of_shard in by_shard.values() for run in runs_of_shard]
     shards = [_shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
-    stages = in_order(_job_stages(benchmarks, scene_benchmarks) | {"render": _render_stage(shards)})
-    sizes = _stage_bytes(stages, dataset, blend)
+    stages = in_order(
+        _job_stages(job.benchmarks, job.scene_benchmarks) | {"render": _render_stage(shards)}
+    )
+    sizes = _stage_bytes(stages, job.dataset, job.blend)
     device = _latest_device(runs)
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
@@ -275,10 +256,10 @@ def costs(
             runs,
             stages,
             sizes["render"],
-            LightField.read(dataset / NAME),
+            LightField.read(job.dataset / NAME),
             energy,
             full,
-            reprojections,
+            job.settings.reprojections,
         ),
     }
 
@@ -320,24 +301,25 @@ class Scale:
     """
 
     views: int
-    samples: Any
+    samples: int
     pixels: float
     effort: float
 
     @classmethod
-    def of(cls, full: Mapping[str, Any], lightfield: LightField) -> "Scale":
+    def of(cls, full: measurement.FullSize, lightfield: LightField) -> "Scale":
         """Return the scale of a full dataset over this one."""
         render = lightfield.render
         lens = lightfield.lens
         assert isinstance(render.samples, int)
-        samples = full["samples"] or render.samples
+        samples = full.samples or render.samples
+        assert isinstance(samples, int)
         # If a target error decides, both are unknown until then.
-        denoise = render.denoise if full["denoise"] is None else full["denoise"]
+        denoise = render.denoise if full.denoise is None else full.denoise
         effort = cost_in_samples(samples, denoise)
         return cls(
-            views=full["views"],
+            views=full.views,
             samples=samples,
-            pixels=math.prod(full["resolution"]) / (lens.width * lens.height),
+            pixels=math.prod(full.resolution) / (lens.width * lens.height),
             effort=effort / cost_in_samples(render.samples, render.denoise),
         )
 
@@ -348,7 +330,7 @@ def extrapolation(
     view_bytes: int,
     lightfield: LightField,
     energy: Energy,
-    full: Mapping[str, Any],
+    full: measurement.FullSize,
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
     """Return the cost of the full dataset, from the views of this one. None without views.
@@ -390,7 +372,7 @@ def extrapolation(
     machine = seconds / energy.core_count if by_processor else seconds
     return {
         "views": scale.views,
-        "resolution": full["resolution"],
+        "resolution": full.resolution,
         "samples": scale.samples,
         "core_hours": seconds / 3600,
         "core_hours_uncertainty": None if error is None else error / 3600,
