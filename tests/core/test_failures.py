@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from lightfield.core import files
-from lightfield.core.cli import finite, positive, run, stops
+from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
@@ -68,20 +68,6 @@ def test_a_count_is_one_or_more(count, capsys):
         parser.parse_args([f"--views={count}"])
     said = f"error: argument --views: is {count}; must be 1 or more\n"
     assert capsys.readouterr().err.endswith(said)
-
-
-@pytest.mark.parametrize(
-    ("kind", "text", "problem"),
-    [
-        (finite, "inf", "is inf; must be a finite number"),
-        (stops, "nan", "is nan; must be from -100 to 100 stops"),
-        (stops, "101", "is 101; must be from -100 to 100 stops"),
-    ],
-)
-def test_numbers_and_exposures_have_limits(kind, text, problem):
-    assert kind("-1.5") == -1.5
-    with pytest.raises(argparse.ArgumentTypeError, match=problem):
-        kind(text)
 
 
 def test_a_cause_that_many_jobs_share_is_said_once(tmp_path):

@@ -3,7 +3,6 @@
 import argparse
 import atexit
 import gc
-import math
 import os
 import re
 import sys
@@ -102,34 +101,6 @@ def counted(flag: str, text: str) -> int:
         return positive(text)
     except argparse.ArgumentTypeError as error:
         raise UserError(f"{flag}: {error}") from None
-
-
-def finite(text: str) -> float:
-    """Return a number that is neither infinite nor NaN."""
-    if math.isfinite(float(text)):
-        return float(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be a finite number")
-
-
-def above_zero(text: str) -> float:
-    """Return a finite number above 0."""
-    if 0 < float(text) < math.inf:
-        return float(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be a finite number above 0")
-
-
-def white(text: str) -> float:
-    """Return the value of light that becomes white, from a flag."""
-    if 1e-9 <= float(text) <= 1e9:
-        return float(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be from 1e-9 to 1e9")
-
-
-def stops(text: str) -> float:
-    """Return an exposure in stops, from a flag."""
-    if abs(float(text)) <= 100:
-        return float(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be from -100 to 100 stops")
 
 
 def view_slice(text: str, count: int) -> slice:
