@@ -24,7 +24,6 @@ from lightfield.configuration import (
     corpus,
     exports,
     family,
-    job_settings,
     publication,
     render_settings,
     reprojections,
@@ -45,9 +44,9 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
+from lightfield.stages import checks, measurement, publishing, report
 from lightfield.stages import exports as export_stages
 from lightfield.stages import family as family_stages
-from lightfield.stages import measurement, publishing, report
 from lightfield.stages import rig as rig_stages
 from lightfield.stages import scene as scene_stages
 from lightfield.stages.registry import BY_NAME
@@ -248,8 +247,8 @@ KEY_PAGES: dict[str, Page] = {
             Section("surface.py", export_stages.MeshSettings),
             Section("reproject.py and lens_map.py", reprojections.Reprojection),
             Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
-            Section("validate.py", job_settings.ValidationSettings),
-            Section("validate_sequence.py", job_settings.SequenceValidationSettings),
+            Section("validate.py", checks.ValidationSettings),
+            Section("validate_sequence.py", checks.SequenceValidationSettings),
             Section("package.py and publish.py", publishing.PackSettings),
             Section("package.py and publish.py: scene", scene_yaml.Credits),
             Section("report_figures.py", report.FiguresSettings),

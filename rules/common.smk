@@ -44,17 +44,14 @@ from lightfield.configuration.scene_yaml import load_scene, scene_content, scene
 from lightfield.configuration.config_file import load_config
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS, Paths
 from lightfield.configuration.dataset import Cluster
+from lightfield.formats.export_lists import MANIFEST
 from lightfield.configuration.exports import (
-    MANIFEST,
     SEQUENCE_EXPORTS,
     InstantNgp,
     export_settings_of,
 )
 from lightfield.core.names import MESH, VIEWS
-from lightfield.configuration.job_settings import (
-    SequenceValidationSettings,
-    ValidationSettings,
-)
+from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import SynthesisSettings
 from lightfield.stages.publishing import PackSettings

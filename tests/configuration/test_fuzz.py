@@ -30,9 +30,9 @@ from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Energy, load_config
 from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
-from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
 from lightfield.formats import published
+from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock

@@ -22,8 +22,9 @@ from lightfield import export
 from lightfield.configuration.exports import settings_of
 from lightfield.core.files import read_json, write_json
 from lightfield.core.flags import parsed
-from lightfield.export import MANIFESTS, zarr_store
+from lightfield.export import zarr_store
 from lightfield.export.source import SourceDataset
+from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.imaging import images

@@ -15,8 +15,8 @@ from test_sequence_exports import CAMERAS, FRAMES, source_of, write_moving_ball
 from lightfield import export
 from lightfield.configuration.exports import settings_of
 from lightfield.core.files import sha256
-from lightfield.export import IN_FOLDERS
 from lightfield.export.sequence import SourceSequence
+from lightfield.formats.export_lists import IN_FOLDERS
 from lightfield.imaging import images
 from lightfield.validation.integrity import Integrity
 from lightfield.validation.sequence import (

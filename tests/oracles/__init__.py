@@ -8,7 +8,7 @@ same for the exports of a sequence.
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from lightfield.export import MANIFESTS
+from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import ImageSet
 from lightfield.validation.files import read_sets
 from oracles import exported_cameras, exported_depth, exported_pictures

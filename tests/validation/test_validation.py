@@ -26,7 +26,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.export import MANIFESTS
+from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.passes import NAMES, PASSES, matte_header
 from lightfield.geometry import lenses, rotations

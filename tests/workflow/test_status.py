@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from checkouts import ROOT, snakemake
 
-import status
 from lightfield.configuration import keys
 from lightfield.core import files, progress
+from lightfield.core.flags import parsed
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.stages.checks import Status
 
 NAMES = ["a", "b", "c", "d"]
 
@@ -31,9 +32,8 @@ def dataset(tmp_path, monkeypatch, capsys):
 
     def lines(others=()):
         folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
-        arguments = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
-        monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
-        status.main()
+        arguments = (*folders, "--dataset", "scene/rig", 4, "flat", *others)
+        parsed(Status, None, [*map(str, arguments)]).run()
         return capsys.readouterr().out.splitlines()
 
     def render(*names, settings=content):
@@ -87,7 +87,7 @@ def test_the_time_left_follows_from_the_rate_of_the_shards_at_work(dataset, monk
     dataset.render("a", "b")
     # This process stands in for the renderer's. It began just now, so the clock is put forward.
     now = time.time() + 1000
-    monkeypatch.setattr(status.time, "time", lambda: now)
+    monkeypatch.setattr(time, "time", lambda: now)
     start = started(1000, pid=os.getpid())
     dataset.journal("0-4", start, *(finished("a", ago) for ago in (900, 500, 1)))
     lines = dataset()
@@ -234,6 +234,5 @@ def test_a_familys_members_are_counted_by_their_state(tmp_path, monkeypatch, cap
         (tmp_path / "chairs" / name).mkdir(parents=True)
         files.write_json(tmp_path / "chairs" / name / "member.json", record)
     folders = ("--results", str(tmp_path), "--work", str(tmp_path))
-    monkeypatch.setattr(sys, "argv", ["status.py", *folders, "--family", "chairs", "5"])
-    status.main()
+    parsed(Status, None, [*folders, "--family", "chairs", "5"]).run()
     assert capsys.readouterr().out == "chairs: 1 of 5 members built, 1 failed\n"

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from lightfield.configuration.exports import MANIFEST
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.core.names import MESH, VIEWS
+from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.splits_file import SPLITS
 
 # The pictures of a report.

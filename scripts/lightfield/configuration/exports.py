@@ -21,9 +21,6 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# The list of an export's files, which is written last.
-MANIFEST = "export.json"
-
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
 BOUNDS_VIEWS = 64

@@ -12,22 +12,18 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import MANIFEST, SEQUENCE_EXPORTS, Export, ExportSettings
+from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export, ExportSettings
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import sha256, write_json
 from lightfield.core.names import MESH
-from lightfield.export import instant_ngp
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
-from lightfield.formats.layout import Manifest
+from lightfield.formats.export_lists import FOLDER, MANIFEST, files_of
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.exports import ExportViews
 from lightfield.workflow.view_store import ViewStore
 
 Source = SourceDataset | SourceSequence
-
-# The folder of a dataset that holds its exports.
-FOLDER = "exports"
 
 
 def write(job: ExportViews) -> None:
@@ -117,7 +113,7 @@ def _check_replaceable(folder: Path) -> None:
     listing = folder / MANIFEST
     exported = {MANIFEST}
     if listing.is_file():
-        exported.update(_files(listing))
+        exported.update(files_of(listing))
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
         if name not in exported and not path.is_dir():
@@ -130,25 +126,3 @@ def transforms(folder: Path) -> list[Path]:
     nerfstudio's files have the same name, but lie deeper.
     """
     return sorted([*folder.glob("transforms.json"), *folder.glob("*/transforms.json")])
-
-
-def _files(path: Path) -> dict[str, str]:
-    """Return the files that an export.json lists, with their SHA-256."""
-    try:
-        files = read_json(path)["files"]
-        return {str(name): str(digest) for name, digest in files.items()}
-    except (UserError, LookupError, TypeError, AttributeError):
-        raise UserError(f"{path}: is not JSON with files and their sha256") from None
-
-
-def _pictures(path: Path) -> list[str]:
-    return [name for name in _files(path) if name.endswith(".png")]
-
-
-# The exports with a folder of their own. Those of a sequence are in the rig's folder.
-IN_FOLDERS = Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=_files)
-MANIFESTS = [
-    instant_ngp.MANIFEST,
-    IN_FOLDERS,
-    Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=_files),
-]

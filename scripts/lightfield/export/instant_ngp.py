@@ -27,7 +27,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
-from lightfield.formats.layout import Manifest
+from lightfield.formats.export_lists import MASK
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
@@ -45,24 +45,8 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 RIG_PART = 0.2
 """The part of the unit cube's side that the rig fills if the scene's size is unknown."""
 
-MASK = "dynamic_mask_{view}.png"
-"""The mask beside a PNG view. The loader does not train on pixels where it is above 0."""
-
 _DEPTH_UNIT = 0.001  # metres of a step of depth, unless a surface is too far for such steps
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
-
-
-def _pictures(path: Path) -> list[str]:
-    """Return the images that a transforms.json names: views and depth maps."""
-    try:
-        frames = read_json(path)["frames"]
-        depths = [str(frame["depth_path"]) for frame in frames if "depth_path" in frame]
-        return [str(frame["file_path"]) for frame in frames] + depths
-    except (UserError, LookupError, TypeError):
-        raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
-
-
-MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
 def write(job: ExportInstantNgp) -> None:

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from lightfield import export
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import prefix_of
@@ -18,22 +17,20 @@ from lightfield.configuration.exports import Export, InstantNgp, export_settings
 from lightfield.configuration.family import SOURCES
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import write_bytes, write_json
 from lightfield.core.names import VIEWS
-from lightfield.export import MANIFESTS
-from lightfield.formats.layout import SUMS, write_sums
+from lightfield.formats.export_lists import FOLDER
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import inventory_file
+from lightfield.stages.checks import Validate, ValidationSettings
 from lightfield.stages.exports import ExportInstantNgp, ExportViews
 from lightfield.stages.family import BatchSettings
 from lightfield.stages.lenses import Reproject
 from lightfield.stages.rig import CheckCameras, FreePlaces, FreePlacesSettings, MakeLightfield
 from lightfield.stages.scene import BuildScene, BuildSettings, ImportModel, ImportSettings
 from lightfield.stages.views import RenderShard
-from lightfield.validation.files import remove_strays
 from lightfield.validation.result import causes
-from lightfield.validation.validate import validate
 
 
 class Stages:
@@ -219,7 +216,7 @@ class Stages:
                 settings=settings,
                 format=name,
                 dataset=Path(dataset.paths.folder),
-                output=folder / export.FOLDER / name,
+                output=folder / FOLDER / name,
             ).run()
 
     def _validate(self, dataset: Dataset, splits: Path | None) -> None:
@@ -228,23 +225,22 @@ class Stages:
         Raises `UserError` with the first problems if it is not valid.
         """
         folder = Path(dataset.paths.folder)
-        reprojections = list(dataset.reprojections)
-        export_lists = [Path(path).resolve() for path in dataset.export_lists]
-        removed = Path(self.settings.work, "removed")
-        remove_strays(folder, reprojections, MANIFESTS, removed, export_lists)
-        result = validate(
-            folder,
-            reprojections,
-            [Path(record) for record in dataset.all_records],
-            Path(dataset.paths.cameras),
-            self.inventory,
-            1,
-            MANIFESTS,
-            splits if dataset.rig.split else None,
-            export_lists,
+        sums = Path(dataset.paths.checksums)
+        settings = ValidationSettings(
+            reprojections=list(dataset.reprojections),
+            exports=dataset.export_lists,
+            records=dataset.all_records,
         )
-        validation = result.to_json()
-        write_json(folder / "validation.json", validation)
+        result = Validate(
+            settings=settings,
+            dataset=folder,
+            output=Path(dataset.paths.validation),
+            sums=sums,
+            clearance=Path(dataset.paths.cameras),
+            inventory=self.inventory,
+            splits=splits if dataset.rig.split else None,
+            removed=Path(self.settings.work, "removed"),
+        ).run()
         if not result.valid:
-            raise UserError(f"{folder}: is not valid: {causes(validation)}")
-        write_sums(folder / SUMS, result.checksums, folder, folder / "validation.json")
+            raise UserError(f"{folder}: is not valid: {causes(result.to_json())}")
+        write_bytes(Path(dataset.paths.sums), sums.read_bytes())

@@ -14,7 +14,7 @@ from typing import Any
 
 import jinja2
 
-from lightfield.configuration.exports import MANIFEST, SEQUENCE_EXPORTS
+from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
@@ -22,6 +22,7 @@ from lightfield.core.files import atomic_path, read_keys, sha256, write_json
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.export import transforms
+from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass

@@ -6,6 +6,7 @@ lightfield.json. A reprojected view counts if it is no older than its source.
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from lightfield.core.units import duration
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.imaging import images
+from lightfield.stages.checks import Status
 from lightfield.workflow import journal, shard_files
 from lightfield.workflow.member_record import read_member
 
@@ -26,6 +28,30 @@ from lightfield.workflow.member_record import read_member
 WINDOW = 600.0
 # A process on another machine counts as dead after this many silent seconds.
 _SILENCE = 3600.0
+
+
+def show(job: Status) -> None:
+    """Print the progress of families, of datasets, and of all datasets together."""
+    for name, members in job.family:
+        print(of_family(name, job.results / name, members))
+    if job.dataset:
+        _show_datasets(job)
+
+
+def _show_datasets(job: Status) -> None:
+    now = time.time()
+    renderings = []
+    for name, views, reprojection_list in job.dataset:
+        folder = job.results / name
+        rendering = look(folder, job.work / name, views, now)
+        reprojections = reprojection_list.split(",") if reprojection_list else []
+        print("\n".join(lines(name, folder, views, reprojections, rendering)))
+        renderings.append(rendering)
+    total = sum(views for _, views, _ in job.dataset)
+    done = sum(len(rendering.finished) for rendering in renderings)
+    recent = sum(rendering.recent for rendering in renderings)
+    seconds = max(rendering.seconds for rendering in renderings)
+    print(f"all: {done} of {total} views rendered{outlook(total - done, recent, seconds)}")
 
 
 def of_family(name: str, folder: Path, count: int) -> str:

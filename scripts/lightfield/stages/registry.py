@@ -4,6 +4,7 @@ from typing import Any
 
 from lightfield.core.stage import Stage
 from lightfield.stages import (
+    checks,
     exports,
     family,
     lenses,
@@ -35,6 +36,10 @@ STAGES: list[type[Stage[Any]]] = [
     exports.ExportInstantNgp,
     exports.WriteSurface,
     synthesis.Synthesize,
+    checks.Validate,
+    checks.ValidateSequence,
+    checks.Verify,
+    checks.Status,
     publishing.PublishChecksums,
     publishing.Package,
     publishing.Publish,

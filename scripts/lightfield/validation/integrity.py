@@ -16,7 +16,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import MANIFEST
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
     absolute_path,
@@ -27,6 +26,7 @@ from lightfield.core.files import (
     sha256,
 )
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
+from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.splits_file import SPLITS

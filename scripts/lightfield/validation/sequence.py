@@ -7,9 +7,9 @@ frames themselves are datasets, which `validate` checks.
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
-from lightfield.configuration.exports import MANIFEST
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
+from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens

@@ -18,9 +18,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import MANIFEST
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
+from lightfield.formats.export_lists import MANIFEST
 from oracles.readers import (
     coco,
     colmap,

@@ -1,0 +1,99 @@
+"""Checks a dataset, or the exports of a sequence, and writes validation.json and checksums."""
+
+import sys
+from os.path import normpath
+from pathlib import Path
+
+from lightfield.core import leftovers
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.formats.export_lists import IN_FOLDERS, MANIFESTS
+from lightfield.formats.layout import REPORT, SUMS, write_sums
+from lightfield.formats.lightfield import NAME
+from lightfield.stages.checks import Validate, ValidateSequence
+from lightfield.validation import sequence
+from lightfield.validation.files import remove_strays
+from lightfield.validation.result import Result
+from lightfield.validation.validate import validate
+from lightfield.workflow import ledger
+
+
+def check(job: Validate) -> Result:
+    """Check a dataset. Raises `UserError` if it is not valid and no validation.json says so."""
+    _check_paths(job, job.dataset)
+    reprojections = [normpath(name) for name in job.settings.reprojections]
+    if job.output:
+        (job.dataset / SUMS).unlink(missing_ok=True)
+        # The report is made meanwhile.
+        leftovers.remove_unfinished(job.dataset, age=0, excluded=REPORT)
+    elif not reprojections:
+        lightfields = sorted(job.dataset.glob(f"*/{NAME}"))
+        reprojections = [path.parent.name for path in lightfields]
+    exports = job.settings.exports
+    export_lists = None if exports is None else [Path(path).resolve() for path in exports]
+    if job.removed:
+        remove_strays(job.dataset, reprojections, MANIFESTS, job.removed, export_lists)
+    result = validate(
+        job.dataset,
+        reprojections,
+        [Path(record) for record in job.settings.records],
+        job.clearance,
+        job.inventory,
+        job.processes,
+        MANIFESTS,
+        job.splits,
+        export_lists,
+        _noted_sums(job.ledger, job.dataset) if job.ledger else None,
+    )
+    _print(result)
+    if not job.output and not result.valid:
+        raise UserError(f"{job.dataset}: is not valid")
+    _write(result, job, job.dataset)
+    return result
+
+
+def check_sequence(job: ValidateSequence) -> None:
+    """Check the exports of a sequence. Raises `UserError` if they are not valid."""
+    _check_paths(job, job.rig)
+    frames = job.settings.frames or sequence.frame_folders(job.rig)
+    lists = sequence.export_lists(job.rig)
+    if job.settings.exports is not None:
+        lists = [Path(path) for path in job.settings.exports]
+    if job.removed:
+        sequence.remove_strays(job.rig, frames, lists, IN_FOLDERS, job.removed)
+    result = sequence.validate_sequence(job.rig, frames, lists, IN_FOLDERS)
+    _print(result)
+    if not result.valid:
+        raise UserError(f"{job.rig}: the exports of its sequence are not valid")
+    _write(result, job, job.rig)
+
+
+def _check_paths(job: Validate | ValidateSequence, folder: Path) -> None:
+    """Raise `UserError` if there is no folder to check, or if one of two outputs is missing."""
+    if (job.output is None) != (job.sums is None):
+        raise UserError("--output, --sums: go together")
+    if not folder.is_dir():
+        raise UserError(f"{folder}: no such folder")
+
+
+def _print(result: Result) -> None:
+    print(result.summary())
+    for line in result.failures():
+        print(line, file=sys.stderr)
+
+
+def _write(result: Result, job: Validate | ValidateSequence, folder: Path) -> None:
+    """Write validation.json and the checksums, if the job has them."""
+    if job.output and job.sums:
+        write_json(job.output, result.to_json())
+        write_sums(job.sums, result.checksums, folder, job.output)
+
+
+def _noted_sums(path: Path, dataset: Path) -> dict[str, str]:
+    """Return the SHA-256 that the ledger has of the dataset's files, by their path in it."""
+    prefix = f"{dataset}/"
+    return {
+        name.removeprefix(prefix): digest
+        for name, digest in ledger.read(path).items()
+        if name.startswith(prefix)
+    }
