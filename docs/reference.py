@@ -8,9 +8,8 @@ import argparse
 import ast
 import json
 import re
-import runpy
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -549,38 +548,11 @@ def page_of_keys(page: Page, table: Table) -> str:
     return "\n".join(lines)
 
 
-class _ParserFoundError(Exception):
-    """Carries a program's parser out of its `main`."""
-
-
-def parser_of(program: Path) -> argparse.ArgumentParser:
-    """Return the parser of a program, which does nothing else."""
-
-    def stop(parser: argparse.ArgumentParser, *_: Any) -> None:
-        raise _ParserFoundError(parser)
-
-    parse_args = argparse.ArgumentParser.parse_args
-    main: Callable[[], None] = runpy.run_path(str(program))["main"]
-    argparse.ArgumentParser.parse_args = stop  # type: ignore[assignment,method-assign]
-    try:
-        main()
-    except _ParserFoundError as found:
-        parser: argparse.ArgumentParser = found.args[0]
-        return parser
-    finally:
-        argparse.ArgumentParser.parse_args = parse_args  # type: ignore[method-assign]
-    raise AssertionError(f"{program}: has not parsed its arguments")
-
-
 def section_of_program(name: str) -> list[str]:
     """Return the lines about one program."""
     file = PROGRAMS / f"{name}.py"
-    if name in BY_NAME:
-        description = ast.get_docstring(ast.parse(file.read_text()))
-        parser = flags.parser_of(BY_NAME[name], description)
-    else:
-        parser = parser_of(file)
-    text = (parser.description or ast.get_docstring(ast.parse(file.read_text())) or "").strip()
+    text = (ast.get_docstring(ast.parse(file.read_text())) or "").strip()
+    parser = flags.parser_of(BY_NAME[name], text)
     lines = [f"## {file.name}", ""]
     for paragraph in text.split("\n\n"):
         is_code = paragraph.startswith(" ")
@@ -601,11 +573,8 @@ def row_of(action: argparse.Action) -> str:
     is_required = action.required and action.nargs not in ("?", "*")
     default = "required" if is_required else "–"
     given = re.search(r" \(default: (\S+)\)$", action.help or "")
-    value = given[1] if action.default == argparse.SUPPRESS and given else action.default
-    has_default = isinstance(value, str | int | float | Path) and value is not False
-    if not is_required and has_default and value != argparse.SUPPRESS:
-        shown = value.relative_to(ROOT) if _is_inside(value) else value
-        default = f"`{shown}`"
+    if given and not is_required:
+        default = f"`{given[1]}`"
     values = action.choices if action.choices is not None else []
     metavar = action.metavar if action.metavar is not None else action.dest.upper()
     placeholder = metavar if isinstance(metavar, str) else " ".join(metavar)
@@ -614,15 +583,10 @@ def row_of(action: argparse.Action) -> str:
         value_text = "–"
     elif action.nargs in ("+", "*"):
         value_text += " …"
-    context = {**vars(action), "prog": "", "default": default.strip("`")}
-    meaning = escaped((action.help or "") % context)
+    meaning = escaped((action.help or "").replace("%%", "%"))
     if not meaning:
         raise AssertionError(f"{flags or action.dest}: has no help text")
     return f"| {flags or f'`{action.dest}`'} | {value_text} | {default} | {meaning} |"
-
-
-def _is_inside(value: Any) -> bool:
-    return isinstance(value, Path) and value.is_relative_to(ROOT)
 
 
 def page_of_programs(title: str, text: str, names: list[str]) -> str:

@@ -1,11 +1,9 @@
 """The messages of failures: their cause, and what the user can do, in one line."""
 
-import argparse
-
 import pytest
 
 from lightfield.core import files
-from lightfield.core.cli import positive, run
+from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
@@ -57,17 +55,6 @@ def test_a_file_without_read_permission_is_named_with_the_cause(name, nobody):
     with pytest.raises(UserError) as caught:
         readers[path.suffix](path)
     assert str(caught.value).startswith(f"{path}: cannot be read: you may not read it: change")
-
-
-@pytest.mark.parametrize("count", ["0", "-1", "1.5", "many"])
-def test_a_count_is_one_or_more(count, capsys):
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--views", type=positive)
-    assert parser.parse_args(["--views", "7"]).views == 7
-    with pytest.raises(SystemExit):
-        parser.parse_args([f"--views={count}"])
-    said = f"error: argument --views: is {count}; must be 1 or more\n"
-    assert capsys.readouterr().err.endswith(said)
 
 
 def test_a_cause_that_many_jobs_share_is_said_once(tmp_path):

@@ -1,6 +1,5 @@
-"""What programs in scripts/ share: how they end, the types of their flags, and --views."""
+"""What programs in scripts/ share: how they end, and --views."""
 
-import argparse
 import atexit
 import gc
 import os
@@ -62,45 +61,6 @@ def _as_value(word: str) -> str:
     Without the blank, argparse takes these for flags. It recognises -1 and -0.5 as values itself.
     """
     return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
-
-
-def check_settings(
-    arguments: argparse.Namespace,
-    add_flags: Callable[[argparse.ArgumentParser], None],
-    required: str | None = None,
-) -> None:
-    """Raise `UserError` if a flag of ``add_flags`` is given beside --settings.
-
-    Without --settings, raise it if the ``required`` flag is missing.
-    """
-    if not arguments.settings:
-        if required and getattr(arguments, required) is None:
-            raise UserError(f"--{required}: is missing; or give --settings")
-        return
-    parser = argparse.ArgumentParser()
-    add_flags(parser)
-    for name, default in vars(parser.parse_args([])).items():
-        if getattr(arguments, name) != default:
-            flag = name.replace("_", "-")
-            raise UserError(f"--settings: excludes --{flag}; write it into the file")
-
-
-# The following functions are for the ``type`` of an argument.
-
-
-def positive(text: str) -> int:
-    """Return a whole number from 1 on."""
-    if text.isdecimal() and int(text) > 0:
-        return int(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be 1 or more")
-
-
-def counted(flag: str, text: str) -> int:
-    """Return a whole number from 1 on, for a flag with several values. Raises `UserError`."""
-    try:
-        return positive(text)
-    except argparse.ArgumentTypeError as error:
-        raise UserError(f"{flag}: {error}") from None
 
 
 def view_slice(text: str, count: int) -> slice:
