@@ -46,8 +46,12 @@ LIGHT = [
     "probe",
     "render_shard",
     "splits",
+    "status",
     "synthesis_quality",
     "synthesize",
+    "validate",
+    "validate_sequence",
+    "verify",
 ]
 
 PROGRAMS = sorted(path.stem for path in SCRIPTS.glob("*.py"))
