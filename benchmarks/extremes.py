@@ -574,8 +574,8 @@ def render(case: Case, folder: Path) -> tuple[Render, list[str], list[str]]:
     distances = surroundings(positions).distances
     warned = list(limits.warnings(positions, distances))
     refused = ["inside geometry"] if distances[0] < TOUCHING else []
-    geometry = render_geometry(view.matrix)
-    channels, attributes = shard.colour_channels(render_colour(view.matrix, 1).pixels)
+    geometry = render_geometry(view.world_from_camera)
+    channels, attributes = shard.colour_channels(render_colour(view.world_from_camera, 1).pixels)
     clamped = int(attributes[images.CLAMPED_ATTRIBUTE])
     if clamped:
         warned.append(f"{clamped} values were clamped to the half range")
@@ -587,7 +587,7 @@ def render(case: Case, folder: Path) -> tuple[Render, list[str], list[str]]:
     shown = Render(
         colour[sees][None].astype(np.float64),
         depth[sees][None].astype(np.float64),
-        (rays @ view.matrix[:3, :3].T)[sees][None],
+        (rays @ view.world_from_camera[:3, :3].T)[sees][None],
         view.position,
     )
     return shown, warned, refused

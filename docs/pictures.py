@@ -51,7 +51,7 @@ def draw_rigs(path: Path) -> None:
     figure = pyplot.figure(figsize=(13, 5.6), dpi=100)
     for place, settings in enumerate(RIGS, 1):
         poses = rigs.from_settings(settings).poses()
-        matrices = np.array([pose.matrix() for pose in poses])
+        matrices = np.array([pose.world_from_camera() for pose in poses])
         positions = matrices[:, :3, 3]
         directions = -matrices[:, :3, 2] * 0.2
         middle = (positions.min(axis=0) + positions.max(axis=0)) / 2

@@ -91,7 +91,7 @@ def write_views(folder, camera, rig, suffix=".exr", see=look):
     images_folder.mkdir(parents=True)
     lightfield.write(folder / "lightfield.json")
     for view in lightfield.views:
-        colour, distance = see(lens, view.matrix)
+        colour, distance = see(lens, view.world_from_camera)
         z = z_from_distance(distance, lens.pixel_rays()) if depth == "z" else distance
         channels = {name: colour[..., i].astype(np.float16) for i, name in enumerate("RGB")}
         if suffix == ".png":

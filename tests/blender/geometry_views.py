@@ -171,7 +171,7 @@ def main(folder: Path, cases: Path) -> None:
             globals()[scene]()
             blend_file.save_scene(path)
         lightfield = LightField.from_json(content)
-        pose = lightfield.views[0].matrix
+        pose = lightfield.views[0].world_from_camera
         cycles.set_up(path, None, lightfield, "cpu", 1)
         results[f"{name}.alone"] = render_colour(pose, 1).pixels
         # The first geometry follows a new session, the second a colour render. Both must be equal.

@@ -291,7 +291,7 @@ def rendered(path):
     rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0, -2, 1.5]}
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=FRAME, render=RENDER)
     cycles.set_up(path, None, lightfield, "cpu", 1)
-    return float(render_colour(lightfield.views[0].matrix, 1).pixels.max())
+    return float(render_colour(lightfield.views[0].world_from_camera, 1).pixels.max())
 
 
 def main():

@@ -113,8 +113,8 @@ def cast(content, number=0, aside=0.0):
     rays = content.lens.pixel_rays()
     level = np.linalg.norm(rays[..., ::2], axis=-1, keepdims=True)
     right = np.stack([-rays[..., 2], 0 * rays[..., 0], rays[..., 0]], axis=-1) / level
-    starts = view.position + aside * right @ view.matrix[:3, :3].T
-    rays = rays @ view.matrix[:3, :3].T
+    starts = view.position + aside * right @ view.world_from_camera[:3, :3].T
+    rays = rays @ view.world_from_camera[:3, :3].T
     depsgraph = bpy.context.evaluated_depsgraph_get()
     names = np.full(rays.shape[:2], "", dtype="U8")
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
@@ -183,7 +183,7 @@ def cast_instances(content):
             places = " ".join(str(place) for place in entry.persistent_id if place < 2**31 - 1)
             name = f"{entry.parent.name} > {name} {places}"
         names[entry.object.name, tuple(np.round(entry.matrix_world.translation, 3).tolist())] = name
-    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+    rays = content.lens.pixel_rays() @ view.world_from_camera[:3, :3].T
     names_of_pixels = np.full(rays.shape[:2], "", dtype="U24")
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
         origin, direction, obj = Vector(view.position), Vector(rays[pixel]), None

@@ -365,7 +365,7 @@ def build(folder):
     camera.sensor_width = lightfield.content["sensor_size"][0]
     camera.clip_start, camera.clip_end = 1e-4, 1e9
     scene.camera = bpy.data.objects.new("camera", camera)
-    scene.camera.matrix_world = lightfield.views[0].matrix.T
+    scene.camera.matrix_world = lightfield.views[0].world_from_camera.T
     scene.collection.objects.link(scene.camera)
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = CAMERA["resolution"]

@@ -23,7 +23,7 @@ def main(blend: Path, output: Path, cases: Path) -> None:
     for name, content in json.loads(cases.read_text()).items():
         lightfield = LightField.from_json(content)
         cycles.set_up(blend, None, lightfield, "cpu", 1)
-        pose = lightfield.views[0].matrix
+        pose = lightfield.views[0].world_from_camera
         depth = geometry_pass.render_geometry(pose).depth
         z = shard.depth_channel(depth, lightfield, shard.depth_rays(lightfield))
         results[f"{name}.z"] = z.astype(np.float64)

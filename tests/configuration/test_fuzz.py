@@ -211,7 +211,7 @@ def lightfield_of(name):
 
 def read_lightfield(path, _):
     lightfield = LightField.read(path)
-    lightfield.matrices  # noqa: B018
+    lightfield.world_from_cameras  # noqa: B018
     lightfield.with_flow()
     lightfield.lens.fitted(8).pixel_rays()
     lightfield.lens.pixels([[0.1, 0.2, -1.0]])

@@ -97,7 +97,9 @@ def export_moving(folder: Path, motion: dict[str, object]) -> None:
     export.run("ncore", source, settings, folder / "ncore")
     rays = source.lens.pixel_rays()
     names = [view.name for view in content.views]
-    np.savez(folder / "views.npz", names=names, matrices=content.matrices, rays=rays, **motion)
+    np.savez(
+        folder / "views.npz", names=names, matrices=content.world_from_cameras, rays=rays, **motion
+    )
 
 
 def publish_views(folder: Path) -> None:
@@ -124,7 +126,7 @@ def main() -> None:
         np.savez(
             folder / f"{name}.npz",
             names=[view.name for view in source.lightfield.views],
-            matrices=source.lightfield.matrices,
+            matrices=source.lightfield.world_from_cameras,
             rays=source.lens.pixel_rays(),
         )
     for kind, sources in OF.items():

@@ -60,7 +60,7 @@ def exported(dataset, name, source, tmp_path, **options):
 
 def matrices(dataset, source):
     views = LightField.read(dataset / source / "lightfield.json").views
-    return {view.name: view.matrix for view in views}
+    return {view.name: view.world_from_camera for view in views}
 
 
 def on_sphere(points, tolerance):
@@ -760,7 +760,7 @@ def test_an_ncore_frame_of_a_blurred_view_is_the_middle_of_its_exposure(tmp_path
         LightField.read(tmp_path / "dataset/lightfield.json").views, frames, exposures, strict=True
     ):
         assert start == end == sum(exposure) / 2
-        np.testing.assert_allclose(poses[start], view.matrix, atol=1e-9)
+        np.testing.assert_allclose(poses[start], view.world_from_camera, atol=1e-9)
         for time, pose in zip(exposure, view.exposure, strict=True):
             np.testing.assert_allclose(poses[time], pose, atol=1e-9)
 
@@ -784,9 +784,9 @@ def test_an_ncore_frame_of_a_rolling_shutter_lasts_from_the_first_row_to_the_las
             part = 0.5 + ((row + 1) / height - 0.5) * (1 - rolling)
             assert abs((time - begin) / (finish - begin) - part) < 1e-5
             turn = Rotation.from_rotvec(np.radians(MOTION["turn"]) * (part - 0.5)).as_matrix()
-            rotation = view.matrix[:3, :3] @ turn
+            rotation = view.world_from_camera[:3, :3] @ turn
             np.testing.assert_allclose(poses[time][:3, :3], rotation, atol=1e-5)
-            travel = view.matrix[:3, :3] @ MOTION["travel"] * (part - 0.5)
+            travel = view.world_from_camera[:3, :3] @ MOTION["travel"] * (part - 0.5)
             np.testing.assert_allclose(poses[time][:3, 3], view.position + travel, atol=1e-5)
 
 
@@ -942,8 +942,8 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
     rays = lightfield.lens.pixel_rays()
     true_normals = {}
     for view in lightfield.views:
-        distance = look(lightfield.lens, view.matrix)[1][..., None]
-        places = view.matrix[:3, 3] + rays @ view.matrix[:3, :3].T * distance
+        distance = look(lightfield.lens, view.world_from_camera)[1][..., None]
+        places = view.world_from_camera[:3, 3] + rays @ view.world_from_camera[:3, :3].T * distance
         true_normals[view.name] = np.nan_to_num(-places / RADIUS)
         planes = np.moveaxis(true_normals[view.name].astype(np.float32), -1, 0)
         path = dataset / "normal" / f"{view.name}.exr"
@@ -1019,7 +1019,7 @@ def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
     again = LightField.from_rig(rig, lenses.from_camera(LENSES["perspective"]))
     for name, matrix in matrices(dataset, "perspective").items():
         same_view = next(view for view in again.views if view.name == name)
-        np.testing.assert_allclose(same_view.matrix, matrix, atol=1e-11)
+        np.testing.assert_allclose(same_view.world_from_camera, matrix, atol=1e-11)
     assert rigs.from_settings(rig).view_count == 12
 
 

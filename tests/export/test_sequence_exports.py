@@ -331,9 +331,13 @@ def write_moving_ball(folder, camera):
         (view,) = lightfield.views
         frame = folder / f"f{number:05}"
         lightfield.write(frame / "lightfield.json")
-        distance, on_ball = pixels_of_ball(lens, view.matrix, BALL + MOVES * (number - 1))
+        distance, on_ball = pixels_of_ball(
+            lens, view.world_from_camera, BALL + MOVES * (number - 1)
+        )
         local = lens.pixel_rays() * distance[..., None]
-        moved = lens.pixels(local + np.where(on_ball[..., None], way @ view.matrix[:3, :3], 0))
+        moved = lens.pixels(
+            local + np.where(on_ball[..., None], way @ view.world_from_camera[:3, :3], 0)
+        )
         centres = np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5
         motion = np.where(on_ball[..., None], moved - centres, 0).astype(np.float32)
         attributes = {images.DEPTH_ATTRIBUTE: "distance"}

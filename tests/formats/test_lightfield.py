@@ -87,27 +87,29 @@ def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None
         del frame["world_matrix"]
     by_angles = read(tmp_path, held)
     for placed in (by_matrix, by_angles):
-        np.testing.assert_allclose(placed.matrices, complete.matrices, atol=1e-11)
+        np.testing.assert_allclose(
+            placed.world_from_cameras, complete.world_from_cameras, atol=1e-11
+        )
         for view, same in zip(placed.views, complete.views, strict=True):
             assert view.position.shape == view.rotation.shape == (3,)
             np.testing.assert_allclose(view.position, same.position, atol=1e-11)
             np.testing.assert_allclose(view.rotation, same.rotation, atol=1e-11)
-    view = View.placed("x", complete.views[1].matrix, {"split": "test"})
+    view = View.placed("x", complete.views[1].world_from_camera, {"split": "test"})
     assert (view.position.shape, view.split) == ((3,), "test")
     np.testing.assert_allclose(view.position, complete.views[1].position, atol=1e-11)
     np.testing.assert_allclose(view.rotation, complete.views[1].rotation, atol=1e-11)
-    assert View.placed("x", view.matrix).split is None
+    assert View.placed("x", view.world_from_camera).split is None
     # With both, the matrix decides.
     held = content()
     held["frames"][0]["world_matrix"][0][3] = 5
-    assert read(tmp_path, held).views[0].matrix[0, 3] == 5
+    assert read(tmp_path, held).views[0].world_from_camera[0, 3] == 5
 
 
 def test_the_matrix_looks_in_the_rigs_direction() -> None:
     """A level plane's cameras look along +Y with +Z up."""
     view = LightField.from_rig({"type": "plane", "cameras": [1, 1]}, FISHEYE).views[0]
     np.testing.assert_array_equal(
-        view.matrix, [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+        view.world_from_camera, [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
     )
 
 
@@ -141,7 +143,7 @@ def test_a_copy_can_have_another_lens_other_views_and_other_keys(tmp_path: Path)
     assert (changed.render.samples, changed.frame) == (8, 2)
     assert (first.lens.width, first.depth, len(first.views)) == (64, "z", 2)
     assert changed.folder == tmp_path
-    assert len(first.changed(views=[]).matrices) == 0
+    assert len(first.changed(views=[]).world_from_cameras) == 0
 
 
 @pytest.mark.parametrize("key", ["render", "frame", "scene"])
@@ -236,10 +238,10 @@ def test_cube_map_refuses_a_lens_that_is_not_90_degrees() -> None:
 def test_a_views_key_changes_with_everything_that_its_pixels_depend_on() -> None:
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", render={"samples": 4}, frame=1)
     view = first.views[0]
-    moved = view.matrix + 1e-12 * np.eye(4)[[3, 1, 2, 0]]
+    moved = view.world_from_camera + 1e-12 * np.eye(4)[[3, 1, 2, 0]]
     view_keys = [
         keys.render_key(first, view),
-        keys.render_key(first, View.placed("other", view.matrix)),
+        keys.render_key(first, View.placed("other", view.world_from_camera)),
         keys.render_key(first, View.placed(view.name, moved)),
         keys.render_key(first.changed(depth="distance"), view),
         keys.render_key(first.changed(depth=None), view),
@@ -259,7 +261,9 @@ def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
     again = LightField.read(tmp_path / "elsewhere.json")
     assert keys.render_key(again, again.views[0]) == key
     assert keys.render_key(first.changed(views=first.views[:1]), first.views[0]) == key
-    other_split = View.placed(first.views[0].name, first.views[0].matrix, {"split": "test"})
+    other_split = View.placed(
+        first.views[0].name, first.views[0].world_from_camera, {"split": "test"}
+    )
     assert keys.render_key(first, other_split) == key
     # A view resumed on another machine is not rendered again for its last digits.
     assert keys.render_key(first.changed(machine="another"), first.views[0]) == key

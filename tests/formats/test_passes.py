@@ -79,12 +79,12 @@ def test_motion_is_the_walls_movement_through_the_lens(lens, made):
     content = LightField.read(made / lens / "lightfield.json")
     cast, motion = np.load(made / "objects.npz")[lens], read(made / lens, "motion")
     view, on_wall = content.views[0], cast == "wall"
-    rays = content.lens.pixel_rays()[on_wall] @ view.matrix[:3, :3].T
+    rays = content.lens.pixel_rays()[on_wall] @ view.world_from_camera[:3, :3].T
     points = rays * ((WALL[1][1] - view.position[1]) / rays[:, 1:2])
     for frame, wall_motion in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
         moved = points + np.subtract(WALL[frame], WALL[1])
-        truth = content.lens.pixels(moved @ view.matrix[:3, :3])
-        truth -= content.lens.pixels(points @ view.matrix[:3, :3])
+        truth = content.lens.pixels(moved @ view.world_from_camera[:3, :3])
+        truth -= content.lens.pixels(points @ view.world_from_camera[:3, :3])
         if lens == "panorama":
             truth[:, 0] -= 2 * SIZE * np.rint(truth[:, 0] / (2 * SIZE))
         assert np.abs(truth).max() > 0.3

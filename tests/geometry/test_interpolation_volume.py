@@ -70,7 +70,7 @@ def test_a_place_is_within_the_edge_if_traced_rays_reach_it(
     center = np.array([1.0, 2, 3])
     rig = {"type": "sphere", "subdivisions": 2, "size": [1, 1, 1.3], "center": center.tolist()}
     rig |= {"face_inside": face_inside, "camera": camera}
-    matrices = np.stack([pose.matrix() for pose in rigs.from_settings(rig).poses()])
+    matrices = np.stack([pose.world_from_camera() for pose in rigs.from_settings(rig).poses()])
     places = center + np.random.default_rng(3).uniform(-0.65, 0.65, (5000, 3))
     parts = parts_to_edge(matrices, lenses.from_camera(camera), places)
     # Cameras that face inside see through the point to the surface behind it.
@@ -86,6 +86,6 @@ def test_a_place_is_within_the_edge_if_traced_rays_reach_it(
 
 def test_a_plane_has_no_inside() -> None:
     rig = rigs.from_settings({"type": "plane", "cameras": [3, 3], "size": 1})
-    matrices = np.stack([pose.matrix() for pose in rig.poses()])
+    matrices = np.stack([pose.world_from_camera() for pose in rig.poses()])
     parts = parts_to_edge(matrices, lenses.from_camera(FISHEYE), np.zeros((2, 3)))
     assert np.isposinf(parts).all()

@@ -26,7 +26,7 @@ def places(rig):
 
 
 def matrices(rig):
-    return np.stack([pose.matrix() for pose in rig.poses()])
+    return np.stack([pose.world_from_camera() for pose in rig.poses()])
 
 
 def path(keys, count, **more):

@@ -195,7 +195,7 @@ def test_each_type_of_rig_has_its_declared_number_of_named_views(name: str) -> N
     poses = rig.poses()
     assert len(poses) == rig.view_count == len({pose.name for pose in poses})
     for pose in poses:
-        turn = pose.matrix()[:3, :3]
+        turn = pose.world_from_camera()[:3, :3]
         np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-9)
         assert np.linalg.det(turn) > 0
 
@@ -206,7 +206,7 @@ def test_every_camera_is_at_blenders_place(label: str, blender: dict[str, Any]) 
     views = rig.poses()
     assert len(views) == count == rig.view_count
     assert [view.name for view in views] == blender[f"{label} names"].tolist()
-    matrices = np.stack([view.matrix() for view in views])
+    matrices = np.stack([view.world_from_camera() for view in views])
     np.testing.assert_allclose(
         [view.position for view in views], blender[f"{label} positions"], rtol=0, atol=1e-6
     )
@@ -265,13 +265,13 @@ def test_spheres_contain_the_coarser_ones() -> None:
 def test_sphere_cameras_look_outward_and_upright_and_at_the_poles_up_and_down() -> None:
     views = from_settings({"type": "sphere", "subdivisions": 3, "size": 2}).poses()
     for view in views:
-        matrix = view.matrix()
+        matrix = view.world_from_camera()
         np.testing.assert_allclose(-matrix[:3, 2], view.position, atol=1e-7)
         assert abs(np.linalg.det(matrix) - 1) < 1e-9
         assert matrix[2, 1] >= -1e-9
     bottom, top = views[0], views[11]
-    np.testing.assert_allclose(bottom.matrix()[:3, :3], np.eye(3), atol=1e-9)
-    np.testing.assert_allclose(top.matrix()[:3, :3], np.diag([-1, 1, -1]), atol=1e-9)
+    np.testing.assert_allclose(bottom.world_from_camera()[:3, :3], np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(top.world_from_camera()[:3, :3], np.diag([-1, 1, -1]), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -293,15 +293,15 @@ def test_a_lattice_has_level_cameras_at_the_corners_of_a_cube() -> None:
     assert {view.position for view in views} == corners
     assert [view.name for view in views] == [f"view_{i:04d}f" for i in range(8)]
     for view in views:
-        np.testing.assert_allclose(view.matrix()[:3, 2], [0, -1, 0], atol=1e-9)
+        np.testing.assert_allclose(view.world_from_camera()[:3, 2], [0, -1, 0], atol=1e-9)
 
 
 def test_face_inside_turns_cameras_half_way_about_their_up_axis() -> None:
     rig = from_settings({"type": "cuboid", "cameras": [2, 2, 2]})
     turned = rig.model_copy(update={"face_inside": True})
     for out, inside in zip(rig.poses(), turned.poses(), strict=True):
-        flipped = out.matrix() @ np.diag([-1, 1, -1, 1])
-        np.testing.assert_allclose(inside.matrix(), flipped, atol=1e-9)
+        flipped = out.world_from_camera() @ np.diag([-1, 1, -1, 1])
+        np.testing.assert_allclose(inside.world_from_camera(), flipped, atol=1e-9)
 
 
 def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
@@ -320,7 +320,7 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
     }
     for view in views:
         look, up = expected[view.name[-1]]
-        matrix = view.matrix()
+        matrix = view.world_from_camera()
         np.testing.assert_allclose(-matrix[:3, 2], look, atol=1e-9)
         np.testing.assert_allclose(matrix[:3, 1], up, atol=1e-9)
         assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
@@ -590,7 +590,7 @@ ORBITS = {
 def test_orbits_look_at_the_middle_from_the_given_places(name):
     settings = {**ORBITS[name], "size": 4, "center": [1, -2, 0.5]}
     rig = rigs.from_settings(settings)
-    matrices = np.array([pose.matrix() for pose in rig.poses()])
+    matrices = np.array([pose.world_from_camera() for pose in rig.poses()])
     assert len(matrices) == rig.view_count == settings["count"]
     places = matrices[:, :3, 3] - (1, -2, 0.5)
     np.testing.assert_allclose(np.linalg.norm(places, axis=1), 2, atol=1e-9)
@@ -611,7 +611,7 @@ def test_orbits_of_an_ellipsoid_look_at_the_middle(name, rotation):
     center = np.array([1, -2, 0.5])
     shape = {"size": [4, 6, 1], "center": center.tolist(), "rotation": rotation}
     poses = rigs.from_settings(ORBITS[name] | shape).poses()
-    matrices = np.array([pose.matrix() for pose in poses])
+    matrices = np.array([pose.world_from_camera() for pose in poses])
     ahead = center - matrices[:, :3, 3]
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     np.testing.assert_allclose(-matrices[:, :3, 2], ahead, atol=1e-9)
@@ -668,7 +668,7 @@ def test_every_rig_can_look_at_a_point():
     target = np.array([0.2, 3.0, -1.0])
     plane = {"type": "plane", "cameras": [3, 2], "size": 2, "look_at": target.tolist()}
     for pose in rigs.from_settings(plane).poses():
-        matrix = pose.matrix()
+        matrix = pose.world_from_camera()
         toward = target - matrix[:3, 3]
         np.testing.assert_allclose(-matrix[:3, 2], toward / np.linalg.norm(toward), atol=1e-9)
     # Straight above and below, "up" is undefined: +X stays the world's.
@@ -680,8 +680,8 @@ def test_every_rig_can_look_at_a_point():
             "look_at": [0, 0, 0],
         }
         (pose,) = rigs.from_settings(single).poses()
-        np.testing.assert_allclose(pose.matrix()[:3, 0], (1, 0, 0), atol=1e-9)
-        np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
+        np.testing.assert_allclose(pose.world_from_camera()[:3, 0], (1, 0, 0), atol=1e-9)
+        np.testing.assert_allclose(pose.world_from_camera()[:3, 1], (0, up, 0), atol=1e-9)
     with pytest.raises(UserError, match="a camera is at"):
         rigs.from_settings({**single, "look_at": single["center"]}).poses()
     with pytest.raises(UserError, match="look_at: does not go with face_inside"):

@@ -160,7 +160,7 @@ def check(
             problems += _missing_parts(path, expected)
             problems += exported_boxes.faults(exported, dataset, image_set)
             if cube and not cube.fits_depth:
-                problems += unit_cube.faults(cube, image_set.lightfield.matrices)
+                problems += unit_cube.faults(cube, image_set.lightfield.world_from_cameras)
     return problems, set_exports
 
 
@@ -239,7 +239,7 @@ def _fitted(lens: Lens) -> PolynomialFisheye:
 
 def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:
     """Yield the views whose matrix is neither form of the pose in lightfield.json."""
-    matrices = np.array([view.matrix for view in views])
+    matrices = np.array([view.world_from_camera for view in views])
     candidates = [expected.view(view.name) if view.name else None for view in views]
     if all(view.name is None for view in views):
         candidates = list(_nearest(matrices[:, :3, 3], expected))
@@ -248,7 +248,7 @@ def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[
         return
     references = [view for view in candidates if view]
     # lightfield.json has each pose as a matrix, and as a position with Euler angles.
-    forms = np.array([[view.matrix for view in references]] * 2)
+    forms = np.array([[view.world_from_camera for view in references]] * 2)
     euler_angles = np.array([view.rotation for view in references])
     forms[1, :, :3, :3] = rotations.euler_to_matrix(euler_angles)
     forms[1, :, :3, 3] = [view.position for view in references]
@@ -292,7 +292,7 @@ def _nearest(positions: Floats, expected: Expected) -> Iterable[View]:
     from scipy.spatial import KDTree
 
     lightfield = expected.image_set.lightfield
-    rows = KDTree(lightfield.matrices[:, :3, 3]).query(positions)[1]
+    rows = KDTree(lightfield.world_from_cameras[:, :3, 3]).query(positions)[1]
     return [lightfield.views[row] for row in rows]
 
 

@@ -50,7 +50,7 @@ def faults(dataset: Path, sets: Sequence[ImageSet], exports: Sequence[SetExport]
             problems += _range_faults(depth_range, [_read(dataset, image_set, v) for v in views])
         if export.fits_depth and export.exported.cube:
             points = np.concatenate([*_seen_points(dataset, image_set)])
-            cameras = image_set.lightfield.matrices[:, :3, 3]
+            cameras = image_set.lightfield.world_from_cameras[:, :3, 3]
             problems += unit_cube.seen_faults(export.exported.cube, cameras, points)
         if export.exported.depth_map:
             problems += _depth_map_faults(export.exported.depth_map, dataset, image_set)

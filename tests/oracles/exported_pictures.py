@@ -51,7 +51,7 @@ def _view_of(picture: Picture, image_set: ImageSet) -> int | None:
     """Return the number of the view that a picture shows. None if the set does not have it."""
     if picture.view is not None:
         return image_set.numbers.get(picture.view)
-    places = image_set.lightfield.matrices[:, :3, 3]
+    places = image_set.lightfield.world_from_cameras[:, :3, 3]
     away = np.linalg.norm(places - np.array(picture.position), axis=1)
     return int(np.argmin(away))
 

@@ -97,7 +97,7 @@ def _numbered(expected: Expected, exported: Exported) -> list[View]:
         trains = [view for view in expected.image_set.lightfield.views if view.split == "train"]
         if tests and tests[0].name not in expected.numbers:
             # Any of the other rigs' test views may be the first.
-            first = min(exported.views, key=lambda view: view.name or "").matrix[:3, 3]
+            first = min(exported.views, key=lambda view: view.name or "").world_from_camera[:3, 3]
             tests.sort(key=lambda view: float(np.linalg.norm(view.position - first)))
     chosen = [(view, "test") for view in tests[:1]] + [(view, "train") for view in trains]
     digits = max(2, len(str(len(chosen) - 1)))
@@ -145,7 +145,7 @@ def _flow_faults(frame: Frame, flow: Flow) -> Iterator[str]:
     lens = camera.lens
     distance = converted(depth.channels["Z"], camera, "distance")
     moved = np.stack([channels[axis] for axis in "XYZ"], axis=-1).astype(np.float64)
-    local = lens.pixel_rays() * distance[..., None] + moved @ view.matrix[:3, :3]
+    local = lens.pixel_rays() * distance[..., None] + moved @ view.world_from_camera[:3, :3]
     motion = np.stack([moves[f"next.{axis}"] for axis in "XY"], axis=-1)
     pixels = np.indices(has_flow.shape)[::-1].transpose(1, 2, 0) + 0.5
     off: Floats = lens.pixels(local[has_flow]) - (pixels + motion)[has_flow]

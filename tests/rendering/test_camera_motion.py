@@ -115,7 +115,7 @@ def test_lightfield_json_has_the_poses_at_start_and_end(tmp_path):
     content.with_exposure().write(tmp_path / "lightfield.json")
     for view in LightField.read(tmp_path / "lightfield.json").views:
         start, end = view.exposure
-        right, _, back = view.matrix[:3, :3].T
+        right, _, back = view.world_from_camera[:3, :3].T
         np.testing.assert_allclose(end[:3, 3] - start[:3, 3], 0.2 * right, atol=1e-11)
         np.testing.assert_allclose((start + end)[:3, 3] / 2, view.position, atol=1e-11)
         # 45° about the camera's up: the end looks to the left, the start to the right.

@@ -85,7 +85,7 @@ def exact_euler(euler: Iterable[float]) -> mpmath.matrix:
 @pytest.mark.parametrize("pitch", [90, -90, 90 - 1e-9, 90 - 1e-8, 90 - 1e-7, -90 + 1e-5, 89.9, 0])
 def test_a_rigs_rotation_survives_gimbal_lock(pitch, turn) -> None:
     rig = {"type": "plane", "cameras": [1, 1], "rotation": [turn, pitch, 2 * turn]}
-    matrix = rigs.from_settings(rig).poses()[0].matrix()[:3, :3]
+    matrix = rigs.from_settings(rig).poses()[0].world_from_camera()[:3, :3]
     turned = exact_euler(float(np.radians(angle)) for angle in rig["rotation"])
     exact = turned * rotation(0, mpf(math.pi / 2))
     # A rig publishes its angles rounded to 12 decimals, so each of three angles may be off by half
@@ -121,9 +121,11 @@ def test_cameras_a_million_metres_from_the_origin_see_the_same_point(name) -> No
     second = rigs.Pose("b", 1, (place[0] + 0.1, place[1], place[2] - 0.05), (0.35, 1.1, -0.6), None)
     x, y = 0.45 * lens.width, 0.55 * lens.height
     seen = (
-        np.linalg.inv(second.matrix()) @ first.matrix() @ np.append(lens.rays(x, y) * distance, 1)
+        np.linalg.inv(second.world_from_camera())
+        @ first.world_from_camera()
+        @ np.append(lens.rays(x, y) * distance, 1)
     )
-    back = np.linalg.inv(first.matrix()) @ second.matrix() @ seen
+    back = np.linalg.inv(first.world_from_camera()) @ second.world_from_camera() @ seen
 
     turns = [exact_euler(pose.rotation) for pose in (first, second)]
     offset = [mpf(a) - mpf(b) for a, b in zip(first.position, second.position, strict=True)]

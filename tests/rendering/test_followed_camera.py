@@ -104,7 +104,7 @@ def of_blender_itself(path, view, prepare):
     from mathutils import Matrix
 
     open_file(path)
-    prepare(Matrix(view.matrix.tolist()))
+    prepare(Matrix(view.world_from_camera.tolist()))
     bpy.context.scene.cycles.seed = keys.view_seed(0, view.name)
     there = path.with_name("there.blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(there), copy=True)

@@ -55,7 +55,7 @@ def views(tmp_path_factory, run_program):
 def truth(content):
     """Return the exact distances (h, w), normals (h, w, 3) and surfaces (h, w), 0 for none."""
     view = content.views[0]
-    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+    rays = content.lens.pixel_rays() @ view.world_from_camera[:3, :3].T
     origin = view.position
     with np.errstate(divide="ignore", invalid="ignore"):
         floor = np.where(rays[..., 2] < 0, -origin[2] / rays[..., 2], np.inf)
@@ -112,7 +112,7 @@ def test_depth_and_normals_are_those_of_the_first_surface(name, views):
         assert shown(views, name, "material", pixels) == [material]
     # A ray's direction is exact to a few units of the 24th bit. At a grazing angle, that moves the
     # point on the surface accordingly farther.
-    rays = content.lens.pixel_rays() @ content.views[0].matrix[:3, :3].T
+    rays = content.lens.pixel_rays() @ content.views[0].world_from_camera[:3, :3].T
     facing = np.abs(np.sum(rays * normals, axis=-1))
     z, expected_z = views[f"{name}.z"][sure], stored(content, distance)[sure]
     error = np.abs(z.astype(np.float64) / expected_z - 1)
@@ -143,7 +143,7 @@ def test_geometry_does_not_change_the_colour(name, views):
 
 def test_invisible_surfaces_have_no_depth_and_glass_has(views):
     content = CASES["curtains"][1]
-    rays = content.lens.pixel_rays() @ content.views[0].matrix[:3, :3].T
+    rays = content.lens.pixel_rays() @ content.views[0].world_from_camera[:3, :3].T
     x, z = (2 * rays[..., axis] / rays[..., 1] for axis in (0, 2))
     for number, (curtain, normal) in enumerate(
         [("Plane", (np.sin(0.3), -np.cos(0.3), 0))]

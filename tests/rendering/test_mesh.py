@@ -131,7 +131,7 @@ def views(folder):
     """Yield the world rays (n, 3), the depth (n,) and the instances (n,) of each view."""
     lightfield = LightField.read(folder / "lightfield.json")
     for view in lightfield.views:
-        rays = lightfield.lens.pixel_rays().reshape(-1, 3) @ view.matrix[:3, :3].T
+        rays = lightfield.lens.pixel_rays().reshape(-1, 3) @ view.world_from_camera[:3, :3].T
         depth = images.read_image(folder / f"exr/{view.name}.exr").channels["Z"].ravel()
         numbers = images.read_image(folder / f"instance/{view.name}.exr").channels["Y"].ravel()
         yield view.position, rays, depth.astype(np.float64), numbers
@@ -277,7 +277,9 @@ def test_the_smoke_datasets_depth_lies_on_its_mesh(smoke):
     rays = lightfield.lens.pixel_rays().reshape(-1, 3)
     z = images.read_image(folder / f"exr/{view.name}.exr").channels["Z"].ravel()
     seen = np.isfinite(z) & (rays[:, 2] < -0.1)
-    distance, _ = first_hits(triangles, view.position, rays[seen] @ view.matrix[:3, :3].T)
+    distance, _ = first_hits(
+        triangles, view.position, rays[seen] @ view.world_from_camera[:3, :3].T
+    )
     # A ray that grazes an edge may miss it.
     is_equal = np.isclose(distance, z[seen] / -rays[seen, 2], rtol=1e-4)
     assert seen.sum() > 1000

@@ -88,7 +88,7 @@ def test_pixels_look_where_cycles_looked(name, rendered):
     """Compares our pose and lens with the points that Cycles reports as hit."""
     lens = lenses.from_camera(CAMERAS[name])
     content = lightfield(CAMERAS[name], RENDER)
-    world = content.views[0].matrix
+    world = content.views[0].world_from_camera
     rays = lens.pixel_rays()
     offset = rendered[f"{name}.points"] - world[:3, 3]
     distance = np.linalg.norm(offset, axis=-1)

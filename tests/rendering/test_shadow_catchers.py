@@ -103,7 +103,7 @@ def of_cube(origin, rays):
 
 def true_distances(lightfield, view):
     """Return the distances (h, w) to the cube and to the ground along the pixels' rays, in m."""
-    rays = lightfield.lens.pixel_rays() @ view.matrix[:3, :3].T
+    rays = lightfield.lens.pixel_rays() @ view.world_from_camera[:3, :3].T
     away = -view.position[2] / rays[..., 2]
     at = view.position + rays * away[..., None]
     is_ground = (away > 0) & (np.abs(at[..., :2]) < 6).all(axis=-1)

@@ -68,7 +68,7 @@ def test_the_base_colour_of_the_floor_follows_its_place(lens, made):
     folder = made / lens
     content = LightField.read(folder / "lightfield.json")
     view = content.views[0]
-    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+    rays = content.lens.pixel_rays() @ view.world_from_camera[:3, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
         points = view.position - rays * (view.position[2] / rays[..., 2:])
     near = inside(folder, "floor") & (np.linalg.norm(points, axis=-1) < 6)

@@ -128,7 +128,7 @@ def test_a_sample_says_the_pose_and_the_bytes_of_each_picture(folder, output):
     for name, picture in sample["pictures"].items():
         assert content[f"{view}.{name}"] == (folder / picture["path"]).read_bytes()
         assert picture["sha256"] == sha256(folder / picture["path"])
-        assert picture["world_matrix"] == true.matrix.tolist()
+        assert picture["world_matrix"] == true.world_from_camera.tolist()
     assert sample["pictures"]["perspective.png"]["resolution"] == [64, 48]
     assert sample["pictures"]["views.exr"]["resolution"] == [16, 16]
 

@@ -61,10 +61,12 @@ def write_dataset(folder, rig, depth="z", names=()):
     keys = {"depth": depth, "frame": 7, "scene": {"name": "ball"}}
     keys["render"] = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
     lightfield = LightField.from_rig(rig, lens, **keys)
-    renamed = [View.placed(n, v.matrix) for n, v in zip(names, lightfield.views, strict=False)]
+    renamed = [
+        View.placed(n, v.world_from_camera) for n, v in zip(names, lightfield.views, strict=False)
+    ]
     lightfield = lightfield.changed(views=renamed or lightfield.views)
     for view in lightfield.views:
-        colour, distance = look(lens, view.matrix)
+        colour, distance = look(lens, view.world_from_camera)
         z = z_from_distance(distance, lens.pixel_rays())
         channels = channels_of(colour.astype(np.float16), Z=np.nan_to_num(z, nan=np.inf))
         images.write_exr(folder / "exr" / f"{view.name}.exr", channels)
@@ -382,7 +384,7 @@ def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
     lightfield = write_dataset(tmp_path, rig)
     parts = [view.split for view in lightfield.views]
     picture = tmp_path / "report/rig"
-    figures.draw_rig(picture, rigs.from_settings(rig), lightfield.matrices, parts)
+    figures.draw_rig(picture, rigs.from_settings(rig), lightfield.world_from_cameras, parts)
     tab = show(make_page(tmp_path, rig))
     pixels(tab, "viewer")
     assert "15 (8 train, 7 test)" in tab.inner_text("main")
@@ -707,7 +709,7 @@ def test_without_a_panorama_the_overview_is_the_view_in_the_middle(tmp_path):
 @pytest.mark.parametrize("tilt", [-30, 0, 20])
 def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
     lens = lenses.from_camera({**rig["camera"], "resolution": [256, 192]})
-    poses = np.array([pose.matrix() for pose in rigs.from_settings(rig).poses()])
+    poses = np.array([pose.world_from_camera() for pose in rigs.from_settings(rig).poses()])
     row = epipolar.find_row(rigs.from_settings(rig), poses)
     rays = epipolar.directions(row, tilt, 90)
     seen = 0
@@ -745,7 +747,9 @@ def test_the_row_is_the_middle_one(change, expected):
     rig = {"size": 1.0, "center": [1, 2, 3], "rotation": [0, 0, 30]} | change
     rig = rigs.from_settings(rig)
     unread = change["type"] == "poses"
-    poses = np.tile(np.eye(4), (9, 1, 1)) if unread else [p.matrix() for p in rig.poses()]
+    poses = (
+        np.tile(np.eye(4), (9, 1, 1)) if unread else [p.world_from_camera() for p in rig.poses()]
+    )
     row = epipolar.find_row(rig, np.array(poses))
     assert (sorted(row.views) if row else None) == (list(expected) if expected else None)
     if row:
@@ -759,7 +763,9 @@ def test_the_row_is_the_middle_one(change, expected):
 def test_a_spheres_row_is_its_equator():
     rig = {**SPHERE, "subdivisions": 3, "center": [0, 0, 1]}
     poses = rigs.from_settings(rig).poses()
-    row = epipolar.find_row(rigs.from_settings(rig), np.array([pose.matrix() for pose in poses]))
+    row = epipolar.find_row(
+        rigs.from_settings(rig), np.array([pose.world_from_camera() for pose in poses])
+    )
     assert len(row.views) == 20
     assert all(poses[view].position[2] == pytest.approx(1, abs=1e-4) for view in row.views)
     assert (np.diff(row.places) > 0).all()

@@ -22,7 +22,7 @@ def placed(place):
 def psnr_of_synthesis(pattern):
     lens = lenses.from_camera(CAMERA)
     views = [View.placed(f"view_{n:04}f", placed(place)) for n, place in enumerate(PLACES)]
-    field = Sources(lens, views, lambda view: see(lens, view.matrix, pattern))
+    field = Sources(lens, views, lambda view: see(lens, view.world_from_camera, pattern))
     target = placed((0.14, 0.1, -0.16))
     made = field.synthesise(target, lens)
     colour, _ = see(lens, target, pattern)
@@ -39,7 +39,7 @@ def test_a_wall_shows_what_is_painted_on_it_and_what_it_reflects(behind):
 def test_a_reflection_stays_on_its_mirror_and_z_is_that_of_the_mirror():
     lens = lenses.from_camera(CAMERA)
     views = [View.placed(f"view_{n:04}f", placed(place)) for n, place in enumerate(PLACES)]
-    field = Sources(lens, views, lambda view: see_framed_mirror(lens, view.matrix))
+    field = Sources(lens, views, lambda view: see_framed_mirror(lens, view.world_from_camera))
     target = placed((0.14, 0.1, -0.16))
     made = field.synthesise(target, lens)
     colour, distance = see_framed_mirror(lens, target)

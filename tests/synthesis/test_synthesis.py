@@ -38,7 +38,9 @@ EYES = {
 
 def sources(see, camera=FISHEYE, rig=RIG):
     lens = lenses.from_camera(camera)
-    return Sources(lens, LightField.from_rig(rig, lens).views, lambda view: see(lens, view.matrix))
+    return Sources(
+        lens, LightField.from_rig(rig, lens).views, lambda view: see(lens, view.world_from_camera)
+    )
 
 
 def errors(made, see, lens, matrix=EYE):
@@ -103,11 +105,11 @@ def test_the_view_nearest_to_the_surface_counts_most():
 
     def wall(view):
         """A wall at y = 2, which the first view sees in red and the other in green."""
-        distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
+        distance = (2 - view.world_from_camera[1, 3]) / -lens.pixel_rays()[..., 2]
         return np.full((48, 48, 3), [0.8, 0, 0] if view is views[0] else [0, 0.8, 0]), distance
 
     field = Sources(lens, views, wall)
-    (target,) = (view.matrix for view in views_along_y([-2.0]))
+    (target,) = (view.world_from_camera for view in views_along_y([-2.0]))
     made = field.blended(target, lenses.from_camera(EYES["perspective"] | {"fov": 20}), [0, 1])
     middle = made.colour[30:34, 38:42]
     assert (middle[..., 0] > 10 * middle[..., 1]).all()
@@ -119,10 +121,10 @@ def test_a_view_from_farther_away_than_the_eye_counts_little():
 
     def wall(view):
         """A wall at y = 2, which is brighter in the first view, from the eye's place."""
-        distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
+        distance = (2 - view.world_from_camera[1, 3]) / -lens.pixel_rays()[..., 2]
         return np.full((48, 48, 3), 0.8 if view is views[0] else 0.2), distance
 
-    made = Sources(lens, views, wall).blended(views[0].matrix, lens, [0, 1])
+    made = Sources(lens, views, wall).blended(views[0].world_from_camera, lens, [0, 1])
     assert (made.colour[20:28, 20:28] > 0.7).all()
 
 
@@ -140,7 +142,7 @@ def test_the_colour_of_an_edge_counts_a_quarter_of_a_surfaces():
             colour[:, edge_column] = 0.8
         return colour, depth / -lens.pixel_rays()[..., 2]
 
-    made = Sources(lens, views, edge).blended(views[0].matrix, lens, [0, 1])
+    made = Sources(lens, views, edge).blended(views[0].world_from_camera, lens, [0, 1])
     # The harmonic mean of square roots. Equal weights would give 0.55.
     expected = (1 / (0.2 / 0.8**0.5 + 0.8 / 0.4**0.5)) ** 2
     assert made.colour[8:40, edge_column] == pytest.approx(expected, abs=0.03)
@@ -161,11 +163,11 @@ def test_the_colour_of_an_edge_counts_only_without_other_views():
         return colour, depth / -lens.pixel_rays()[..., 2]
 
     field = Sources(lens, views, edge)
-    alone = field.blended(views[0].matrix, lens, [0]).colour[8:40, green_column]
+    alone = field.blended(views[0].world_from_camera, lens, [0]).colour[8:40, green_column]
     assert (alone[:, 1] > 0.6).all()
     # Inside the pixel colours blend towards its neighbour on the wall, which is red.
     assert (alone[:, 1] > 10 * alone[:, 0]).all()
-    both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
+    both = field.blended(views[0].world_from_camera, lens, [0, 1]).colour[8:40, green_column]
     # The harmonic mean darkens where views disagree, but the wall shows.
     assert (both[:, 0] > 100 * both[:, 1]).all()
     assert (both[:, 0] > 0.02).all()
@@ -183,7 +185,9 @@ def test_a_single_leaf_is_a_soft_splat():
         return colour, depth / -lens.pixel_rays()[..., 2]
 
     views = views_along_y([0.0])
-    made = Sources(lens, views, leaf).blended(views[0].matrix, lens.resized(768, 768), [0])
+    made = Sources(lens, views, leaf).blended(
+        views[0].world_from_camera, lens.resized(768, 768), [0]
+    )
     assert not made.holes[300:500, 300:500].any()
     # From the leaf's middle, at 392, its footprint reaches 8 pixels in each direction.
     light = made.colour[..., 0]
@@ -201,9 +205,9 @@ def test_a_wall_does_not_shine_through_a_panel_close_in_front():
     lens = lenses.from_camera(FISHEYE | {"fov": 120})
     # The second camera stands between the panel and the wall, and sees the wall alone.
     views = views_along_y([0.0, 2.1])
-    field = Sources(lens, views, lambda view: panel_before_wall(lens, view.matrix))
+    field = Sources(lens, views, lambda view: panel_before_wall(lens, view.world_from_camera))
     target = lenses.from_camera({"lens": "rectilinear", "fov": 30, "resolution": [48, 48]})
-    made = field.blended(field.matrices[0], target, [0, 1])
+    made = field.blended(field.world_from_cameras[0], target, [0, 1])
     assert not made.holes.any()
     np.testing.assert_allclose(made.colour[..., 0], 0.8, atol=1e-3)
     np.testing.assert_allclose(made.colour[..., 1:], 0, atol=1e-6)
@@ -225,8 +229,8 @@ def test_pixels_that_no_view_sees_are_holes():
 @pytest.mark.parametrize("times", [1, 256])
 def test_a_view_at_a_cameras_place_equals_the_cameras_view(times):
     field = sources(look_at_ball)
-    made = field.blended(field.matrices[3], field.lens, [3] * times)
-    colour, distance = look_at_ball(field.lens, field.matrices[3])
+    made = field.blended(field.world_from_cameras[3], field.lens, [3] * times)
+    colour, distance = look_at_ball(field.lens, field.world_from_cameras[3])
     torn = binary_dilation(field.surface(3).torn, np.ones((3, 3)))
     # At the rim, not all samples of a pixel are seen.
     inside = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)))
@@ -240,7 +244,7 @@ def test_a_view_at_a_cameras_place_equals_the_cameras_view(times):
 
 def test_a_view_from_a_cameras_place_has_no_holes():
     field = sources(look_at_ball)
-    made = field.blended(field.matrices[3], field.lens, [3])
+    made = field.blended(field.world_from_cameras[3], field.lens, [3])
     # At the rim, the lens does not see a triangle's outer corner.
     seen = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)), 2)
     assert not made.holes[seen].any()
@@ -254,7 +258,7 @@ def test_a_single_near_pixel_leaves_no_gap_around_it():
         return colour, distance
 
     field = sources(see)
-    made = field.blended(field.matrices[3], field.lens, [3])
+    made = field.blended(field.world_from_cameras[3], field.lens, [3])
     assert not made.holes[28:62, 28:62].any()
 
 
@@ -268,7 +272,7 @@ def test_holes_are_filled_mostly_from_the_background():
 
     camera = {"lens": "rectilinear", "fov": 90, "resolution": [64, 64]}
     field = sources(see, camera, {"type": "plane", "cameras": [1, 1], "size": 0})
-    beside = field.matrices[0].copy()
+    beside = field.world_from_cameras[0].copy()
     beside[:3, 3] += 0.4 * beside[:3, 0]
     made = field.synthesise(beside, field.lens)
     middle = made.holes[32]
@@ -295,7 +299,7 @@ def test_a_highlight_that_one_view_sees_counts_little():
         colour, distance = look(lens, matrix)
         return (50 * colour if matrix[0, 3] < -0.05 else colour), distance
 
-    target = sources(look, FISHEYE, rig).matrices[1]
+    target = sources(look, FISHEYE, rig).world_from_cameras[1]
     lens = lenses.from_camera(EYES["perspective"])
     made = sources(see, FISHEYE, rig).blended(target, lens, [0, 1, 2])
     colour, _ = look(lens, target)
@@ -313,7 +317,7 @@ def test_a_slanted_plane_does_not_tear():
 def test_the_best_views_look_where_the_eye_does():
     field = sources(look)
     for index in field.best(EYE, lenses.from_camera(EYES["perspective"]), 4):
-        ahead = -field.matrices[index, :3, 2]
+        ahead = -field.world_from_cameras[index, :3, 2]
         assert ahead @ -EYE[:3, 2] > 0.4
     assert len(set(field.best(EYE, lenses.from_camera(EYES["panorama"]), 6))) == 6
 
@@ -356,7 +360,7 @@ def test_the_program_writes_a_dataset_and_a_video(dataset, tmp_path, run_program
     for view in lightfield.views:
         image = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
         assert set(image.channels) == {*"RGBAZ"}
-        colour, distance = look(lightfield.lens, view.matrix)
+        colour, distance = look(lightfield.lens, view.world_from_camera)
         z = distance * -lightfield.lens.pixel_rays()[..., 2]
         np.testing.assert_allclose(image.channels["Z"], z, rtol=0.02)
         assert np.abs(image.colour - colour).max() < 0.05
@@ -383,8 +387,8 @@ def measured(tmp_path_factory, run_program):
     field.changed(render={"passes": [*PARTS_OF_LIGHT]}).write(field.path)
     for view in field.views:
         # The ball is a mirror.
-        _, distance = look_at_ball(field.lens, view.matrix)
-        ball = distance < look(field.lens, view.matrix)[1] - 1e-6
+        _, distance = look_at_ball(field.lens, view.world_from_camera)
+        ball = distance < look(field.lens, view.world_from_camera)[1] - 1e-6
         for name in PARTS_OF_LIGHT:
             lit = {"glossy_light": ball, "diffuse_light": ~ball}.get(name, np.zeros_like(ball))
             light = dict.fromkeys("RGB", lit.astype(np.float16))
@@ -467,7 +471,7 @@ def test_smaller_views_have_the_depth_of_their_pixels(tmp_path, width):
         if variant.value == "12 × 12"
     )
     _, distance = small.read(views[0])
-    _, truth = look(small.lens, views[0].matrix)
+    _, truth = look(small.lens, views[0].world_from_camera)
     # From one small pixel to the next, the distance changes by up to 4 %.
     assert np.abs(distance / truth - 1).max() < 0.006
 

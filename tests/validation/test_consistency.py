@@ -352,10 +352,10 @@ def test_scales_are_the_missing_factors_of_angles_and_depths(angle, depth):
     for asking, answering in (cameras, cameras[::-1]):
         recorded = []
         for camera in (asking, answering):
-            arms = (points - camera.position) @ camera.world_matrix[:3, :3]
+            arms = (points - camera.position) @ camera.world_from_camera[:3, :3]
             distance = np.linalg.norm(arms, axis=1, keepdims=True) * (1 + depth)
             rays = wrong.rays(*right.pixels(arms).T)
-            recorded.append(rays * distance @ camera.world_matrix[:3, :3].T + camera.position)
+            recorded.append(rays * distance @ camera.world_from_camera[:3, :3].T + camera.position)
         usable = np.isfinite(recorded).all(axis=(0, 2))
         measured = compared(*(each[usable] for each in (*recorded, normals, footprint)))
         moments = consistency.scale_moments(measured, asking, answering)

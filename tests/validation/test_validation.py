@@ -114,7 +114,7 @@ def make_dataset(
         attributes = {images.NAN_ATTRIBUTE: 0, images.CLAMPED_ATTRIBUTE: 0}
         if depth:
             attributes[images.DEPTH_ATTRIBUTE] = depth
-        channels = render(lens, view.matrix, depth, rng)
+        channels = render(lens, view.world_from_camera, depth, rng)
         images.write_exr(folder / "exr" / f"{view.name}.exr", channels, attributes)
     lightfield.write(folder / NAME)
     return folder
@@ -173,7 +173,9 @@ def relist(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
     """Change lightfield.json. Positions and rotations then follow the matrices."""
     rewrite(dataset, change)
     lightfield = LightField.read(dataset / NAME)
-    views = [View.placed(view.name, view.matrix, view.others) for view in lightfield.views]
+    views = [
+        View.placed(view.name, view.world_from_camera, view.others) for view in lightfield.views
+    ]
     lightfield.changed(views=views).write(dataset / NAME)
 
 
@@ -285,7 +287,7 @@ def two_views_of_a_ball(folder: Path, fov: float, angle: float, recorded_fov: fl
     seen = LightField.from_rig({**rig, "look_at": [0, 0, 0]}, lenses.from_camera(camera), depth="z")
     for view in seen.views:
         rays = seen.lens.pixel_rays()
-        half = rays @ view.matrix[:3, :3].T @ view.matrix[:3, 3]
+        half = rays @ view.world_from_camera[:3, :3].T @ view.world_from_camera[:3, 3]
         with np.errstate(invalid="ignore"):
             distance = -half - np.sqrt(half**2 - 15)
         z = np.where(np.isnan(distance), np.inf, distance * -rays[..., 2]).astype(np.float32)
@@ -1109,7 +1111,7 @@ def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] =
     lightfield = LightField.read(dataset / NAME).changed(lens=lens, depth="distance")
     behind = np.abs(np.mgrid[:48, :96][1] + 0.5 - 48) > 24
     for view in lightfield.views:
-        channels = render(lens, view.matrix, "distance", np.random.default_rng(2))
+        channels = render(lens, view.world_from_camera, "distance", np.random.default_rng(2))
         channels = {name: np.where(behind, 0, pixels) for name, pixels in channels.items()}
         channels["Z"] = np.where(behind, np.float32(np.nan), channels["Z"])
         channels = spoil(channels)
@@ -1363,14 +1365,14 @@ def test_the_faces_of_a_cube_map_are_compared_with_their_view(one_view: Path) ->
         turned = np.eye(4)
         turned[:3, :3] = degrees(1, 90 * side)
         views = [
-            View.placed(f"{view.name}_{face}", view.matrix @ turned)
+            View.placed(f"{view.name}_{face}", view.world_from_camera @ turned)
             for view in lightfield_of_view.views
         ]
         lightfield = lightfield_of_view.changed(lens=lens, views=views, depth="distance")
         # The fisheyes see only what is in front, which is half of each face.
         unseen = (np.arange(32) < 16) == (side > 0)
         for view in views:
-            channels = render(lens, view.matrix, "distance", np.random.default_rng(3))
+            channels = render(lens, view.world_from_camera, "distance", np.random.default_rng(3))
             channels = {name: np.where(unseen, 0, pixels) for name, pixels in channels.items()}
             channels["Z"] = np.where(unseen, np.float32(np.nan), channels["Z"])
             images.write_exr(one_view / face / f"{view.name}.exr", channels)

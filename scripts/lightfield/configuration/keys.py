@@ -112,7 +112,7 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
 
 def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
-    pose = view.matrix.tolist()
+    pose = view.world_from_camera.tolist()
     content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
     key = [_RENDER_VERSION, version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
@@ -161,7 +161,7 @@ def names_key(lightfield: LightField) -> str:
 
 def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:
     """Return the key of the flow between two views, whose SHA-256 checksums are ``sums``."""
-    poses = [view.matrix.tolist(), other.matrix.tolist()]
+    poses = [view.world_from_camera.tolist(), other.world_from_camera.tolist()]
     return _digest([FLOW_VERSION, lightfield.lens.to_lightfield(), poses, list(sums)])
 
 

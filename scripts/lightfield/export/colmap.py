@@ -162,7 +162,7 @@ class Model:
     def _binary_images(self) -> Iterator[bytes]:
         yield struct.pack("<Q", len(self.views))
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
-            quaternion, translation = pose(view.matrix)
+            quaternion, translation = pose(view.world_from_camera)
             yield struct.pack("<i7di", number, *quaternion, *translation, 1)
             yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
             table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
@@ -192,7 +192,7 @@ class Model:
 
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
-            quaternion, translation = pose(view.matrix)
+            quaternion, translation = pose(view.world_from_camera)
             yield f"{number} {_text(quaternion + translation)} 1 {view.name}.png\n".encode()
             points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
             yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()

@@ -47,7 +47,7 @@ def export(source: SourceSequence, settings: Dnerf, folder: Path) -> None:
                     entries[view.name] = {
                         "file_path": f"./{path}",
                         "time": time,
-                        "transform_matrix": view.matrix.tolist(),
+                        "transform_matrix": view.world_from_camera.tolist(),
                     }
                 lists[part].append(entries[view.name])
         progress.done()

@@ -48,8 +48,8 @@ def _write(path: Path, source: SourceDataset, view: View, neighbour: View, key: 
     neighbour_distance[images.may_hide(source.path(neighbour))] = np.nan
     motion, visible = flow(
         source.lens,
-        view.matrix,
-        neighbour.matrix,
+        view.world_from_camera,
+        neighbour.world_from_camera,
         source.depth(view, "distance"),
         neighbour_distance,
     )

@@ -59,8 +59,8 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
     Raises `UserError` if the views are not a regular grid in the plane of their images.
     """
     views = list(lightfield.views)
-    rotations = lightfield.matrices[:, :3, :3]
-    places = lightfield.matrices[:, :3, 3] @ rotations[0]
+    rotations = lightfield.world_from_cameras[:, :3, :3]
+    places = lightfield.world_from_cameras[:, :3, 3] @ rotations[0]
     x, y, z = (np.unique(np.round(places[:, axis], 9)) for axis in range(3))
     steps = np.concatenate([np.diff(x), np.diff(y)])
     regular = (

@@ -128,7 +128,7 @@ class _Writer:
         if self.options.scale is not None:
             return self.options.scale, placed(cameras, self.options.scale, self.options.middle)
         if self.options.bounds == "rig":
-            return _fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
+            return _fitted_to_rig(cameras, -self.lightfield.world_from_cameras[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
             raise UserError(f"{self.image_dir}: no view sees anything at a finite depth")
@@ -143,7 +143,7 @@ class _Writer:
             view = views[index]
             distance = self.depth(view, "distance")[part]
             points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
-            yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
+            yield points @ view.world_from_camera[:3, :3].T + view.world_from_camera[:3, 3]
 
     def frames(self) -> dict[str, dict[str, Any]]:
         """Write the files of all views. Return their frames by the views' names."""

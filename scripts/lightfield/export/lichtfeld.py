@@ -60,7 +60,7 @@ def export(source: SourceDataset, settings: LichtFeld, folder: Path) -> None:
         if settings.normals:
             images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
         path = image.relative_to(folder).as_posix()
-        frames.append({"file_path": path, "transform_matrix": view.matrix.tolist()})
+        frames.append({"file_path": path, "transform_matrix": view.world_from_camera.tolist()})
         progress.done()
     write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
     parts = splits(source.lightfield)
@@ -118,5 +118,5 @@ def _normals(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.u
     channels = images.read_image(path).channels
     world: Floats = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float64)
     check_size(path, source.lightfield, world)
-    local = world @ view.matrix[:3, :3] * _FLIP
+    local = world @ view.world_from_camera[:3, :3] * _FLIP
     return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)

@@ -26,7 +26,7 @@ _STEP = 4
 def depths(lens: Rectilinear, view: View, surface: Surface) -> Floats:
     """Return the Z of those points of a surface that are in a view's frame."""
     points = surface.points(_STEP)[0]
-    local = (points - view.matrix[:3, 3]) @ view.matrix[:3, :3]
+    local = (points - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
     inside = pixel_indices(lens, local)[2]
     return np.asarray(-local[inside, 2])
 
@@ -46,7 +46,7 @@ def write_poses_bounds(
 
 def _row(lens: Rectilinear, view: View, seen_depths: Floats) -> Floats:
     """Return a camera's 17 numbers. ``seen_depths`` (n,) are the Z that it sees."""
-    right, up, back, position = view.matrix[:3].T
+    right, up, back, position = view.world_from_camera[:3].T
     size = np.array([lens.height, lens.width, cameras.focal_pixels(lens)[0]])
     # A camera that sees nothing has any bounds.
     bounds = [0.1, 100.0]

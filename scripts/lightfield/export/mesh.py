@@ -92,13 +92,13 @@ def _write_files(surface: Surface, formats: Sequence[str], frame: int, folder: P
 
 def _object(placed: Placed, mesh: Mesh) -> dict[str, Any]:
     """Return an object's entry in objects.json."""
-    box: Box = box_around(mesh, placed.matrix)
+    box: Box = box_around(mesh, placed.world_from_object)
     parts = {"center": box.center, "size": box.size, "rotation": box.rotation}
     return {
         "name": placed.name,
         "original": placed.original,
         **placed.numbers,
-        "matrix": placed.matrix.tolist(),
+        "matrix": placed.world_from_object.tolist(),
         # Adding 0 makes 0 of -0.
         "box": {key: (values.round(_DIGITS) + 0.0).tolist() for key, values in parts.items()},
     }
@@ -138,12 +138,12 @@ def _without_shear(surface: Surface) -> tuple[list[Placed], list[Mesh]]:
     meshes = list(surface.meshes)
     placed = []
     for each in surface.placed:
-        if _is_sheared(each.matrix):
-            world = to_world(meshes[each.mesh], each.matrix).astype(np.float32)
-            is_mirrored = np.linalg.det(each.matrix[:3, :3]) < 0
+        if _is_sheared(each.world_from_object):
+            world = to_world(meshes[each.mesh], each.world_from_object).astype(np.float32)
+            is_mirrored = np.linalg.det(each.world_from_object[:3, :3]) < 0
             triangles = meshes[each.mesh].triangles
             meshes.append(Mesh(world, triangles[:, ::-1] if is_mirrored else triangles))
-            each = replace(each, mesh=len(meshes) - 1, matrix=np.eye(4))
+            each = replace(each, mesh=len(meshes) - 1, world_from_object=np.eye(4))
         placed.append(each)
     used = sorted({each.mesh for each in placed})
     index_of = {old: new for new, old in enumerate(used)}
@@ -153,12 +153,12 @@ def _without_shear(surface: Surface) -> tuple[list[Placed], list[Mesh]]:
     )
 
 
-def _is_sheared(matrix: Floats) -> bool:
+def _is_sheared(world_from_object: Floats) -> bool:
     """Return whether a matrix (4, 4) shears or flattens, so that it is no rotation and scale."""
-    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    lengths = np.linalg.norm(world_from_object[:3, :3], axis=0)
     if (lengths == 0).any():
         return True
-    axes = matrix[:3, :3] / lengths
+    axes = world_from_object[:3, :3] / lengths
     return bool(np.abs(axes.T @ axes - np.eye(3)).max() > _PERPENDICULAR)
 
 
@@ -192,7 +192,11 @@ def _glb_content(
     for each in placed:
         # glTF's matrices go column by column.
         nodes.append(
-            {"name": each.name, "mesh": each.mesh, "matrix": each.matrix.T.ravel().tolist()}
+            {
+                "name": each.name,
+                "mesh": each.mesh,
+                "matrix": each.world_from_object.T.ravel().tolist(),
+            }
         )
     content = {
         "asset": {"version": "2.0", "generator": "Plenoforge"},

@@ -51,8 +51,8 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
         camera_entries.append(
             {
                 "Name": view.name,
-                "Position": view.matrix[:3, 3].tolist(),
-                "Rotation": rotation(view.matrix),
+                "Position": view.world_from_camera[:3, 3].tolist(),
+                "Rotation": rotation(view.world_from_camera),
                 "Depth_range": list(limits),
                 "Resolution": [lens.width, lens.height],
                 **projection(lens),
@@ -68,7 +68,7 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
     content: dict[str, Any] = {
         "Version": "3.0",
         "Content_name": absolute_path(source.dataset).name,
-        "BoundingBox_center": source.lightfield.matrices[:, :3, 3].mean(axis=0).tolist(),
+        "BoundingBox_center": source.lightfield.world_from_cameras[:, :3, 3].mean(axis=0).tolist(),
         "Fps": 30,
         "Frames_number": 1,
         "lengthsInMeters": True,
@@ -78,7 +78,7 @@ def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
     write_json(folder / "sequence.json", content)
 
 
-def rotation(matrix: Floats) -> list[float]:
+def rotation(world_from_camera: Floats) -> list[float]:
     """Return yaw, pitch and roll in degrees of a camera-to-world matrix (4, 4)."""
-    roll, pitch, yaw = np.degrees(matrix_to_euler(matrix[:3, :3] @ _FROM_OMAF)).tolist()
+    roll, pitch, yaw = np.degrees(matrix_to_euler(world_from_camera[:3, :3] @ _FROM_OMAF)).tolist()
     return [yaw, pitch, roll]

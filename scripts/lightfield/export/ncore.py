@@ -82,7 +82,7 @@ class _Frame:
         """
         begin = index * STEP
         if view.exposure is None:
-            return cls(view, begin, begin, {begin: view.matrix})
+            return cls(view, begin, begin, {begin: view.world_from_camera})
         middle = begin + EXPOSURE // 2
         start, end = (middle + round(time * EXPOSURE) for time in rows or (0, 0))
         poses = {

@@ -40,7 +40,7 @@ def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None
             images.write_png(folder / f"{path}.png", pixels)
             frames[view.name] = {
                 "file_path": f"./{path}",
-                "transform_matrix": view.matrix.tolist(),
+                "transform_matrix": view.world_from_camera.tolist(),
             }
             progress.done()
         content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in part_views]}

@@ -48,7 +48,7 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
         name = f"{view.name}.png"
         frame: dict[str, Any] = {
             "file_path": f"images/{name}",
-            "transform_matrix": view.matrix.tolist(),
+            "transform_matrix": view.world_from_camera.tolist(),
         }
         source.write_image(view, folder / "images" / name)
         if masked:

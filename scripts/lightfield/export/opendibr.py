@@ -38,7 +38,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     colour_bits, depth_bits = _BITS[settings.format]
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views
-    camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
+    camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.world_from_cameras)]
     farther = Farther()
     progress = Progress(len(views), "opendibr", "views")
     for view in views:
@@ -61,7 +61,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
             {
                 "NameColor": names[0],
                 "NameDepth": names[1],
-                **pose(view.matrix),
+                **pose(view.world_from_camera),
                 "Depth_range": list(limits),
                 "Resolution": [lens.width, lens.height],
                 **projection(lens),
@@ -74,11 +74,11 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
 
 
-def pose(matrix: Floats) -> dict[str, list[float]]:
+def pose(world_from_camera: Floats) -> dict[str, list[float]]:
     """Return the keys of a camera-to-world matrix (4, 4): metres, and XYZ Euler degrees."""
-    angles = matrix_to_euler(_TO_OPENGL @ matrix[:3, :3])
+    angles = matrix_to_euler(_TO_OPENGL @ world_from_camera[:3, :3])
     return {
-        "Position": (_TO_OPENGL @ matrix[:3, 3]).tolist(),
+        "Position": (_TO_OPENGL @ world_from_camera[:3, 3]).tolist(),
         "Rotation": np.degrees(angles).tolist(),
     }
 
@@ -99,10 +99,10 @@ def projection(lens: Lens) -> dict[str, Any]:
     return {"Projection": "Fisheye_Equidistant", "Fov": math.degrees(lens.fov)}
 
 
-def viewport(matrices: Floats) -> dict[str, Any]:
+def viewport(world_from_cameras: Floats) -> dict[str, Any]:
     """Return the viewport at the start: the mean of the positions, the first view's rotation."""
-    middle = matrices[0].copy()
-    middle[:3, 3] = matrices[:, :3, 3].mean(axis=0)
+    middle = world_from_cameras[0].copy()
+    middle[:3, 3] = world_from_cameras[:, :3, 3].mean(axis=0)
     return {
         "NameColor": "viewport",
         **pose(middle),

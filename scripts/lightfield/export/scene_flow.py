@@ -38,7 +38,7 @@ def export(source: SourceSequence, settings: SceneFlow, folder: Path) -> None:
         for view in frame.lightfield.views:
             flow, is_known = scene_flow(
                 source.lens,
-                view.matrix,
+                view.world_from_camera,
                 frame.depth(view, "distance"),
                 _motion(frame, view, "next"),
                 following.depth(view, "distance"),

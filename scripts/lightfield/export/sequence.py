@@ -94,7 +94,9 @@ class SourceSequence:
     def require_still_cameras(self) -> None:
         """Raise `UserError` if a camera moves: the consumer has one pose for all frames."""
         for frame in self.frames[1:]:
-            if not np.array_equal(frame.lightfield.matrices, self.lightfield.matrices):
+            if not np.array_equal(
+                frame.lightfield.world_from_cameras, self.lightfield.world_from_cameras
+            ):
                 raise UserError(
                     f"{frame.lightfield.path}: frames: its cameras are not where they were at the "
                     "first frame, and this format has one pose for each camera"

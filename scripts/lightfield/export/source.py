@@ -237,7 +237,7 @@ class Surface:
         first = step // 2
         part = np.s_[first::step, first::step]
         with np.errstate(invalid="ignore"):
-            world = self.rays * self.distance[..., None] @ self.view.matrix[:3, :3].T
+            world = self.rays * self.distance[..., None] @ self.view.world_from_camera[:3, :3].T
             right = np.full_like(world, np.nan)
             below = np.full_like(world, np.nan)
             right[:, :-1] = world[:, 1:] - world[:, :-1]
@@ -248,11 +248,11 @@ class Surface:
             normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
             normal *= -np.sign((normal * world).sum(axis=-1, keepdims=True))
         hits = np.isfinite(self.distance[part]) & (self.distance[part] > 0)
-        return world[part][hits] + self.view.matrix[:3, 3], normal[part][hits]
+        return world[part][hits] + self.view.world_from_camera[:3, 3], normal[part][hits]
 
     def sees(self, points: Floats) -> Bools:
         """Return which world points (n, 3) lie on this surface, so that nothing hides them."""
-        local = (points - self.view.matrix[:3, 3]) @ self.view.matrix[:3, :3]
+        local = (points - self.view.world_from_camera[:3, 3]) @ self.view.world_from_camera[:3, :3]
         expected = np.linalg.norm(local, axis=1)
         column, row, inside = pixel_indices(self.lens, local)
         distance = np.where(inside, self.distance[row, column], np.nan)

@@ -52,36 +52,38 @@ MACHINE = "machine"
 class View:
     """A view, which SILVR calls a frame. Here frames are those of an animated scene.
 
-    ``matrix`` (4, 4) is camera-to-world, in metres. The camera looks along −Z, and +Y is up.
+    ``world_from_camera`` (4, 4) is in metres. The camera looks along −Z, and +Y is up.
     ``position`` (3,) in metres and ``rotation`` (3,) give the same pose. The rotation is Blender's:
     XYZ Euler angles in radians. ``others`` are the frame's other keys.
     """
 
     name: str
-    matrix: Floats
+    world_from_camera: Floats
     position: Floats
     rotation: Floats
     others: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def placed(cls, name: str, matrix: Floats, others: Mapping[str, Any] | None = None) -> "View":
+    def placed(
+        cls, name: str, world_from_camera: Floats, others: Mapping[str, Any] | None = None
+    ) -> "View":
         """Return the view with a camera-to-world matrix (4, 4)."""
-        rotation = rotations.matrix_to_euler(matrix[:3, :3])
-        return cls(name, matrix, matrix[:3, 3], rotation, others or {})
+        rotation = rotations.matrix_to_euler(world_from_camera[:3, :3])
+        return cls(name, world_from_camera, world_from_camera[:3, 3], rotation, others or {})
 
     @classmethod
     def from_frame(cls, frame: Frame) -> "View":
         """Return the view of a frame. Where a form of the pose is missing, the other gives it."""
-        matrix = frame.matrix
-        if matrix is None:
+        world_from_camera = frame.world_from_camera
+        if world_from_camera is None:
             assert frame.position is not None
             assert frame.rotation is not None
-            matrix = np.eye(4)
-            matrix[:3, :3] = rotations.euler_to_matrix(frame.rotation)
-            matrix[:3, 3] = frame.position
+            world_from_camera = np.eye(4)
+            world_from_camera[:3, :3] = rotations.euler_to_matrix(frame.rotation)
+            world_from_camera[:3, 3] = frame.position
         if frame.position is None or frame.rotation is None:
-            return cls.placed(frame.name, matrix, frame.others)
-        return cls(frame.name, matrix, frame.position, frame.rotation, frame.others)
+            return cls.placed(frame.name, world_from_camera, frame.others)
+        return cls(frame.name, world_from_camera, frame.position, frame.rotation, frame.others)
 
     @property
     def split(self) -> str | None:
@@ -107,7 +109,7 @@ class View:
             "name": self.name,
             "position": self.position.tolist(),
             "rotation": self.rotation.tolist(),
-            "world_matrix": self.matrix.tolist(),
+            "world_matrix": self.world_from_camera.tolist(),
             **self.others,
         }
 
@@ -170,7 +172,7 @@ class LightField:
         views = [
             View(
                 pose.name,
-                np.round(pose.matrix(), 12) + 0.0,  # without noise such as 6e-17 or −0
+                np.round(pose.world_from_camera(), 12) + 0.0,  # without noise such as 6e-17 or −0
                 np.array(pose.position),
                 np.array(pose.rotation),
                 {"split": pose.split} if pose.split else {},
@@ -225,7 +227,7 @@ class LightField:
 
     def with_flow(self) -> "LightField":
         """Return a copy in which the flow of each view leads to a neighbour."""
-        targets = [self.views[number].name for number in neighbours(self.matrices)]
+        targets = [self.views[number].name for number in neighbours(self.world_from_cameras)]
         return self.changed(
             views=[
                 replace(view, others={**view.others, "flow": target})
@@ -239,11 +241,11 @@ class LightField:
         assert motion
         views = []
         for view in self.views:
-            matrices = {}
+            world_from_cameras = {}
             for name, time in (("start", -0.5), ("end", 0.5)):
-                pose = pose_at(view.matrix, motion.travel, motion.turn, time)
-                matrices[name] = (np.round(pose, 12) + 0.0).tolist()
-            views.append(replace(view, others={**view.others, EXPOSURE: matrices}))
+                pose = pose_at(view.world_from_camera, motion.travel, motion.turn, time)
+                world_from_cameras[name] = (np.round(pose, 12) + 0.0).tolist()
+            views.append(replace(view, others={**view.others, EXPOSURE: world_from_cameras}))
         return self.changed(views=views)
 
     @property
@@ -252,9 +254,9 @@ class LightField:
         return self.path.parent
 
     @cached_property
-    def matrices(self) -> Floats:
+    def world_from_cameras(self) -> Floats:
         """The views' camera-to-world matrices, (n, 4, 4)."""
-        return np.array([view.matrix for view in self.views]).reshape(-1, 4, 4)
+        return np.array([view.world_from_camera for view in self.views]).reshape(-1, 4, 4)
 
     @property
     def frame(self) -> float:

@@ -11,17 +11,17 @@ from lightfield.geometry.rotations import Floats, quaternion_to_matrix
 _FLIP = np.diag([1.0, -1.0, -1.0])
 
 
-def pose(matrix: Floats) -> tuple[list[float], list[float]]:
+def pose(world_from_camera: Floats) -> tuple[list[float], list[float]]:
     """Return the quaternion (w, x, y, z) and the translation of a camera-to-world matrix (4, 4)."""
     # SciPy takes long to import, and no plan needs it.
     from scipy.spatial.transform import Rotation
 
-    turn = _FLIP @ matrix[:3, :3].T
+    turn = _FLIP @ world_from_camera[:3, :3].T
     x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    return [w, x, y, z], (-turn @ matrix[:3, 3]).tolist()
+    return [w, x, y, z], (-turn @ world_from_camera[:3, 3]).tolist()
 
 
-def camera_to_world(quaternion: Floats, translation: Floats) -> Floats:
+def world_from_camera(quaternion: Floats, translation: Floats) -> Floats:
     """Return the camera-to-world matrix (4, 4) of a unit quaternion (w, x, y, z) and (3,)."""
     turn = quaternion_to_matrix(quaternion)
     matrix = np.eye(4)

@@ -8,16 +8,18 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def pose_at(matrix: Floats, travel: Sequence[float], turn: Sequence[float], time: float) -> Floats:
+def pose_at(
+    world_from_camera: Floats, travel: Sequence[float], turn: Sequence[float], time: float
+) -> Floats:
     """Return the camera-to-world matrix (4, 4) at a ``time`` from −½, the start, to ½, the end.
 
-    ``matrix`` is the pose at time 0. ``travel`` (3,) are the metres of a whole exposure along the
-    camera's right, up and back. ``turn`` (3,) is a rotation vector in degrees about the same axes.
-    Both have constant speed.
+    ``world_from_camera`` is the pose at time 0. ``travel`` (3,) are the metres of a whole exposure
+    along the camera's right, up and back. ``turn`` (3,) is a rotation vector in degrees about the
+    same axes. Both have constant speed.
     """
-    pose = matrix.copy()
-    pose[:3, 3] += matrix[:3, :3] @ np.asarray(travel, np.float64) * time
-    pose[:3, :3] = matrix[:3, :3] @ _rotation(np.radians(turn) * time)
+    pose = world_from_camera.copy()
+    pose[:3, 3] += world_from_camera[:3, :3] @ np.asarray(travel, np.float64) * time
+    pose[:3, :3] = world_from_camera[:3, :3] @ _rotation(np.radians(turn) * time)
     return pose
 
 

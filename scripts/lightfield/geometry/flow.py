@@ -20,8 +20,8 @@ _RETURNS = 0.5
 SAME_SURFACE = 0.1
 
 
-def neighbours(matrices: Array) -> list[int]:
-    """Return for each of the views at ``matrices`` (n, 4, 4) the number of its neighbour.
+def neighbours(world_from_cameras: Array) -> list[int]:
+    """Return for each of the views at ``world_from_cameras`` (n, 4, 4) the number of its neighbour.
 
     The neighbour is the view with the nearest camera; of equally near ones, the view with the most
     similar direction. Views from the very same place do not count, because nothing hides anything
@@ -29,7 +29,7 @@ def neighbours(matrices: Array) -> list[int]:
     """
     from lightfield.geometry.nearest import Cameras
 
-    places, ahead = matrices[:, :3, 3], matrices[:, :3, 2]
+    places, ahead = world_from_cameras[:, :3, 3], world_from_cameras[:, :3, 2]
     cameras = Cameras(places)
     chosen = []
     for view, look in enumerate(ahead):
@@ -44,7 +44,11 @@ def neighbours(matrices: Array) -> list[int]:
 
 
 def flow(
-    lens: Lens, matrix: Array, other_matrix: Array, distance: Array, other_distance: Array
+    lens: Lens,
+    world_from_camera: Array,
+    world_from_other: Array,
+    distance: Array,
+    other_distance: Array,
 ) -> tuple[Array, Array]:
     """Return the flow (h, w, 2) from one view to another, and where (h, w) its point is visible.
 
@@ -54,11 +58,11 @@ def flow(
     has no ray to the point. A point is visible if it is in the other view's frame, and if nothing
     hides it there.
     """
-    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    rays = lens.pixel_rays() @ world_from_camera[:3, :3].T
     far = np.isinf(distance)
-    baseline = np.where(far[..., None], 0, matrix[:3, 3] - other_matrix[:3, 3])
+    baseline = np.where(far[..., None], 0, world_from_camera[:3, 3] - world_from_other[:3, 3])
     offset = rays * np.where(far, 1, distance)[..., None] + baseline
-    pixels = lens.pixels(offset @ other_matrix[:3, :3])
+    pixels = lens.pixels(offset @ world_from_other[:3, :3])
     x, y = np.moveaxis(pixels, -1, 0)
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
@@ -78,7 +82,7 @@ def flow(
 
 def scene_flow(
     lens: Lens,
-    matrix: Array,
+    world_from_camera: Array,
     distance: Array,
     motion: Array,
     next_distance: Array,
@@ -87,9 +91,9 @@ def scene_flow(
     """Return how far (h, w, 3) the surface at each pixel moves in the world, and where it is known.
 
     Flow is in metres, from one frame to the next, and 0 where it is not known. The camera at
-    ``matrix`` (4, 4) stands still. The distances (h, w) are along the ray, in metres, at the two
-    frames. ``motion`` (h, w, 2) is the way in pixels to the surface's place in the next frame.
-    ``next_motion`` is the way of the next frame's surfaces back to this one.
+    ``world_from_camera`` (4, 4) stands still. The distances (h, w) are along the ray, in metres, at
+    the two frames. ``motion`` (h, w, 2) is the way in pixels to the surface's place in the next
+    frame. ``next_motion`` is the way of the next frame's surfaces back to this one.
 
     The surface is at the distance that the next frame has around its new place. 1/distance is
     interpolated there, which is linear on a plane. Flow is not known where
@@ -129,7 +133,9 @@ def scene_flow(
     is_known &= np.isfinite(rays).all(axis=-1)
     before = lens.pixel_rays() * np.where(is_known, distance, 0)[..., None]
     after = rays * np.where(is_known, 1 / np.where(inverse > 0, inverse, 1), 0)[..., None]
-    return np.where(is_known[..., None], (after - before) @ matrix[:3, :3].T, 0), is_known
+    return np.where(
+        is_known[..., None], (after - before) @ world_from_camera[:3, :3].T, 0
+    ), is_known
 
 
 def _pixel(lens: Lens, place: Array) -> tuple[Array, Array, Array]:

@@ -28,14 +28,14 @@ MIRRORED = "its first 3 × 3 must be a rotation, and mirrors"
 class Frame(NamedTuple):
     """A view's name and pose as a file gives them. A form of the pose that it lacks is None.
 
-    ``where`` says in messages where the frame stands in its file. ``matrix`` (4, 4) is
+    ``where`` says in messages where the frame stands in its file. ``world_from_camera`` (4, 4) is
     camera-to-world, in metres. ``position`` (3,) is in metres, and ``rotation`` (3,) holds XYZ
     Euler angles in radians: there are both or neither. ``others`` are the frame's other keys.
     """
 
     where: str
     name: str
-    matrix: Floats | None = None
+    world_from_camera: Floats | None = None
     position: Floats | None = None
     rotation: Floats | None = None
     others: Mapping[str, Any] = MappingProxyType({})
@@ -56,13 +56,13 @@ def read_frames(frames: Any) -> list[Frame]:
         if frame.name in names:
             raise UserError(f"{frame.where}: {frame.name}: is the name of two frames")
         names.add(frame.name)
-    _check_rotations([frame for frame in views if frame.matrix is not None])
+    _check_rotations([frame for frame in views if frame.world_from_camera is not None])
     return views
 
 
 def _check_rotations(frames: Sequence[Frame]) -> None:
     """Raise `UserError` for the first matrix of ``frames`` that scales, shears or mirrors."""
-    turns = np.array([frame.matrix for frame in frames]).reshape(-1, 4, 4)[:, :3, :3]
+    turns = np.array([frame.world_from_camera for frame in frames]).reshape(-1, 4, 4)[:, :3, :3]
     for wrong, problem in ((is_skewed(turns), SKEWED), (is_mirrored(turns), MIRRORED)):
         if wrong.any():
             raise UserError(f"{frames[int(np.argmax(wrong))].where}: world_matrix: {problem}")
@@ -140,7 +140,7 @@ def _frame(where: str, content: Any) -> Frame:
     return Frame(
         where,
         name,
-        matrix=pose.get("world_matrix"),
+        world_from_camera=pose.get("world_matrix"),
         position=pose.get("position"),
         rotation=pose.get("rotation"),
         others=others,

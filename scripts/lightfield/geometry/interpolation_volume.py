@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 def _immersive_planes(
     mesh: list[tuple[int, ...]],
     hull: ConvexHull,
-    matrices: Floats,
+    world_from_cameras: Floats,
     lens: Lens,
     face_inside: bool,
 ) -> Floats | None:
@@ -43,7 +43,7 @@ def _immersive_planes(
     ``mesh`` holds the triangles of a closed surface between cameras (m, 4, 4). ``hull`` is the
     convex hull of their positions. None if the lens does not see its own axis: the volume is empty.
     """
-    positions = matrices[:, :3, 3]
+    positions = world_from_cameras[:, :3, 3]
     outside: Floats = hull.equations
     if sees_all_round(lens):
         return outside
@@ -52,7 +52,7 @@ def _immersive_planes(
         return None
     # If cameras face inside, a ray runs from the surface through the point.
     sign = -1.0 if face_inside else 1.0
-    normals = sign * sides @ np.swapaxes(matrices[:, :3, :3], 1, 2)
+    normals = sign * sides @ np.swapaxes(world_from_cameras[:, :3, :3], 1, 2)
     bounds = np.full(normals.shape[:2], np.inf)
     for camera, corner in neighbours(mesh):
         bounds[camera] = np.minimum(bounds[camera], normals[camera] @ positions[corner])
@@ -61,23 +61,23 @@ def _immersive_planes(
     return bounded
 
 
-def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
+def parts_to_edge(world_from_cameras: Floats, lens: Lens, places: Floats) -> Floats:
     """Return where places (n, 3) lie between the middle and the edge of the immersive volume.
 
-    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 is the edge in that direction. All
-    are inf if the middle itself is outside, as it is among cameras in a plane. The convex hull of
-    the cameras stands for the surface between them.
+    0 is the middle of the cameras ``world_from_cameras`` (m, 4, 4), and 1 is the edge in that
+    direction. All are inf if the middle itself is outside, as it is among cameras in a plane. The
+    convex hull of the cameras stands for the surface between them.
     """
-    positions = matrices[:, :3, 3]
+    positions = world_from_cameras[:, :3, 3]
     middle = positions.mean(axis=0)
     nowhere = np.full(len(places), np.inf)
     try:
         hull = ConvexHull(positions)
     except QhullError:
         return nowhere
-    outward = ((positions - middle) * -matrices[:, :3, 2]).sum() >= 0
+    outward = ((positions - middle) * -world_from_cameras[:, :3, 2]).sum() >= 0
     mesh = [tuple(map(int, cell)) for cell in hull.simplices]
-    planes = _immersive_planes(mesh, hull, matrices, lens, not outward)
+    planes = _immersive_planes(mesh, hull, world_from_cameras, lens, not outward)
     if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
         return nowhere
     reach = -(planes[:, :3] @ middle + planes[:, 3])

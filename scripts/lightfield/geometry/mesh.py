@@ -28,14 +28,14 @@ class Placed:
     - ``name``: its name. An instance's is that of the id passes' names.json.
     - ``original``: the name of the object that it shows.
     - ``mesh``: an index of `Surface.meshes`.
-    - ``matrix`` (4, 4): from the mesh's coordinates to the world, in metres with Z up.
+    - ``world_from_object`` (4, 4): from the mesh's coordinates to the world, in metres with Z up.
     - ``numbers``: its values in the id passes "object" and "instance". Empty without such passes.
     """
 
     name: str
     original: str
     mesh: int
-    matrix: Floats
+    world_from_object: Floats
     numbers: dict[str, int]
 
 
@@ -57,9 +57,9 @@ class Surface:
         """
         for placed in self.placed:
             mesh = self.meshes[placed.mesh]
-            is_mirrored = np.linalg.det(placed.matrix[:3, :3]) < 0
+            is_mirrored = np.linalg.det(placed.world_from_object[:3, :3]) < 0
             triangles = mesh.triangles[:, ::-1] if is_mirrored else mesh.triangles
-            yield placed, to_world(mesh, placed.matrix), triangles
+            yield placed, to_world(mesh, placed.world_from_object), triangles
 
 
 @dataclass(frozen=True)
@@ -74,22 +74,25 @@ class Box:
     rotation: Floats
 
 
-def to_world(mesh: Mesh, matrix: Floats) -> Floats:
+def to_world(mesh: Mesh, world_from_object: Floats) -> Floats:
     """Return the vertices (n, 3) of a mesh in the world."""
-    return np.asarray(mesh.vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.asarray(
+        mesh.vertices.astype(np.float64) @ world_from_object[:3, :3].T + world_from_object[:3, 3]
+    )
 
 
-def box_around(mesh: Mesh, matrix: Floats) -> Box:
-    """Return the tightest box around a mesh in the world, along the axes of its ``matrix``.
+def box_around(mesh: Mesh, world_from_object: Floats) -> Box:
+    """Return the tightest box around a mesh in the world, along the axes of its object.
 
-    If the matrix shears, the axes are those of the nearest rotation (polar decomposition).
+    If ``world_from_object`` (4, 4) shears, the axes are those of the nearest rotation, by polar
+    decomposition.
     """
-    left, _, right = np.linalg.svd(matrix[:3, :3])
+    left, _, right = np.linalg.svd(world_from_object[:3, :3])
     rotation = left @ right
     if np.linalg.det(rotation) < 0:
         # A mirrored object. The box of the opposite axes is the same.
         rotation = -rotation
-    along_axes = to_world(mesh, matrix) @ rotation
+    along_axes = to_world(mesh, world_from_object) @ rotation
     low = along_axes.min(axis=0)
     high = along_axes.max(axis=0)
     return Box(rotation @ ((low + high) / 2), high - low, rotation)

@@ -48,5 +48,5 @@ def middle_view(rig: Rig) -> int:
     row = rig.middle_row(places) or range(len(poses))
     middle = row[len(row) // 2]
     if rig.is_round and len(row) < len(poses):
-        middle = max(row, key=lambda number: -poses[number].matrix()[1, 2])
+        middle = max(row, key=lambda number: -poses[number].world_from_camera()[1, 2])
     return middle * rig.views_a_position

@@ -210,11 +210,11 @@ def compare(
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
     angles = metrics.solid_angles(truth.lens)
     weights = angles if isinstance(truth.lens, Equirectangular) else None
-    cameras = np.array([view.matrix for view in around])
-    eyes = np.array([view.matrix for view in views])
+    cameras = np.array([view.world_from_camera for view in around])
+    eyes = np.array([view.world_from_camera for view in views])
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
     for view, to_edge in zip(views, parts.tolist(), strict=True):
-        synthesised = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
+        synthesised = variant.sources.synthesise(view.world_from_camera, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
         true_picture = _developed(true, exposure, inside)
         picture = _developed(synthesised.colour, exposure, inside)

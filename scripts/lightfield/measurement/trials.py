@@ -204,7 +204,7 @@ class Trials:
 
     def camera(self, view: View) -> Camera:
         """Return the camera of a view for `lightfield.validation.consistency`."""
-        return Camera(self.lens, view.matrix, conventional_depth(self.lens))
+        return Camera(self.lens, view.world_from_camera, conventional_depth(self.lens))
 
     def windows(self, size: int, count: int) -> list[Window]:
         """Choose ``count`` windows of ``size``² pixels, spread evenly over the views and the image.
@@ -250,15 +250,15 @@ class Trials:
         cycles.set_sampling(RenderBlock(**{**self.inventory["sampling"], **settings.to_json()}))
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings.seed, window.view.name)
-        raw = render_colour(window.view.matrix, seed, self.lightfield.passes)
+        raw = render_colour(window.view.world_from_camera, seed, self.lightfield.passes)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
         channels |= {f"{name}.Y": part.mean(axis=-1) for name, part in raw.passes.items()}
         if raw.passes:
-            channels |= self._surfaces(render_geometry(window.view.matrix).materials)
+            channels |= self._surfaces(render_geometry(window.view.world_from_camera).materials)
         elif self.lightfield.depth:
-            channels["Z"] = render_geometry(window.view.matrix).depth
+            channels["Z"] = render_geometry(window.view.world_from_camera).depth
         images.write_exr(
             path,
             channels,
@@ -296,7 +296,7 @@ class Trials:
         # The first render also loads shared data, so it does not count.
         cycles.set_sampling(settings.changed(samples=1, denoise=True))
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
-        colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
+        colour_pass.render_colour(self.lightfield.views[0].world_from_camera, 0)
         self._started = True
 
 
@@ -323,9 +323,11 @@ def nearest_view(views: Sequence[View], view: View) -> View | None:
     least_cosine = math.cos(math.radians(70))
     distances = []
     for index, other in enumerate(views):
-        looks_alike = other.matrix[:3, 2] @ view.matrix[:3, 2] > least_cosine
+        looks_alike = other.world_from_camera[:3, 2] @ view.world_from_camera[:3, 2] > least_cosine
         if other.name != view.name and looks_alike:
-            distance = float(np.linalg.norm(other.matrix[:3, 3] - view.matrix[:3, 3]))
+            distance = float(
+                np.linalg.norm(other.world_from_camera[:3, 3] - view.world_from_camera[:3, 3])
+            )
             distances.append((round(distance, 6), index))
     return views[min(distances)[1]] if distances else None
 

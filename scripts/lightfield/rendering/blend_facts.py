@@ -100,7 +100,7 @@ def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None
     """
     scene = bpy.context.scene
     lenses = []
-    matrices = {}
+    world_from_cameras = {}
     names = []
     clips = []
     for frame in sorted(set(camera_frames)):
@@ -113,25 +113,25 @@ def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None
         lenses.append(_lens(camera.data))
         clips.append([round(camera.data.clip_start, 6), round(camera.data.clip_end, 6)])
         # Cycles ignores scale along the camera's own axes, too.
-        matrix = camera.matrix_world.normalized()
-        matrices[str(frame)] = [list(row) for row in matrix]
+        world_from_camera = camera.matrix_world.normalized()
+        world_from_cameras[str(frame)] = [list(row) for row in world_from_camera]
         if is_taken:
-            _check_pose(names[-1], frame, np.array(matrix))
+            _check_pose(names[-1], frame, np.array(world_from_camera))
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has a different lens at frame {frame} than at frame "
                 f"{min(camera_frames)}, and all views of a dataset share one lens; choose frames "
                 "with the same lens"
             )
-    return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": matrices}
+    return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": world_from_cameras}
 
 
-def _check_pose(name: str, frame: float, matrix: Floats) -> None:
+def _check_pose(name: str, frame: float, world_from_camera: Floats) -> None:
     """Raise `UserError` if no view can have the matrix (4, 4) of the camera ``name`` as its pose.
 
     Cycles mirrors or shears the picture of such a camera, and a pose is a rotation.
     """
-    turn = matrix[:3, :3]
+    turn = world_from_camera[:3, :3]
     if is_skewed(turn):
         raise UserError(
             f"the camera {name} is sheared or flat at frame {frame}, which a view's pose cannot "

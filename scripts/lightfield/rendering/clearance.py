@@ -76,7 +76,7 @@ def surroundings(positions: Floats, reach: float = REACH) -> Surroundings:
     nearest = np.full(len(positions), np.inf)
     lowest = np.full(3, np.inf)
     highest = np.full(3, -np.inf)
-    for mesh, matrix, low, high in instances():
+    for mesh, world_from_object, low, high in instances():
         lowest = np.minimum(lowest, low)
         highest = np.maximum(highest, high)
         # Only cameras within reach of the instance's bounding box can be near its surface.
@@ -85,7 +85,7 @@ def surroundings(positions: Floats, reach: float = REACH) -> Surroundings:
         if not len(near) or not len(mesh.polygons):
             continue
         tree = BVHTree.FromPolygons(
-            [matrix @ vertex.co for vertex in mesh.vertices],
+            [world_from_object @ vertex.co for vertex in mesh.vertices],
             [tuple(polygon.vertices) for polygon in mesh.polygons],
         )
         for index in near:
@@ -105,9 +105,9 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
         # Particles may show copies of an object that is hidden itself.
         if obj.hide_render and not instance.is_instance:
             continue
-        matrix = instance.matrix_world.copy()
-        corners = np.array([matrix @ Vector(corner) for corner in obj.bound_box])
-        yield obj.data, matrix, corners.min(axis=0), corners.max(axis=0)
+        world_from_object = instance.matrix_world.copy()
+        corners = np.array([world_from_object @ Vector(corner) for corner in obj.bound_box])
+        yield obj.data, world_from_object, corners.min(axis=0), corners.max(axis=0)
 
 
 class Enclosure(NamedTuple):
@@ -216,7 +216,7 @@ class _Hit(NamedTuple):
     """The first hit of a ray: an object, or an instance of it, with its world matrix."""
 
     obj: Any
-    matrix: Any
+    world_from_object: Any
     is_back: bool
 
 
@@ -225,18 +225,18 @@ def _first_hits(position: Floats, depsgraph: Any) -> list[_Hit]:
     hits = []
     for vertex in icosphere(1):
         direction = Vector(vertex).normalized()
-        hit, _, normal, _, obj, matrix = bpy.context.scene.ray_cast(
+        hit, _, normal, _, obj, world_from_object = bpy.context.scene.ray_cast(
             depsgraph, Vector(position), direction
         )
         if hit:
-            hits.append(_Hit(obj, matrix, normal.dot(direction) > 0))
+            hits.append(_Hit(obj, world_from_object, normal.dot(direction) > 0))
     return hits
 
 
 def _is_within_open(position: Floats, hit: _Hit, depsgraph: Any) -> bool:
     """Return whether a camera is in an object's bounding box, and some ray does not meet it."""
     obj = hit.obj.evaluated_get(depsgraph)
-    inverse = hit.matrix.inverted_safe()
+    inverse = hit.world_from_object.inverted_safe()
     local = inverse @ Vector(position)
     corners = np.array(obj.bound_box)
     if not np.all(np.abs(np.array(local) - corners.mean(axis=0)) < np.ptp(corners, axis=0) / 2):

@@ -46,9 +46,9 @@ class Colour:
 
 
 def render_colour(
-    world_matrix: Array, seed: int, passes: Iterable[Pass] = (), alpha: bool = False
+    world_from_camera: Array, seed: int, passes: Iterable[Pass] = (), alpha: bool = False
 ) -> Colour:
-    """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world.
+    """Render the view of a camera at ``world_from_camera``, (4, 4) camera-to-world.
 
     Returns those of the ``passes`` that belong to colour. Cycles must be set up for them.
     """
@@ -57,7 +57,7 @@ def render_colour(
     mattes = [view_pass for view_pass in colour_passes if view_pass.kind == "matte"]
     matte = None
     if mattes and namesakes.shown():
-        matte = _render_matte(world_matrix, seed, mattes)
+        matte = _render_matte(world_from_camera, seed, mattes)
     _reports.clear()
     needed: dict[str, str] = {}
     for view_pass in colour_passes:
@@ -68,7 +68,7 @@ def render_colour(
     needed["Combined"] = "RGBA" if alpha else "RGB"
     if counts_samples:
         needed[_COUNTS] = "X"
-    rendered = render_view(world_matrix, seed, needed)
+    rendered = render_view(world_from_camera, seed, needed)
     if matte:
         rendered.passes.update(matte.passes)
     samples = None
@@ -95,7 +95,7 @@ def render_colour(
     )
 
 
-def _render_matte(world_matrix: Array, seed: int, mattes: Iterable[Pass]) -> Rendered:
+def _render_matte(world_from_camera: Array, seed: int, mattes: Iterable[Pass]) -> Rendered:
     """Render ``mattes`` in which objects of equal names have their full names.
 
     The camera's rays are those of the colour, and nothing else is followed.
@@ -106,7 +106,7 @@ def _render_matte(world_matrix: Array, seed: int, mattes: Iterable[Pass]) -> Ren
         for name, value in _MATTE_SAMPLING.items():
             stack.enter_context(changed(cycles, name, value))
         stack.enter_context(namesakes.under_full_names())
-        return render_view(world_matrix, seed, needed)
+        return render_view(world_from_camera, seed, needed)
 
 
 def _to_rec_709() -> Array | None:

@@ -87,9 +87,9 @@ def cleared(pixels: Array, where: Array) -> Array:
 
 
 def render_geometry(
-    world_matrix: Array, motion: bool = False, apart: bool = False, alpha: bool = False
+    world_from_camera: Array, motion: bool = False, apart: bool = False, alpha: bool = False
 ) -> Geometry:
-    """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees.
+    """Render the geometry that a camera at ``world_from_camera``, (4, 4) camera-to-world, sees.
 
     ``motion`` adds the motion, ``apart`` the instances, ``alpha`` the alpha. Cycles must be set up
     for them.
@@ -101,7 +101,7 @@ def render_geometry(
         cycles_passes = geometry_passes | (instances.CYCLES_PASSES if apart else {})
         if alpha:
             cycles_passes = cycles_passes | {"Combined": "RGBA"}
-        rendered = render_view(world_matrix, 0, cycles_passes)
+        rendered = render_view(world_from_camera, 0, cycles_passes)
     depth = rendered.passes["Depth"]
     # Cycles leaves NaN where the lens sees nothing.
     hit = depth < MISS

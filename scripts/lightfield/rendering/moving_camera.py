@@ -36,17 +36,17 @@ def set_up(motion: CameraMotion | None) -> None:
     scene.camera.rotation_mode = "QUATERNION"
 
 
-def place_camera(world_matrix: Array) -> None:
-    """Place the scene's camera at ``world_matrix``, (4, 4) camera-to-world.
+def place_camera(world_from_camera: Array) -> None:
+    """Place the scene's camera at ``world_from_camera``, (4, 4) camera-to-world.
 
     A moving camera is there in the middle of the exposure.
     """
     scene = bpy.context.scene
     camera = scene.camera
     if not _motions:
-        camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
+        camera.matrix_world = mathutils.Matrix(np.asarray(world_from_camera).tolist())
         return
-    middle = np.asarray(world_matrix, np.float64)
+    middle = np.asarray(world_from_camera, np.float64)
     (motion,) = _motions
     render = scene.render
     # Blender remaps frames before it reads keys.

@@ -256,15 +256,17 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in view_passes)
     began = time.perf_counter()
     choose_eye(view.name)
-    part = visible_part.choose(visible, view.matrix, lightfield.lens)
+    part = visible_part.choose(visible, view.world_from_camera, lightfield.lens)
     catches = lightfield.transparent and bool(shadow_catchers.names())
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
     if has_geometry:
-        geometry = render_geometry(view.matrix, "motion" in names, "instance" in names, catches)
+        geometry = render_geometry(
+            view.world_from_camera, "motion" in names, "instance" in names, catches
+        )
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render.seed, view.name)
-    colour = render_colour(view.matrix, seed, view_passes, lightfield.transparent)
+    colour = render_colour(view.world_from_camera, seed, view_passes, lightfield.transparent)
     unshown_pixels = None
     if catches:
         colour, geometry, unshown_pixels = unshown.left_out(colour, geometry, view_passes)

@@ -35,13 +35,13 @@ class Rendered:
     synchronization_seconds: float
 
 
-def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Rendered:
-    """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world.
+def render_view(world_from_camera: Array, seed: int, passes: Mapping[str, str]) -> Rendered:
+    """Render the view of a camera at ``world_from_camera``, (4, 4) camera-to-world.
 
     ``passes`` are names and channels, as in {"Combined": "RGB"}.
     """
     scene = bpy.context.scene
-    place_camera(world_matrix)
+    place_camera(world_from_camera)
     scene.cycles.seed = seed
     groups = len(view_layer(scene).lightgroups)
     layer = view_layer(scene).name

@@ -77,14 +77,17 @@ def _places(depsgraph: Any) -> NDArray[np.float64] | None:
     return np.concatenate(groups)
 
 
-def choose(visible: NDArray[np.float64] | None, world_matrix: Array, lens: Lens) -> Part | None:
-    """Make the next renders, from ``world_matrix``, (4, 4), those of the part that shows something.
+def choose(
+    visible: NDArray[np.float64] | None, world_from_camera: Array, lens: Lens
+) -> Part | None:
+    """Make the next renders those of the part that shows something.
 
-    ``visible`` are `places`. Return the part. Return None for the whole view.
+    ``world_from_camera`` (4, 4) is their pose, and ``visible`` are `places`. Return the part.
+    Return None for the whole view.
     """
     if visible is None:
         return None
-    part = _part(visible, world_matrix, lens)
+    part = _part(visible, world_from_camera, lens)
     if part:
         set_window(part.x, part.y, part.width, part.height)
     else:
@@ -92,12 +95,12 @@ def choose(visible: NDArray[np.float64] | None, world_matrix: Array, lens: Lens)
     return part
 
 
-def _part(visible: NDArray[np.float64], world_matrix: Array, lens: Lens) -> Part | None:
+def _part(visible: NDArray[np.float64], world_from_camera: Array, lens: Lens) -> Part | None:
     """Return the smallest part of a perspective view that has all ``visible`` places.
 
     Return None if there is none, or if a place is not in front of the camera.
     """
-    in_camera = (visible - world_matrix[:3, 3]) @ world_matrix[:3, :3]
+    in_camera = (visible - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
     if not len(visible) or not (in_camera[:, 2] < 0).all():
         return None
     # The rows and columns of a perspective view follow from these slopes.

@@ -99,9 +99,11 @@ def _sensor_folder(folder: Path, lightfield: LightField) -> Path | None:
     for path in sorted(folder.glob(f"*/{NAME}")):
         sensed = LightField.read(path)
         settings = settings_in(sensed.content)
-        poses = sensed.matrices
-        is_resampled = sensed.lens != lightfield.lens or len(poses) != len(lightfield.matrices)
-        if settings and not is_resampled and np.allclose(poses, lightfield.matrices):
+        poses = sensed.world_from_cameras
+        is_resampled = sensed.lens != lightfield.lens or len(poses) != len(
+            lightfield.world_from_cameras
+        )
+        if settings and not is_resampled and np.allclose(poses, lightfield.world_from_cameras):
             stops_of_folder[path.parent] = abs(settings.bracket or 0.0)
     return min(stops_of_folder, key=stops_of_folder.__getitem__, default=None)
 
@@ -174,7 +176,7 @@ def facts(
     bpy = images.attribute(first, images.BPY_ATTRIBUTE)
     texts = {
         "Views": f"{len(parts)}" + (f" ({', '.join(counts)})" if counts else ""),
-        "Rig": rig_text(rig, lightfield.matrices[:, :3, 3]),
+        "Rig": rig_text(rig, lightfield.world_from_cameras[:, :3, 3]),
         "Lens": lens.description,
         "Field of view": _field_of_view(lens),
         "Resolution": f"{lens.width} × {lens.height}",

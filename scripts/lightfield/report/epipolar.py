@@ -46,16 +46,16 @@ class Row:
     places: Array
 
 
-def find_row(rig: Rig, matrices: Array) -> Row | None:
+def find_row(rig: Rig, world_from_cameras: Array) -> Row | None:
     """Return the row in the middle of a rig, or None if no three cameras are in a row.
 
-    ``matrices`` (views, 4, 4) are the poses of all its views. A grid has the middle row of its
-    front. A sphere has the level of cameras nearest the equator.
+    ``world_from_cameras`` (views, 4, 4) are the poses of all its views. A grid has the middle row
+    of its front. A sphere has the level of cameras nearest the equator.
     """
     if rig.is_omnidirectional:
         return None
     faces = rig.views_a_position
-    local = (matrices[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
+    local = (world_from_cameras[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
     numbers = rig.middle_row(local)
     if len(numbers) < _FEWEST_CAMERAS:
         return None
@@ -64,17 +64,17 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
         azimuth = np.arctan2(local[numbers, 0], local[numbers, 1])
         order = np.argsort(azimuth, kind="stable")
         return Row("ring", [views[i] for i in order], rig.turn.T, azimuth[order])
-    places = matrices[views, :3, 3]
+    places = world_from_cameras[views, :3, 3]
     along = places[-1] - places[0]
     length = float(np.linalg.norm(along))
     if length == 0:
         return None
     along = along / length
-    if along @ matrices[views[0], :3, 0] < 0:
+    if along @ world_from_cameras[views[0], :3, 0] < 0:
         along = -along
         views = views[::-1]
         places = places[::-1]
-    forward = -matrices[views[0], :3, 2]
+    forward = -world_from_cameras[views[0], :3, 2]
     forward = forward - (forward @ along) * along
     forward = forward / np.linalg.norm(forward)
     axes = np.stack([along, forward, np.cross(along, forward)])
@@ -102,7 +102,7 @@ def directions(row: Row, tilt: float, columns: int) -> Array:
 
 def sample(
     lens: Lens,
-    matrix: Array,
+    world_from_camera: Array,
     colour: Array,
     depth: Array | None,
     meaning: str | None,
@@ -115,7 +115,7 @@ def sample(
     nearest pixel. NaN depth marks rays that the lens does not see.
     """
     height, width = colour.shape[:2]
-    camera_rays = rays @ matrix[:3, :3]
+    camera_rays = rays @ world_from_camera[:3, :3]
     x, y = np.moveaxis(lens.pixels(camera_rays), -1, 0)
     with np.errstate(invalid="ignore"):
         visible = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)

@@ -61,7 +61,7 @@ def draw(job: ReportFigures) -> None:
     sheet = contact_sheet.sheet(thinned, lens.width, lens.height)
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
-    draw_rig(output / "rig", rig, lightfield.matrices, parts)
+    draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts)
     if job.panorama:
         overview = _read_panorama(job.panorama)
     else:

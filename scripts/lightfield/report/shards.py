@@ -147,7 +147,7 @@ def _add_file(
         "resolution": lightfield.content["resolution"],
         "sensor_size": lightfield.content["sensor_size"],
         "depth": lightfield.depth,
-        "world_matrix": view.matrix.tolist(),
+        "world_matrix": view.world_from_camera.tolist(),
     }
 
 

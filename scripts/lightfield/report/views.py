@@ -123,10 +123,10 @@ def collect(
                 entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
         if len(json.dumps(shown)) <= MOST_BYTES:
             break
-    row = epipolar.find_row(rig, lightfield.matrices)
+    row = epipolar.find_row(rig, lightfield.world_from_cameras)
     row_views = epipolar.thinned(row.views, _MOST_ROWS) if row else []
-    middle = lightfield.matrices[middle_view(rig)]
-    distances = np.abs(lightfield.matrices[embedded] - middle).sum(axis=(1, 2))
+    middle = lightfield.world_from_cameras[middle_view(rig)]
+    distances = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
     data = {
         "views": _cameras(lightfield),
         "outline": [[_rounded(point) for point in line] for line in rig.outline()],
@@ -188,12 +188,14 @@ def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
         {
             "name": view.name,
             "part": view.split,
-            "at": _rounded(matrix[:3, 3]),
-            "right": _rounded(matrix[:3, 0]),
-            "up": _rounded(matrix[:3, 1]),
-            "ahead": _rounded(-matrix[:3, 2]),
+            "at": _rounded(world_from_camera[:3, 3]),
+            "right": _rounded(world_from_camera[:3, 0]),
+            "up": _rounded(world_from_camera[:3, 1]),
+            "ahead": _rounded(-world_from_camera[:3, 2]),
         }
-        for view, matrix in zip(lightfield.views, lightfield.matrices, strict=True)
+        for view, world_from_camera in zip(
+            lightfield.views, lightfield.world_from_cameras, strict=True
+        )
     ]
 
 
@@ -225,17 +227,17 @@ def _pictures(
         return shown | {"points": None, "depth": None, "walk": None}
     rays = small.pixel_rays()
     reach = depth_range(depths)
-    matrices = lightfield.matrices
+    world_from_cameras = lightfield.world_from_cameras
     distances = converted(depths, rays, lightfield.depth, "distance")
-    farther = seeming_farther(small, light, distances, matrices[embedded])
+    farther = seeming_farther(small, light, distances, world_from_cameras[embedded])
     for entry, depth, steps in zip(packed, depths, farther, strict=True):
         entry["depth"] = webp(pack_depth(depth, reach, steps))
     colours = pictures.develop(light, exposure)
     return shown | {
-        "points": _points(distances, rays, matrices[embedded], colours),
+        "points": _points(distances, rays, world_from_cameras[embedded], colours),
         "depth": _depth_scale(depths, reach, lightfield.depth),
         "walk": walk.collect(
-            small, matrices[:, :3, 3], distances, fills_holes=not lightfield.transparent
+            small, world_from_cameras[:, :3, 3], distances, fills_holes=not lightfield.transparent
         ),
     }
 
@@ -275,7 +277,7 @@ def _middle(length: int) -> slice:
 
 
 def _points(
-    distances: Array, rays: Array, matrices: Array, colours: Array
+    distances: Array, rays: Array, world_from_cameras: Array, colours: Array
 ) -> dict[str, Any] | None:
     """Return some of the points that the views see: places and sRGB colours, packed.
 
@@ -288,10 +290,10 @@ def _points(
         return None
     picked = np.linspace(0, len(view) - 1, min(len(view), _CANDIDATES)).astype(int)
     at = view[picked], row[picked], column[picked]
-    turned = np.einsum("nij,nj->ni", matrices[at[0], :3, :3], rays[at[1:]])
-    places = matrices[at[0], :3, 3] + distances[at][:, None] * turned
+    turned = np.einsum("nij,nj->ni", world_from_cameras[at[0], :3, :3], rays[at[1:]])
+    places = world_from_cameras[at[0], :3, 3] + distances[at][:, None] * turned
     # Drop the farthest points: they would cost all others their precision.
-    way = places - matrices[:, :3, 3].mean(axis=0)
+    way = places - world_from_cameras[:, :3, 3].mean(axis=0)
     away = np.linalg.norm(way, axis=1)
     near = np.flatnonzero(away <= np.percentile(away, 98))
     scale = np.log1p(away[near] / (0.2 * np.median(away))) / np.maximum(away[near], 1e-9)
@@ -336,7 +338,7 @@ def _epipolar_images(
 
     ``kept`` are the positions of the shown views in the row.
     """
-    matrices = lightfield.matrices
+    world_from_cameras = lightfield.world_from_cameras
     fitted = lightfield.lens.fitted(_EPIPOLAR_SIDE)
     columns = epipolar.COLUMNS[row.kind]
     count = len(kept)
@@ -348,7 +350,7 @@ def _epipolar_images(
         for tilted, tilt in enumerate(epipolar.TILTS):
             rays = epipolar.directions(row, tilt, columns)
             light[tilted, place], depth[tilted, place] = epipolar.sample(
-                fitted, matrices[number], view.colour, view.depth, lightfield.depth, rays
+                fitted, world_from_cameras[number], view.colour, view.depth, lightfield.depth, rays
             )
     reach = depth_range(depth)
     sight = np.isfinite(depth) | np.isposinf(depth)
@@ -356,7 +358,7 @@ def _epipolar_images(
     first, last = (int(used[0]), int(used[-1]) + 1) if used.size else (0, columns)
     light = light[:, :, first:last]
     depth = depth[:, :, first:last]
-    centers = matrices[[row.views[i] for i in kept], :3, 3] @ row.axes.T
+    centers = world_from_cameras[[row.views[i] for i in kept], :3, 3] @ row.axes.T
     return {
         "kind": row.kind,
         "views": row.views,

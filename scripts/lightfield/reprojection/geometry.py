@@ -15,13 +15,13 @@ from lightfield.reprojection import lens_map
 class Target:
     """One image to make of each view.
 
-    Its name is the view's name and ``suffix``. ``rotation`` (3, 3) turns rays of its camera into
-    the source camera's.
+    Its name is the view's name and ``suffix``. ``source_from_target`` (3, 3) turns rays of its
+    camera into the source camera's.
     """
 
     suffix: str
     lens: Lens
-    rotation: Array
+    source_from_target: Array
 
 
 @dataclass(frozen=True)
@@ -41,22 +41,24 @@ class Geometry:
     def compute(self, target: Target) -> lens_map.LensMap:
         """Compute the lens map of one of the targets."""
         return lens_map.compute(
-            self.source, target.lens, target.rotation, self.filter, self.samples
+            self.source, target.lens, target.source_from_target, self.filter, self.samples
         )
 
     def map_settings(self, target: Target) -> dict[str, Any]:
         """Return what the lens map of one of the targets depends on."""
         return lens_map.settings(
-            self.source, target.lens, target.rotation, self.filter, self.samples
+            self.source, target.lens, target.source_from_target, self.filter, self.samples
         )
 
 
 def _targets(settings: Reprojection, source: Lens) -> list[Target]:
-    rotation = lens_map.rotation_matrix(*settings.rotation)
+    source_from_target = lens_map.rotation_matrix(*settings.rotation)
     lens = settings.lens(source)
     if not settings.cube_map:
-        return [Target("", lens, rotation)]
-    faces = [Target(f"_{name}", lens, rotation @ turn) for name, turn in CUBE_FACES.items()]
+        return [Target("", lens, source_from_target)]
+    faces = [
+        Target(f"_{name}", lens, source_from_target @ turn) for name, turn in CUBE_FACES.items()
+    ]
     return [target for target in faces if _is_seen(target, source)]
 
 
@@ -65,9 +67,9 @@ def _is_seen(target: Target, source: Lens) -> bool:
 
     A fisheye of 180°, for example, shows nothing of the face behind it.
     """
-    to_source = _rays_across(target.lens) @ target.rotation.T
+    to_source = _rays_across(target.lens) @ target.source_from_target.T
     # The whole image of a narrow lens may lie between these rays, so test the other way, too.
-    to_target = _rays_across(source) @ target.rotation
+    to_target = _rays_across(source) @ target.source_from_target
     return _shows_any(source, to_source) or _shows_any(target.lens, to_target)
 
 

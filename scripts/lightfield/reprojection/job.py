@@ -120,7 +120,7 @@ class Job:
     def copies(self) -> bool:
         """Whether the target is the source itself, so that nothing is resampled."""
         target = self.targets[0]
-        return target.lens == self.source and np.array_equal(target.rotation, np.eye(3))
+        return target.lens == self.source and np.array_equal(target.source_from_target, np.eye(3))
 
     @cached_property
     def maps(self) -> list[LensMap]:
@@ -312,18 +312,23 @@ def _turned(view: lightfield.View, target: Target, light: Light) -> lightfield.V
     if light.group:
         others["light"] = light.group
     view = replace(view, others=others)
-    if np.array_equal(target.rotation, np.eye(3)):
+    if np.array_equal(target.source_from_target, np.eye(3)):
         return replace(view, name=name)
-    matrix = _turned_matrix(view.matrix, target)
+    world_from_camera = _world_from_target(view.world_from_camera, target)
     if view.exposure:
-        start, end = (_turned_matrix(pose, target).tolist() for pose in view.exposure)
+        start, end = (_world_from_target(pose, target).tolist() for pose in view.exposure)
         exposure = {lightfield.EXPOSURE: {"start": start, "end": end}}
         view = replace(view, others={**view.others, **exposure})
-    return replace(view, name=name, matrix=matrix, rotation=matrix_to_euler(matrix[:3, :3]))
+    return replace(
+        view,
+        name=name,
+        world_from_camera=world_from_camera,
+        rotation=matrix_to_euler(world_from_camera[:3, :3]),
+    )
 
 
-def _turned_matrix(matrix: Array, target: Target) -> Array:
+def _world_from_target(world_from_camera: Array, target: Target) -> Array:
     """Return the camera-to-world matrix (4, 4) of a target's camera."""
-    turned = matrix.copy()
-    turned[:3, :3] = turned[:3, :3] @ target.rotation
-    return turned
+    world_from_target = world_from_camera.copy()
+    world_from_target[:3, :3] = world_from_camera[:3, :3] @ target.source_from_target
+    return world_from_target

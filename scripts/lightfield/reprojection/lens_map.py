@@ -95,13 +95,13 @@ class LensMap:
 
 
 def settings(
-    source: Lens, target: Lens, rotation: Array, filter_name: str, samples: int
+    source: Lens, target: Lens, source_from_target: Array, filter_name: str, samples: int
 ) -> dict[str, Any]:
     """Return everything that a lens map depends on, as values of JSON. Each view's key has it."""
     return {
         "source": source.to_lightfield(),
         "target": target.to_lightfield(),
-        "rotation": np.asarray(rotation, np.float64).tolist(),
+        "rotation": np.asarray(source_from_target, np.float64).tolist(),
         "filter": filter_name,
         "samples": samples,
         "topology": [*_topology(source), len(CUBE_FACES) if isinstance(source, CubeMap) else 1],
@@ -111,24 +111,24 @@ def settings(
 def compute(
     source: Lens,
     target: Lens,
-    rotation: Array,
+    source_from_target: Array,
     filter_name: str = DEFAULT_FILTER,
     samples: int = 1,
 ) -> LensMap:
     """Compute the map from ``source`` to ``target``, with ``samples`` × ``samples`` for each pixel.
 
-    ``rotation`` (3, 3) turns rays of the target camera into the source camera's.
+    ``source_from_target`` (3, 3) turns rays of the target camera into the source camera's.
     """
     _check_sampling(filter_name, samples)
     reach = FILTERS[filter_name].reach
-    fold = Fold.of_map(source, target, rotation)
+    fold = Fold.of_map(source, target, source_from_target)
     points, target_cos, magnification, footprints, counts, areas = _measure_pixels(
-        source, target, rotation, fold, filter_name
+        source, target, source_from_target, fold, filter_name
     )
     summary = _summary(fold.unfolded(magnification))
     sample_points, sample_fold = points, fold
     if samples > 1:
-        sample_points, areas = _measure_samples(source, target, rotation, samples, reach)
+        sample_points, areas = _measure_samples(source, target, source_from_target, samples, reach)
         sample_fold = Fold((len(sample_points), sample_points.shape[1]))
     part = _source_part(source, areas, sample_fold, reach)
     if isinstance(source, CubeMap):
@@ -145,7 +145,7 @@ def compute(
         footprints = fold.steps(footprints)
         counts = fold.unfolded(counts)
     lens_map = LensMap(
-        settings=settings(source, target, rotation, filter_name, samples),
+        settings=settings(source, target, source_from_target, filter_name, samples),
         summary=summary,
         window=part.window,
         centers=centers,
@@ -176,7 +176,7 @@ def _check_sampling(filter_name: str, samples: int) -> None:
 
 
 def _measure_pixels(
-    source: Lens, target: Lens, rotation: Array, fold: Fold, filter_name: str
+    source: Lens, target: Lens, source_from_target: Array, fold: Fold, filter_name: str
 ) -> tuple[Array, Array, Array, Array, Array, list[Any]]:
     """Measure the target pixels of the fold's part: where each lies in the source, and its extent.
 
@@ -205,7 +205,7 @@ def _measure_pixels(
         y = np.arange(rows.start - 1, rows.stop + 1) + 0.5
         rays = target.rays(x[None, :], y[:, None])
         target_cos[rows] = -rays[1:-1, 1:-1, 2]
-        padded = source.pixels(rays @ rotation.T)
+        padded = source.pixels(rays @ source_from_target.T)
         left, right, above, below = _neighbours(padded, source)
         count = measure(
             padded[1:-1, 1:-1],
@@ -458,7 +458,7 @@ def _face_cosines(source: CubeMap, border: int) -> Array:
 
 
 def _measure_samples(
-    source: Lens, target: Lens, rotation: Array, samples: int, reach: int
+    source: Lens, target: Lens, source_from_target: Array, samples: int, reach: int
 ) -> tuple[Array, list[Any]]:
     """Return the source coordinates of n × n samples for each pixel, and their bounds.
 
@@ -473,7 +473,7 @@ def _measure_samples(
     areas = []
     for rows in _strips(height, width):
         y = (np.arange(rows.start, rows.stop) + 0.5) / samples
-        pixels = source.pixels(target.rays(x[None, :], y[:, None]) @ rotation.T)
+        pixels = source.pixels(target.rays(x[None, :], y[:, None]) @ source_from_target.T)
         inside = (pixels >= 0) & (pixels <= [source.width, source.height])
         if isinstance(source, CubeMap):
             pixels = _on_strip(pixels, source, _margin(reach))

@@ -47,17 +47,17 @@ FARTHEST = np.float32(0.02)
 
 @dataclass(frozen=True)
 class Picture:
-    """A view to compare: ``root`` (h, w, 3) of its colour, ``inverse`` (h, w) distance, ``matrix``.
+    """A view to compare: ``root`` (h, w, 3) of its colour, ``inverse`` (h, w) distance, and pose.
 
-    ``inverse`` is in 1/m, NaN where there is no ray. ``matrix`` (4, 4) is camera-to-world.
+    ``inverse`` is in 1/m, NaN where there is no ray. The pose is ``world_from_camera`` (4, 4).
     """
 
     root: Array
     inverse: Array
-    matrix: Array
+    world_from_camera: Array
 
 
-def picture(colour: Array, distance: Array, matrix: Array) -> Picture:
+def picture(colour: Array, distance: Array, world_from_camera: Array) -> Picture:
     """Return a view's linear ``colour`` (h, w, 3) and ``distance`` (h, w) as a small picture."""
     inverse = inverse_of(colour, distance)
     height, width = shape = _small_shape(inverse.shape)
@@ -69,7 +69,7 @@ def picture(colour: Array, distance: Array, matrix: Array) -> Picture:
             for small, full in zip(shape, inverse.shape, strict=True)
         )
         inverse = inverse[np.ix_(row, column)]
-    return Picture(np.sqrt(colour).astype(np.float32), inverse, matrix)
+    return Picture(np.sqrt(colour).astype(np.float32), inverse, world_from_camera)
 
 
 def inverse_of(colour: Array, distance: Array) -> Array:
@@ -87,9 +87,9 @@ def _small_shape(shape: tuple[int, ...]) -> tuple[int, int]:
     return height, width
 
 
-def neighbours(matrices: Array, index: int) -> list[int]:
-    """Return the views to compare a view with, of the ``matrices`` (n, 4, 4) of all views."""
-    apart = np.linalg.norm(matrices[:, :3, 3] - matrices[index, :3, 3], axis=1)
+def neighbours(world_from_cameras: Array, index: int) -> list[int]:
+    """Return the views to compare a view with. ``world_from_cameras`` (n, 4, 4) has all views."""
+    apart = np.linalg.norm(world_from_cameras[:, :3, 3] - world_from_cameras[index, :3, 3], axis=1)
     nearest = np.argsort(apart, kind="stable")
     return [int(other) for other in nearest if other != index][:NEIGHBOURS]
 
@@ -170,7 +170,7 @@ class _Comparison:
         self.here = here
         self.others = others
         self.lens = lens
-        rays = lens.pixel_rays() @ here.matrix[:3, :3].T
+        rays = lens.pixel_rays() @ here.world_from_camera[:3, :3].T
         self.rays = rays.astype(np.float32).reshape(-1, 3)
         self.seen: list[Array] = []
 
@@ -189,8 +189,10 @@ class _Comparison:
         is_first = not self.seen
         for place, other in enumerate(self.others):
             pixels = candidates if is_first else candidates[self.seen[place][candidates]]
-            offset = (self.here.matrix[:3, 3] - other.matrix[:3, 3]).astype(np.float32)
-            turn = other.matrix[:3, :3].astype(np.float32)
+            offset = (self.here.world_from_camera[:3, 3] - other.world_from_camera[:3, 3]).astype(
+                np.float32
+            )
+            turn = other.world_from_camera[:3, :3].astype(np.float32)
             # One plane after the other: numpy projects these faster than vectors.
             directions = np.empty((3, len(pixels)), np.float32)
             lengths = np.empty(len(pixels), np.float32)

@@ -48,7 +48,7 @@ def run(job: Synthesize) -> None:
     size = (lens.width, lens.height)
     with video(path, size, job.rate) if job.video else nullcontext() as add_to_video:
         for view in targets.views:
-            made = sources.synthesise(view.matrix, lens, job.best)
+            made = sources.synthesise(view.world_from_camera, lens, job.best)
             if exposure is None:
                 exposure = pictures.exposure_for(made.colour[~made.holes])
             images.write_exr(job.output / "exr" / f"{view.name}.exr", made.channels(depth, rays))

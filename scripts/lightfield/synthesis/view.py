@@ -131,7 +131,7 @@ class Sources:
         self.read = read
         self.fills_holes = fills_holes
         self.most = most
-        self.matrices: Array = np.array([view.matrix for view in views])
+        self.world_from_cameras: Array = np.array([view.world_from_camera for view in views])
         self._held: OrderedDict[int, Surface] = OrderedDict()
         self._pictures: OrderedDict[int, apparent.Picture] = OrderedDict()
         self._latest_layers: tuple[Array, Array] | None = None
@@ -160,7 +160,9 @@ class Sources:
         """Return a view as a small picture. Keeps the latest ones in memory."""
         if index not in self._pictures:
             colour, distance = self.read(self.views[index])
-            self._pictures[index] = apparent.picture(colour, distance, self.matrices[index])
+            self._pictures[index] = apparent.picture(
+                colour, distance, self.world_from_cameras[index]
+            )
             if len(self._pictures) > self.most * apparent.NEIGHBOURS:
                 self._pictures.popitem(last=False)
         self._pictures.move_to_end(index)
@@ -168,7 +170,9 @@ class Sources:
 
     def _steps(self, index: int) -> Array:
         """Return how much farther away a view's pixels (h, w) seem, as `apparent.farther` does."""
-        others = [self._picture(other) for other in apparent.neighbours(self.matrices, index)]
+        others = [
+            self._picture(other) for other in apparent.neighbours(self.world_from_cameras, index)
+        ]
         return farther(self._picture(index), others, self.lens)
 
     def _surface(self, index: int, colour: Array, distance: Array) -> Surface:
@@ -208,9 +212,9 @@ class Sources:
         away = np.concatenate([distance * rays for distance in self.distances])
         points = target[:3, 3] + away
         quality = np.zeros((len(self.views), len(points)))
-        for index, matrix in enumerate(self.matrices):
-            offset = points - matrix[:3, 3]
-            _, _, is_seen = pixel_indices(self.lens, offset @ matrix[:3, :3])
+        for index, world_from_camera in enumerate(self.world_from_cameras):
+            offset = points - world_from_camera[:3, 3]
+            _, _, is_seen = pixel_indices(self.lens, offset @ world_from_camera[:3, :3])
             kernels.qualities(away, offset, is_seen, quality[index])
         chosen: list[int] = []
         worth = np.zeros(len(points))
@@ -275,7 +279,7 @@ class Sources:
         `kernels.draw` does.
         """
         surface = self.surface(index)
-        here = self.matrices[index]
+        here = self.world_from_cameras[index]
         wraps = _wraps(lens)
         turns = np.stack([_turn(here), target[:3, :3].astype(np.float32)])
         offset = (here[:3, 3] - target[:3, 3]).astype(np.float32)
@@ -340,15 +344,21 @@ def farther(here: apparent.Picture, others: Sequence[apparent.Picture], lens: Le
     return enlarged
 
 
-def seeming_farther(lens: Lens, colours: Array, distances: Array, matrices: Array) -> Array:
+def seeming_farther(
+    lens: Lens, colours: Array, distances: Array, world_from_cameras: Array
+) -> Array:
     """Return `apparent.farther` of the pixels (n, h, w) of all views of a ``lens``.
 
     ``colours`` (n, h, w, 3) are linear, ``distances`` (n, h, w) in metres.
     """
-    shown = [apparent.picture(*view) for view in zip(colours, distances, matrices, strict=True)]
+    shown = [
+        apparent.picture(*view) for view in zip(colours, distances, world_from_cameras, strict=True)
+    ]
     return np.stack(
         [
-            farther(picture, [shown[n] for n in apparent.neighbours(matrices, index)], lens)
+            farther(
+                picture, [shown[n] for n in apparent.neighbours(world_from_cameras, index)], lens
+            )
             for index, picture in enumerate(shown)
         ]
     )
@@ -383,9 +393,9 @@ def typical(inverse: Array) -> Array:
     return distances
 
 
-def _turn(matrix: Array) -> Array:
+def _turn(world_from_camera: Array) -> Array:
     """Return the matrix (3, 3) by which a camera's row vectors become the world's."""
-    return np.asarray(matrix[:3, :3].T, np.float32)
+    return np.asarray(world_from_camera[:3, :3].T, np.float32)
 
 
 def to_rim(lens: Lens) -> Array:

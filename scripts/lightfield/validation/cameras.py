@@ -18,7 +18,7 @@ def camera_of(image_set: ImageSet, view: int) -> Camera:
     angle = _central_angle(lightfield.lens)
     # So many pixels are as wide as a pixel of a source view, in the middle.
     spacing = math.ceil(grain / angle) if grain > angle > 0 else 1
-    matrix = lightfield.matrices[view]
+    matrix = lightfield.world_from_cameras[view]
     return Camera(lightfield.lens, matrix, lightfield.depth, grain, spacing)
 
 

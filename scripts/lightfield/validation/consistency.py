@@ -71,7 +71,7 @@ CONTRADICT = 3
 class Camera:
     """A view's camera.
 
-    - ``world_matrix`` (4, 4): camera to world.
+    - ``world_from_camera`` (4, 4): camera to world.
     - ``depth``: ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
     - ``grain``: the angle in radians of a source view's pixel, if this view was reprojected. A
       depth may come from that far beside its pixel's centre.
@@ -80,14 +80,14 @@ class Camera:
     """
 
     lens: Lens
-    world_matrix: Array
+    world_from_camera: Array
     depth: str
     grain: float = 0.0
     spacing: int = 1
 
     @property
     def position(self) -> Array:
-        return self.world_matrix[:3, 3]
+        return self.world_from_camera[:3, 3]
 
     def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
         """Return the world points (..., 3) at ``depth`` along the rays of the pixel centres."""
@@ -95,12 +95,12 @@ class Camera:
         distance = converted(depth, rays, self.depth, "distance")
         with np.errstate(invalid="ignore"):
             arms = rays * distance[..., np.newaxis]
-            points: Array = arms @ self.world_matrix[:3, :3].T + self.position
+            points: Array = arms @ self.world_from_camera[:3, :3].T + self.position
         return points
 
     def pixels(self, points: Array) -> Array:
         """Return the pixel coordinates (..., 2) of world points. NaN where they are not seen."""
-        return self.lens.pixels((points - self.position) @ self.world_matrix[:3, :3])
+        return self.lens.pixels((points - self.position) @ self.world_from_camera[:3, :3])
 
 
 @dataclass(frozen=True)
@@ -408,7 +408,7 @@ def _outwards(camera: Camera, points: Array) -> Array:
     """Return θ ∂point/∂θ: how points move when their angles θ from the optical axis are scaled."""
     arms = points - camera.position
     distance = np.linalg.norm(arms, axis=1, keepdims=True)
-    axis = -camera.world_matrix[:3, 2]
+    axis = -camera.world_from_camera[:3, 2]
     cosine = arms @ axis[:, np.newaxis] / distance
     sine = np.linalg.norm(np.cross(arms, axis), axis=1, keepdims=True) / distance
     tangent = (arms * cosine - axis * distance) / np.maximum(sine, 1e-12)

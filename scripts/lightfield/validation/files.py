@@ -80,9 +80,9 @@ def _poses(image_set: ImageSet) -> Check:
     faults = {}
     for view in views:
         difference = (
-            np.abs(rotations.euler_to_matrix(view.rotation) - view.matrix[:3, :3]).max()
-            + np.abs(view.position - view.matrix[:3, 3]).max()
-            + np.abs(view.matrix[3] - (0, 0, 0, 1)).max()
+            np.abs(rotations.euler_to_matrix(view.rotation) - view.world_from_camera[:3, :3]).max()
+            + np.abs(view.position - view.world_from_camera[:3, 3]).max()
+            + np.abs(view.world_from_camera[3] - (0, 0, 0, 1)).max()
         )
         if not difference < tolerance:
             faults[view.name] = "world_matrix: is not that of its position and rotation"
@@ -112,7 +112,7 @@ def _moves_elsewhere(view: View, tolerance: float) -> bool:
         if view.exposure is None:
             return False
         middle = pose_between(*view.exposure, 0.5)
-        return not np.abs(middle - view.matrix).max() < tolerance
+        return not np.abs(middle - view.world_from_camera).max() < tolerance
     except (LookupError, TypeError, ValueError):
         return True  # These are no two matrices.
 

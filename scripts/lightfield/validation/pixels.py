@@ -381,8 +381,8 @@ class Examiner:
         if source is None or number is None:
             return None
         lens, from_lens = target.lightfield.lens, source.lightfield.lens
-        to_world = target.lightfield.matrices[file.view]
-        from_world = source.lightfield.matrices[number]
+        to_world = target.lightfield.world_from_cameras[file.view]
+        from_world = source.lightfield.world_from_cameras[number]
         # Round it, and remove −0, so that views turned alike share one answer.
         turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
         key = (lens, turn.tobytes())

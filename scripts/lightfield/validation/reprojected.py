@@ -57,8 +57,8 @@ class _Rays:
     def __init__(self, target: ImageSet, view: int, source: ImageSet, source_view: int) -> None:
         self.lens = target.lightfield.lens
         self.source_lens = source.lightfield.lens
-        to_world = target.lightfield.matrices[view, :3, :3]
-        self.turn = source.lightfield.matrices[source_view, :3, :3].T @ to_world
+        to_world = target.lightfield.world_from_cameras[view, :3, :3]
+        self.turn = source.lightfield.world_from_cameras[source_view, :3, :3].T @ to_world
         step = max(1, int((self.lens.width * self.lens.height / _PIXELS) ** 0.5))
         grid = np.mgrid[step // 2 : self.lens.height : step, step // 2 : self.lens.width : step]
         self.rows, self.columns = grid.reshape(2, -1)

@@ -75,7 +75,7 @@ def _shared_poses(lightfields: Mapping[str, LightField]) -> list[str]:
                     continue
                 name = f"{folder}/{view.name}"
                 # Adding 0.0 turns -0.0 into 0.0, so that equal poses have equal bytes.
-                pose = (np.round(view.matrix, _SAME_POSE) + 0.0).tobytes()
+                pose = (np.round(view.world_from_camera, _SAME_POSE) + 0.0).tobytes()
                 if part == "train":
                     training_views[pose] = name
                 elif pose in training_views:

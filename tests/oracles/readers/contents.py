@@ -19,7 +19,7 @@ FLOAT32 = 4 * float(np.finfo(np.float32).eps)
 
 @dataclass(frozen=True)
 class ExportedView:
-    """One view: ``matrix`` (4, 4) is camera-to-world, metres, x right, y up, looking along −z.
+    """One view: ``world_from_camera`` (4, 4) in metres, x right, y up, looking along −z.
 
     ``file`` and ``place`` say where it stands. ``name`` is the view's, or None where the export
     numbers its pictures. ``exposure`` are the matrices at the start and the end of a moving
@@ -29,7 +29,7 @@ class ExportedView:
     file: Path
     place: str
     name: str | None
-    matrix: Floats
+    world_from_camera: Floats
     exposure: tuple[Floats, Floats] | None = None
 
 

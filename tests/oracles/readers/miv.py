@@ -48,7 +48,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 exported.expect(f"{where}: HasInvalidDepth", camera["HasInvalidDepth"], True)
                 _check_videos(where, listing.parent, camera, content["Frames_number"], exported)
                 _add_pictures(listing.parent, camera, options, exported)
-        middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
+        middle = np.mean([view.world_from_camera[:3, 3] for view in exported.views], axis=0)
         center = content["BoundingBox_center"]
         exported.expect(f"{path}: BoundingBox_center", center, middle.tolist())
     return exported

@@ -28,7 +28,7 @@ def read(
     with reading(path, "poses_bounds.npy"):
         rows = numbers(np.load(path), (len(exported.views), 17))
     for index, (row, view) in enumerate(zip(rows, exported.views, strict=True)):
-        exported.expect(f"{path}: row {index}: pose", llff_matrix(row), view.matrix)
+        exported.expect(f"{path}: row {index}: pose", llff_matrix(row), view.world_from_camera)
         exported.expect(f"{path}: row {index}: 0 < near < far", bool(0 < row[15] < row[16]), True)
         camera = folder / f"cam{(view.name or '').removeprefix('image').zfill(2)}"
         exported.faults += _picture_faults(camera, size, len(frames))

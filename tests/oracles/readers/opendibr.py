@@ -97,14 +97,14 @@ def _matrix(camera: dict[str, Any]) -> Floats:
 def _check_viewport(place: str, viewport: dict[str, Any], exported: Exported) -> None:
     """Check that the viewport is at the mean of the views, with the rotation of the first view."""
     matrix = _matrix(viewport)
-    middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
+    middle = np.mean([view.world_from_camera[:3, 3] for view in exported.views], axis=0)
     width, height = numbers(viewport["Resolution"], (2,)).tolist()
     fx, fy = numbers(viewport["Focal"], (2,)).tolist()
     near, far = numbers(viewport["Depth_range"], (2,)).tolist()
     exported.expect(f"{place}: NameColor", viewport["NameColor"], "viewport")
     exported.expect(f"{place}: Projection", viewport["Projection"], "Perspective")
     exported.expect(f"{place}: Position", matrix[:3, 3].tolist(), middle.tolist())
-    turn = exported.views[0].matrix[:3, :3]
+    turn = exported.views[0].world_from_camera[:3, :3]
     exported.expect(f"{place}: Rotation", matrix[:3, :3].tolist(), turn.tolist())
     exported.expect(
         f"{place}: Principle_point", viewport["Principle_point"], [width / 2, height / 2]

@@ -141,14 +141,14 @@ def _read_checked(path: Path, _modified_ns: int) -> PosesFile:
         if frame.name in names:
             raise UserError(f"{path}: {frame.where}: name: {frame.name!r} occurs twice")
         names.add(frame.name)
-    matrices = _stacked([frame.matrix for frame in frames], (4, 4))
+    world_from_cameras = _stacked([frame.world_from_camera for frame in frames], (4, 4))
     positions = _stacked([frame.position for frame in frames], (3,))
     rotations = _stacked([frame.rotation for frame in frames], (3,))
     places = [frame.where for frame in frames]
-    _check_poses(path, places, matrices, positions, rotations, matrix_key)
+    _check_poses(path, places, world_from_cameras, positions, rotations, matrix_key)
     only_matrix = np.isnan(positions[:, 0])
-    positions[only_matrix] = matrices[only_matrix, :3, 3]
-    rotations[only_matrix] = matrix_to_euler(matrices[only_matrix, :3, :3])
+    positions[only_matrix] = world_from_cameras[only_matrix, :3, 3]
+    rotations[only_matrix] = matrix_to_euler(world_from_cameras[only_matrix, :3, :3])
     return PosesFile(lf_type, [frame.name for frame in frames], positions, rotations)
 
 
@@ -161,28 +161,28 @@ def _stacked(arrays: Sequence[Floats | None], shape: tuple[int, ...]) -> Floats:
 def _check_poses(
     path: Path,
     where: Sequence[str],
-    matrices: Floats,
+    world_from_cameras: Floats,
     positions: Floats,
     rotations: Floats,
     matrix_key: str,
 ) -> None:
     """Raise `UserError` for a wrong pose of a file.
 
-    ``where`` names each pose. ``matrices`` (n, 4, 4) are camera-to-world. ``positions`` (n, 3) are
-    in metres, and ``rotations`` (n, 3) are XYZ Euler angles in radians. What a pose lacks is NaN.
+    ``where`` names each pose. ``world_from_cameras`` (n, 4, 4) and ``positions`` (n, 3) are in
+    metres, and ``rotations`` (n, 3) are XYZ Euler angles in radians. What a pose lacks is NaN.
     """
 
     def refuse(wrong: NDArray[np.bool_], why: str) -> None:
         if wrong.any():
             raise UserError(f"{path}: {where[int(np.argmax(wrong))]}: {why}")
 
-    far = (np.abs(np.hstack([matrices[:, :3, 3], positions])) > FARTHEST).any(-1)
+    far = (np.abs(np.hstack([world_from_cameras[:, :3, 3], positions])) > FARTHEST).any(-1)
     refuse(far, f"position: must be within {FARTHEST:g} metres of the origin")
-    turns = matrices[:, :3, :3]
+    turns = world_from_cameras[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
-        last_row = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(-1)
+        last_row = np.abs(world_from_cameras[:, 3] - [0, 0, 0, 1]).max(-1)
         angle_gap = np.abs(turns - euler_to_matrix(rotations)).max((-1, -2))
-        place_gap = np.abs(matrices[:, :3, 3] - positions).max(-1)
+        place_gap = np.abs(world_from_cameras[:, :3, 3] - positions).max(-1)
     # NaN, of a missing form, is never more than the tolerance.
     refuse(is_skewed(turns), f"{matrix_key}: {SKEWED}")
     refuse(is_mirrored(turns), f"{matrix_key}: {MIRRORED}")
@@ -229,10 +229,10 @@ def _csv_frame(path: Path, where: str, keys: Sequence[str], row: Sequence[str]) 
     )
     if keys == CSV_HEADER:
         return Frame(where, row[0], position=numbers[:3], rotation=numbers[3:])
-    matrix = np.eye(4)
-    matrix[:3, :3] = quaternion_to_matrix(_unit(path, where, numbers[3:]))
-    matrix[:3, 3] = numbers[:3]
-    return Frame(where, row[0], matrix)
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, :3] = quaternion_to_matrix(_unit(path, where, numbers[3:]))
+    world_from_camera[:3, 3] = numbers[:3]
+    return Frame(where, row[0], world_from_camera)
 
 
 def _read_json(path: Path) -> Listing:
@@ -277,7 +277,7 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         if scale <= 0:
             raise UserError(f"applied_scale: is {scale:g}; must be above 0")
     names = []
-    matrices = []
+    world_from_cameras = []
     for index, frame in enumerate(content["frames"]):
         where = f"frames[{index}]"
         check_mapping(where, frame)
@@ -287,26 +287,26 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
                 "transform_matrix"
             )
         key = "transform_matrix"
-        matrices.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))
+        world_from_cameras.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))
         names.append(_view_name(where, frame.get("file_path")))
-    originals = _unapplied(np.array(matrices) @ _CAMERA_AXES[convention], applied, scale)
+    originals = _unapplied(np.array(world_from_cameras) @ _CAMERA_AXES[convention], applied, scale)
     return [
-        Frame(f"frames[{index}]", name, matrix)
-        for index, (name, matrix) in enumerate(zip(names, originals, strict=True))
+        Frame(f"frames[{index}]", name, world_from_camera)
+        for index, (name, world_from_camera) in enumerate(zip(names, originals, strict=True))
     ]
 
 
-def _unapplied(matrices: Floats, applied: Floats, scale: float) -> Floats:
+def _unapplied(world_from_cameras: Floats, applied: Floats, scale: float) -> Floats:
     """Return camera-to-world matrices (n, 4, 4) before a transform and then a scale were applied.
 
     The scale changed only the positions. A transform (4, 4) that scales, too, changed either the
     positions alone, or the whole matrices. Raises `UserError` if no rotation can have been before.
     """
-    unscaled = matrices.copy()
+    unscaled = world_from_cameras.copy()
     with np.errstate(over="ignore"):
         unscaled[:, :3, 3] /= scale
         originals: Floats = np.linalg.inv(applied) @ unscaled
-    are_rotations = _are_rotations(matrices)
+    are_rotations = _are_rotations(world_from_cameras)
     originals[are_rotations, :3, :3] *= abs(np.linalg.det(applied)) ** (1 / 3)
     if (are_rotations & ~_are_rotations(originals)).any():
         raise UserError(
@@ -316,9 +316,9 @@ def _unapplied(matrices: Floats, applied: Floats, scale: float) -> Floats:
     return originals
 
 
-def _are_rotations(matrices: Floats) -> NDArray[np.bool_]:
+def _are_rotations(world_from_cameras: Floats) -> NDArray[np.bool_]:
     """Return which matrices (n, 4, 4) neither scale nor shear nor mirror."""
-    turns = matrices[:, :3, :3]
+    turns = world_from_cameras[:, :3, :3]
     return ~is_skewed(turns) & ~is_mirrored(turns)
 
 
@@ -328,8 +328,8 @@ def _read_colmap(path: Path) -> Listing:
     frames = []
     for where, values, image in images:
         numbers = np.array([_number(path, where, value) for value in values])
-        matrix = colmap.camera_to_world(_unit(path, where, numbers[:4]), numbers[4:])
-        frames.append(Frame(where, _view_name(where, image), matrix))
+        world_from_camera = colmap.world_from_camera(_unit(path, where, numbers[:4]), numbers[4:])
+        frames.append(Frame(where, _view_name(where, image), world_from_camera))
     return Listing(Poses.shape, "quaternion", frames)
 
 

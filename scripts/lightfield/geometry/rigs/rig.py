@@ -49,12 +49,12 @@ class Pose:
     rotation: tuple[float, float, float]
     split: Part | None
 
-    def matrix(self) -> Floats:
+    def world_from_camera(self) -> Floats:
         """Return the (4, 4) camera-to-world matrix. The camera looks along −Z, and +Y is up."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = euler_to_matrix(np.array(self.rotation))
-        matrix[:3, 3] = self.position
-        return matrix
+        world_from_camera = np.eye(4)
+        world_from_camera[:3, :3] = euler_to_matrix(np.array(self.rotation))
+        world_from_camera[:3, 3] = self.position
+        return world_from_camera
 
 
 @dataclass(frozen=True)
