@@ -26,13 +26,27 @@ def stored_records(wildcards):
     return dataset_of(wildcards).all_records if STORE else []
 
 
+def finished_in_store():
+    """Return the paths of the chosen datasets and sequences whose checksums are in the storage."""
+    homes = [dataset.paths for dataset in CHOSEN]
+    homes += [d.sequence_paths for d in CHOSEN if d.sequence_exports]
+    store = ViewStore(STORE)
+    return [
+        paths
+        for paths in dict.fromkeys(homes)
+        if Path(paths.sums).name in store.names(paths.folder)
+    ]
+
+
 def stored_lists(wildcards):
-    """Return the lists of all chosen datasets' files in the view store. Empty without a store."""
+    """Return the lists of all chosen datasets' files, and their checksums. Empty without a store."""
     if not STORE:
         return []
     files = []
     for dataset in CHOSEN:
         files += [*dataset.all_records, *dataset.published, *dataset.sequence_exports]
+    for paths in finished_in_store():
+        files += [paths.validation, paths.sums]
     return list(dict.fromkeys(files))
 
 

@@ -101,18 +101,15 @@ rule validate_sequence:
 
 
 # The jobs that made the files are unknown when this is planned. It reads all files, also those of an
-# unfinished build. From a view store it fetches the dataset's files, and compares their checksums.
+# unfinished build. With a view store, it first fetches the files.
 rule verify:
     input:
         stored_lists,
     log:
         log_of("verify"),
     params:
-        folders=lambda wildcards: shlex.join(verified_folders()),
-        work=WORK,
+        verify=verify_command,
     message:
         "Checking every byte of the chosen datasets"
     shell:
-        taking("input")
-        or f"python {SCRIPTS}/verify.py"
-        " {params.folders} --work {params.work} > {log} 2>&1"
+        f"{taking('input')}{{params.verify}} > {{log}} 2>&1"

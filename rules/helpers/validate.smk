@@ -32,10 +32,23 @@ def sequence_validation_settings(wildcards):
 
 
 def verified_folders():
-    """Return the folders of the chosen datasets, of sequences with exports, and of families."""
+    """Return the folders of the chosen datasets, of sequences with exports, and of families.
+
+    With a store, only those of finished datasets: no list has the checksums of the others' files.
+    """
+    if STORE:
+        return [paths.folder for paths in finished_in_store()]
     folders = []
     for dataset in CHOSEN:
         folders.append(dataset.paths.folder)
         if dataset.sequence_exports:
             folders.append(dataset.sequence_paths.folder)
     return list(dict.fromkeys([*folders, *family_results()]))
+
+
+def verify_command(wildcards):
+    """Return the command that verifies folders. Without any, it does nothing."""
+    folders = shlex.join(verified_folders())
+    # The ledger does not know what other machines made.
+    work = "" if STORE else f"--work {WORK}"
+    return f"python {SCRIPTS}/verify.py {folders} {work}" if folders else ":"

@@ -1,6 +1,7 @@
 """Builds whose jobs share no folder, with a storage in a folder."""
 
 import json
+import os
 import tarfile
 from collections import Counter
 
@@ -222,6 +223,20 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
         assert len(archive.getnames()) == 8
     with tarfile.open(tmp_path / PUBLISHED / "other_files.tar") as archive:
         assert "modelled_LFPair/exports/dnerf/transforms_train.json" in archive.getnames()
+
+    verify = (*BROUGHT_WORDS[:4], "--", "verify")
+    said, _ = (run := build.start(*verify)).communicate()
+    assert run.returncode == 0, said
+    damaged = folder / frames[0] / "validation.json"
+    before = damaged.stat()
+    sound = damaged.read_text()
+    damaged.write_text(sound.replace("true", "TRUE"))
+    os.utime(damaged, ns=(before.st_atime_ns, before.st_mtime_ns))
+    said, _ = (run := build.start("--retries", "0", *verify)).communicate()
+    assert run.returncode == 1, said
+    assert f"{frames[0]}/validation.json: " in (work / "logs/verify.log").read_text()
+    damaged.write_text(sound)
+    os.utime(damaged, ns=(before.st_atime_ns, before.st_mtime_ns))
 
     dry_run = ("--dry-run", "--quiet", "rules", *BROUGHT_WORDS)
     bookkeeping.lose_stored(folder, sha256(root / "textures/walls.png"))
