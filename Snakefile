@@ -64,6 +64,7 @@ container: f"{FOLDER}/envs/plenoforge.sif" if USES_CONTAINERS else "plenoforge.s
 include: "rules/common.smk"
 include: "rules/shell.smk"
 include: "rules/storage.smk"
+include: "rules/selectors.smk"
 include: "rules/ledger.smk"
 include: "rules/start.smk"
 include: "rules/failures.smk"
@@ -127,7 +128,7 @@ rule all:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
         f"{RESULTS}/index.html",
-        family_targets(),
+        BUILD.family_targets,
 
 
 rule report_html:
@@ -138,10 +139,10 @@ rule report_html:
 
 rule smoke:
     input:
-        [[*dataset.files, *dataset.intermediates] for dataset in SMOKE],
+        [[*dataset.files, *dataset.intermediates] for dataset in BUILD.smoke],
 
 
 rule package:
     input:
         [dataset.sequence_paths.package for dataset in CHOSEN],
-        documents_to_publish(),
+        BUILD.documents,

@@ -1,9 +1,6 @@
 # Measurements that anybody can repeat. They are not part of a dataset: name the target.
 
 
-include: "helpers/benchmark.smk"
-
-
 MEASURED = f"{RESULTS}/benchmarks"
 
 
@@ -72,7 +69,7 @@ rule render_overhead:
 
 rule check_gpu:
     input:
-        settings=gpu_check_settings,
+        settings=settings("gpu_check"),
         check=of_first("blend_check"),
         blend=of_first("blend"),
         inventory=of_first("inventory"),
@@ -90,7 +87,7 @@ rule check_gpu:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
+        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

@@ -1,8 +1,6 @@
 # The configuration, and where everything lies. Every path of the workflow comes from here.
 import atexit
-import difflib
 import json
-import math
 import os
 import re
 import shlex
@@ -11,7 +9,6 @@ import sys
 import tempfile
 import time
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 # Relative to Snakemake's folder, which may be a user's own, and quoted for commands.
@@ -33,42 +30,23 @@ from lightfield.planning.cost import (
     Cost,
     cost,
     light_group_count,
-    members_cost,
     shard_threads,
     temporary_bytes,
     view_cost,
 )
 from lightfield.workflow import ledger, presence, shard_counts
-from lightfield.configuration.capture import LightfieldSettings
-from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
 from lightfield.configuration.config_file import load_config
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS, Paths
 from lightfield.configuration.dataset import Cluster
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.configuration.exports import (
     SEQUENCE_EXPORTS,
-    InstantNgp,
-    export_settings_of,
 )
-from lightfield.core.names import MESH, VIEWS
-from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
-from lightfield.stages.exports import MeshSettings
-from lightfield.stages.measurement import SynthesisSettings
-from lightfield.stages.publishing import PackSettings
-from lightfield.stages.report import FiguresSettings, Measurement, PageSettings
-from lightfield.stages.rig import FreePlacesSettings
-from lightfield.stages.scene import BuildSettings, ImportSettings
-from lightfield.workflow.loading import (
-    chosen_families,
-    family_folder,
-    load_datasets,
-    rendered_frames,
-    scene_datasets,
-)
+from lightfield.stages import job_settings
+from lightfield.workflow.build import Build, learned_exports, stage_of
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 from lightfield.workflow.view_store import ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
-from lightfield.geometry.rigs import Poses
 
 # The rigs in a config.yaml belong to the scenes in it. For other scenes, all rigs are chosen.
 NAMING = GIVEN if "scenes" in GIVEN else OWN
@@ -80,25 +58,20 @@ CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
 
 try:
     SETTINGS = load_config(config)
-    CHOSEN = load_datasets(SETTINGS, CLUSTER)
-    FAMILIES = chosen_families(SETTINGS)
+    BUILD = Build.load(SETTINGS, CLUSTER)
     if IS_MAIN_PROCESS:
-        for dataset in CHOSEN:
+        for dataset in BUILD.chosen:
             presence.check_presence(dataset)
-    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}), CLUSTER)
-    SMOKE = scene_datasets("smoke", settings=SETTINGS, cluster=CLUSTER)
 except UserError as error:
     sys.exit(f"error: {error}")
 
+RESULTS = SETTINGS.results
+WORK = SETTINGS.work
+CHOSEN = BUILD.chosen
+DATASETS = BUILD.datasets
 CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
 # Imported scenes have only views.
 RENDERED_SCENES = list(dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported))
-RESULTS = SETTINGS.results
-WORK = SETTINGS.work
-# Also datasets that are not chosen: they may test what is trained on the chosen ones.
-DATASETS = {dataset.name: dataset for dataset in [*SMOKE, *WHOLE]}
-# Any dataset of each scene YAML: all of them have the same .blend.
-SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
 # The imported scenes, as a wildcard's constraint. "(?!)" matches nothing.
 IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
@@ -160,34 +133,27 @@ def times_of(job):
     return f"{WORK}/benchmarks/{job}.tsv"
 
 
-def one_of(by_name, name, folder, kind):
-    """Return the entry with a name from a file's path. Ends the run if there is none."""
-    if name not in by_name:
-        near = " or ".join(difflib.get_close_matches(name, by_name))
-        hint = f"; is {near} meant?" if near else ""
-        sys.exit(f"error: {folder}/{name}: no {kind}{hint}")
-    return by_name[name]
+def asked(question, wildcards):
+    """Return what a function of the build says of a job. Ends the run if it refuses the job."""
+    try:
+        return question(dict(wildcards.items()))
+    except UserError as error:
+        sys.exit(f"error: {error}")
 
 
 def dataset_of(wildcards):
     """Return the dataset of a job's wildcards."""
-    name = f"{wildcards.scene}/{wildcards.rig}"
-    return one_of(DATASETS, name, RESULTS, "dataset of the chosen scenes")
+    return asked(BUILD.dataset, wildcards)
 
 
 def scene_of(wildcards):
     """Return any dataset of the scene of a job's wildcard."""
-    return one_of(SCENES, wildcards.name, WORK, "chosen scene")
+    return asked(BUILD.scene, wildcards)
 
 
-def reprojection_of(wildcards):
-    """Return the reprojection of a job's wildcards. None for the views themselves."""
-    dataset, name = dataset_of(wildcards), stage_of(wildcards)
-    if name == "render":
-        return None
-    return one_of(
-        dataset.reprojections, name, dataset.paths.folder, "reprojection of it"
-    )
+def of_build(question):
+    """Return an input function: it returns what a function of the build says of the job."""
+    return of_each_shard(lambda wildcards: asked(question, wildcards))
 
 
 def of_dataset(attribute):
@@ -200,15 +166,12 @@ def of_dataset(attribute):
     )
 
 
-def stage_of(wildcards):
-    """Return the stage whose views a job makes or reads."""
-    source = wildcards.get("source", "").rstrip("/")
-    return wildcards.get("reprojection", source or "render")
-
-
-def records(wildcards):
-    """Return the records of the shards whose views a job reads."""
-    return dataset_of(wildcards).records(stage_of(wildcards))
+def of_first(attribute):
+    """Return an input function: an attribute of the dataset whose views are the scene's probes."""
+    return (
+        lambda wildcards: getattr(BUILD.first_of_scene(wildcards.scene), attribute)
+        or []
+    )
 
 
 def optional(*names, **flags):

@@ -1,19 +1,9 @@
 # The costs of a dataset, and the progress of a build.
 
 
-include: "helpers/costs.smk"
-
-
 rule costs:
     input:
-        settings=settings_of(
-            "costs",
-            lambda dataset: {
-                "energy": SETTINGS.energy.model_dump(mode="json"),
-                "full": full_size(dataset),
-                "reprojections": [*dataset.reprojections],
-            },
-        ),
+        settings=settings("costs"),
         validation=PATHS.validation,
         records=stored_records,
         published=of_dataset("published"),

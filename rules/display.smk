@@ -58,7 +58,7 @@ def is_of_sensor(job):
     """Return whether a job makes views as a sensor sees them."""
     if "reprojection" not in job.wildcards.keys():
         return False
-    reprojection = reprojection_of(job.wildcards)
+    reprojection = asked(BUILD.reprojection, job.wildcards)
     return bool(reprojection and reprojection.sensor)
 
 
@@ -90,11 +90,11 @@ def cost_of(job):
     """Return the cost of a job. None if it is unknown."""
     wildcards = job.wildcards
     if is_of(job, "calibrate"):
-        return cost("calibrate", first_dataset(wildcards.scene))
+        return cost("calibrate", BUILD.first_of_scene(wildcards.scene))
     if phase_of(job) in UNKNOWN_PHASES:
         return None
     if is_of(job, "build_members"):
-        return batch_cost(wildcards)
+        return asked(BUILD.batch_cost, wildcards)
     stage = stages().get(job.rule.name, job.rule.name)
     dataset = dataset_of(wildcards) if is_of_dataset(job) else None
     return cost(stage, dataset, views_of(job), wildcards.get("reprojection", ""))
@@ -255,7 +255,7 @@ def dataset_name_of(job):
 def work_of(job):
     """Return a job's part of the forecast."""
     is_batch = is_of(job, "build_members")
-    views = batch_views(job.wildcards) if is_batch else rendered_views(job)
+    views = asked(BUILD.batch_views, job.wildcards) if is_batch else rendered_views(job)
     return Work(phase_of(job), dataset_name_of(job), views, cost_of(job) or Cost())
 
 

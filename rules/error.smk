@@ -2,12 +2,13 @@
 # may give instead of samples.
 
 
-include: "helpers/error.smk"
+# The probe cameras of the chosen scenes. Target rules name them, so that missing ones are made again.
+PROBES = [f"{WORK}/{name}/probes.json" for name in RENDERED_SCENES]
 
 
 rule probe_cameras:
     input:
-        settings=probe_settings,
+        settings=settings("probes"),
         inventory=of_first("lightfield_inventory"),
         model=of_first("model_record"),
         places=of_first("places"),
@@ -48,7 +49,7 @@ rule calibrate:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
+        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
         seconds=PATHS.calibration_seconds,
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
@@ -85,7 +86,7 @@ rule measure_error:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: first_dataset(wildcards.scene).paths.trials,
+        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

@@ -1,15 +1,12 @@
 # Files with which trainers open a dataset.
 
 
-include: "helpers/export.smk"
-
-
 rule export_to_instant_ngp:
     input:
-        settings=export_settings,
-        records=records,
+        settings=settings("instant_ngp"),
+        records=of_build(BUILD.records),
         lightfield=PATHS.source_lightfield(),
-        trained=trained_by,
+        trained=of_build(BUILD.training_transforms),
     output:
         PATHS.transforms(),
     log:
@@ -18,7 +15,7 @@ rule export_to_instant_ngp:
         times_of("{scene}/{rig}/export/{source}instant_ngp")
     localrule: True
     params:
-        views=folder_of_views,
+        views=of_build(BUILD.folder_of_views),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
     shell:
@@ -30,8 +27,8 @@ rule export_to_instant_ngp:
 # The frames of a sequence lie in the rig's folder, beside the exports of all of them.
 rule export_sequence:
     input:
-        settings=sequence_export_settings,
-        views=exported_frames,
+        settings=settings("export_sequence"),
+        views=of_build(BUILD.exported_frames),
     output:
         PATHS.export_list(),
     log:
@@ -57,8 +54,8 @@ rule export_sequence:
 
 rule export:
     input:
-        settings=export_settings,
-        views=exported_views,
+        settings=settings("export"),
+        views=of_build(BUILD.exported_views),
         lightfield=PATHS.source_lightfield(),
         dataset=PATHS.lightfield,
     output:

@@ -1,12 +1,16 @@
 # Families of scenes. One job builds a batch of members, with all stages of each.
 
+from lightfield.configuration.corpus import CORPUS_FILES
 
-include: "helpers/family.smk"
+
+wildcard_constraints:
+    family="|".join(BUILD.family_names) or "(?!)",
+    batch=r"(seeds|models)_\d+_(of_)?\d+",
 
 
 rule build_members:
     input:
-        settings=batch_settings,
+        settings=settings("batch"),
     output:
         f"{WORK}/{{family}}/batches/{{batch}}.json",
     log:
@@ -14,7 +18,7 @@ rule build_members:
     benchmark:
         times_of("{family}/batches/{batch}")
     # With a store, model files lie where Snakemake runs.
-    localrule: bool(STORE) and any(family.models for family in FAMILIES.values())
+    localrule: bool(STORE) and any(family.models for family in BUILD.families.values())
     threads: batch_threads
     resources:
         mem_mb=8000,
@@ -32,8 +36,8 @@ rule build_members:
 
 rule corpus:
     input:
-        settings=corpus_settings,
-        records=batch_records,
+        settings=settings("corpus"),
+        records=of_build(BUILD.batch_records),
     output:
         [f"{RESULTS}/{{family}}/{name}" for name in CORPUS_FILES],
     log:
@@ -54,8 +58,8 @@ rule corpus:
 # It fails if a member has failed, after all others are built and collected.
 rule count_members:
     input:
-        settings=count_settings,
-        records=batch_records,
+        settings=settings("members"),
+        records=of_build(BUILD.batch_records),
         corpus=f"{RESULTS}/{{family}}/corpus.json",
     output:
         f"{WORK}/{{family}}/members.json",

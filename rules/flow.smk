@@ -4,7 +4,7 @@
 rule flow:
     input:
         # A neighbour may belong to another shard.
-        records=records,
+        records=of_build(BUILD.records),
         lightfield=PATHS.lightfield,
     output:
         PATHS.record("flow"),

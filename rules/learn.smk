@@ -1,12 +1,14 @@
 # Radiance fields that learn from exported files. They are not part of a dataset: name the target.
 
 
-include: "helpers/learn.smk"
+# The environment that has torch.
+CONSUMERS = FOLDER / ".venv-consumers"
+CONSUMERS_PYTHON = shlex.quote(os.path.relpath(CONSUMERS / "bin/python"))
 
 
 rule measure_learning:
     input:
-        lambda wildcards: learned_from(dataset_of(wildcards)),
+        of_build(BUILD.learned_from),
     output:
         multiext(
             f"{RESULTS}/benchmarks/learn/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
@@ -31,5 +33,5 @@ rule learn:
         [
             f"{RESULTS}/benchmarks/learn/{dataset.scene_folder}/{dataset.rig_folder}.csv"
             for dataset in CHOSEN
-            if learned_from(dataset)
+            if learned_exports(dataset)
         ],

@@ -10,6 +10,7 @@ from lightfield.core.files import (
     unreadable,
     write_json_if_changed,
 )
+from lightfield.configuration.family import outdated_members
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
 # The records of the present shards. Records of shards with other bounds are obsolete.
@@ -74,38 +75,39 @@ def restore_time(path):
         os.utime(path, ns=(time, time))
 
 
-def dataset_settings(dataset, stage, content):
-    """Write a dataset's settings of a stage. Return their file as an input."""
-    mark_stale_files(dataset.name)
-    return settings_file(dataset.paths.settings(stage), content)
-
-
-def settings_of(stage, content):
-    """Return the input function for a dataset's settings of a stage.
-
-    ``content`` is a function that returns the settings of a dataset.
-    """
+def settings(stage):
+    """Return the input function for the settings file of a stage's job."""
 
     def input_function(wildcards):
-        dataset = dataset_of(wildcards)
-        return dataset_settings(dataset, stage, content(dataset))
+        mark_stale_files_of(wildcards)
+        path, content = asked(
+            lambda names: job_settings.settings_file(stage, BUILD, names), wildcards
+        )
+        return settings_file(path, content)
 
     return input_function
 
 
-def scene_settings_of(stage, content):
-    """Return the input function for a scene's settings.
+def mark_stale_files_of(wildcards):
+    """Mark the stale files of a job's dataset, or the stale record of a batch of members."""
+    names = dict(wildcards.items())
+    if "batch" in names:
+        mark_stale_batch(names["family"], names["batch"])
+    elif "name" in names:
+        mark_stale_files(scene_of(wildcards).name)
+    elif "rig" in names:
+        mark_stale_files(f"{names['scene']}/{names['rig']}")
+    elif "scene" in names:
+        mark_stale_files(BUILD.first_of_scene(names["scene"]).name)
 
-    ``content`` is a function that returns them from any dataset of the scene.
-    """
 
-    def input_function(wildcards):
-        dataset = scene_of(wildcards)
-        mark_stale_files(dataset.name)
-        folder = f"{dataset.paths.scene_work}/settings"
-        return settings_file(f"{folder}/{stage}.json", content(dataset))
-
-    return input_function
+def mark_stale_batch(folder, batch):
+    """Mark a batch whose members are outdated. With a storage, the members are not here."""
+    if IS_MAIN_PROCESS:
+        mark_noted_files()
+        record = BUILD.batch_record(folder, batch)
+        if not STORE and outdated_members(Path(record), Path(RESULTS, folder)):
+            rerun([record])
 
 
 # For each damaged path: what is wrong with it, and the outputs of the jobs that make it again.
@@ -142,7 +144,7 @@ def mark_stale_files(name):
 
     A dataset's files that the ledger does not have are among them.
     """
-    if not IS_MAIN_PROCESS:
+    if not IS_MAIN_PROCESS or name not in DATASETS:
         return
     mark_noted_files()
     dataset = DATASETS[name]

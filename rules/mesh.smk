@@ -1,12 +1,9 @@
 # The surface that cameras can see, as meshes.
 
 
-include: "helpers/mesh.smk"
-
-
 rule mesh:
     input:
-        settings=settings_of("mesh", mesh_settings),
+        settings=settings("mesh"),
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("inventory"),

@@ -1,12 +1,9 @@
 # A dataset as archives with a card, as SILVR publishes its own.
 
 
-include: "helpers/package.smk"
-
-
 rule pack:
     input:
-        settings=pack_settings,
+        settings=settings("pack"),
         sums=packed_sums,
     output:
         archive=PATHS.package,
@@ -25,7 +22,7 @@ rule pack:
 
 rule publish:
     input:
-        settings=pack_settings,
+        settings=settings("pack"),
         sums=packed_sums,
     output:
         PATHS.documents,

@@ -1,9 +1,6 @@
 # A table before rendering: the estimated time and size of the views.
 
 
-include: "helpers/plan.smk"
-
-
 rule probe:
     input:
         check=of_dataset("blend_check"),
@@ -32,15 +29,16 @@ rule probe:
 # It has no output: its log is printed.
 rule plan:
     input:
-        [probe for _, _, probe in probes()],
+        [probe for _, _, probe in BUILD.probes],
     log:
         log_of("plan"),
     localrule: True
     params:
         datasets=" ".join(
-            f"--dataset {name} {frames} {probe}" for name, frames, probe in probes()
+            f"--dataset {name} {frames} {probe}"
+            for name, frames, probe in BUILD.probes
         ),
-        families=shlex.join(f"--family={folder}" for folder in FAMILY_FOLDERS),
+        families=shlex.join(f"--family={folder}" for folder in BUILD.family_names),
         advice=advice_arguments(),
         watts=SETTINGS.energy.watts,
         cores=SETTINGS.energy.core_count,

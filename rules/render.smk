@@ -1,9 +1,6 @@
 # The views. One job renders one shard, and keeps every finished view.
 
 
-include: "helpers/render.smk"
-
-
 # Views that somebody else has rendered are imported unchanged.
 ruleorder: import_views > render
 

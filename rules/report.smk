@@ -1,12 +1,9 @@
 # Pictures and pages of datasets.
 
 
-include: "helpers/report.smk"
-
-
 rule panorama_lightfield:
     input:
-        settings=settings_of("panorama", panorama_settings),
+        settings=settings("panorama"),
         inventory=of_dataset("blend_inventory"),
         model=of_dataset("model_record"),
         calibration=of_dataset("calibration"),
@@ -59,11 +56,8 @@ rule render_panorama:
 
 rule figures:
     input:
-        settings=settings_of(
-            "figures",
-            lambda dataset: FiguresSettings(rig=dataset.placed_rig).as_json(),
-        ),
-        records=records,
+        settings=settings("figures"),
+        records=of_build(BUILD.records),
         lightfield=PATHS.lightfield,
         panorama=of_dataset("panorama"),
     output:
@@ -100,7 +94,7 @@ rule page:
         validation=PATHS.validation,
         costs=PATHS.costs,
         inventory=of_dataset("blend_inventory"),
-        settings=page_settings,
+        settings=settings("page"),
     output:
         PATHS.page,
     log:
@@ -122,11 +116,9 @@ rule page:
 
 rule index:
     input:
-        settings=lambda wildcards: settings_file(
-            f"{WORK}/settings/index.json", {"pages": [d.paths.page for d in CHOSEN]}
-        ),
+        settings=settings("index"),
         pages=[dataset.paths.page for dataset in CHOSEN],
-        corpora=corpora(),
+        corpora=BUILD.corpora,
     output:
         f"{RESULTS}/index.html",
     log:

@@ -1,20 +1,9 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 
 
-include: "helpers/reproject.smk"
-
-
-lens_map_settings = reprojection_settings_of(
-    "lens_map", lambda reprojection: reprojection.lens_map_settings
-)
-reproject_settings = reprojection_settings_of(
-    "reproject", lambda reprojection: reprojection.as_json()
-)
-
-
 rule reprojected_lightfield:
     input:
-        settings=reproject_settings,
+        settings=settings("reproject"),
         lightfield=PATHS.lightfield,
     output:
         PATHS.source_lightfield("{reprojection}/"),
@@ -37,7 +26,7 @@ rule reprojected_lightfield:
 
 rule lens_map:
     input:
-        settings=lens_map_settings,
+        settings=settings("lens_map"),
         lightfield=PATHS.lightfield,
     output:
         PATHS.lens_map(),
@@ -64,8 +53,8 @@ rule reproject:
     input:
         record=PATHS.record("render"),
         lightfield=PATHS.lightfield,
-        lens_maps=lens_maps_of,
-        settings=reproject_settings,
+        lens_maps=of_build(BUILD.lens_maps),
+        settings=settings("reproject"),
     output:
         PATHS.record(),
     log:

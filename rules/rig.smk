@@ -1,13 +1,10 @@
 # The places of the cameras, and their lens.
 
 
-include: "helpers/rig.smk"
-
-
 # Only a random rig's places depend on the scene.
 rule free_places:
     input:
-        settings=settings_of("free_places", free_places_settings),
+        settings=settings("free_places"),
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
@@ -32,7 +29,7 @@ rule free_places:
 
 rule lightfield:
     input:
-        settings=settings_of("lightfield", lightfield_settings),
+        settings=settings("lightfield"),
         inventory=of_dataset("lightfield_inventory"),
         model=of_dataset("model_record"),
         calibration=of_dataset("calibration"),
@@ -84,8 +81,8 @@ rule check_cameras:
 
 rule splits:
     input:
-        settings=splits_settings,
-        lightfields=split_rigs,
+        settings=settings("splits"),
+        lightfields=of_build(BUILD.split_lightfields),
     output:
         PATHS.splits,
     log:

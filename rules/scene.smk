@@ -1,12 +1,9 @@
 # A .blend: built by a scene builder, made of a model file, or brought by the user and checked.
 
 
-include: "helpers/scene.smk"
-
-
 rule build_scene:
     input:
-        settings=scene_settings_of("build_scene", build_settings),
+        settings=settings("build_scene"),
     output:
         PATHS.built_blend,
     log:
@@ -25,7 +22,7 @@ rule build_scene:
 
 rule import_model:
     input:
-        settings=scene_settings_of("import_model", import_settings),
+        settings=settings("import_model"),
         model=lambda wildcards: local(scene_of(wildcards).source.model),
     output:
         blend=PATHS.model_blend,
@@ -49,15 +46,7 @@ rule import_model:
 
 rule check_blend:
     input:
-        settings=scene_settings_of(
-            "check_blend",
-            lambda dataset: {
-                # The scene YAML's checksum. Without it the job itself records the file's.
-                "sha256": load_scene(dataset.scene_name).scene.sha256,
-                # Another bpy makes everything of the file again.
-                "bpy": version("bpy"),
-            },
-        ),
+        settings=settings("check_blend"),
         blend=lambda wildcards: local(scene_of(wildcards).blend),
     output:
         PATHS.blend_check,
@@ -76,7 +65,7 @@ rule check_blend:
 
 rule inventory:
     input:
-        settings=scene_settings_of("inventory", inventory_settings),
+        settings=settings("inventory"),
         check=lambda wildcards: scene_of(wildcards).blend_check or [],
         blend=blend_of,
     output:
@@ -86,7 +75,7 @@ rule inventory:
     benchmark:
         times_of("{name}/inventory")
     # With a store a user's files lie where Snakemake runs.
-    localrule: bool(STORE) and any(d.source.blend or d.source.model for d in SCENES.values())
+    localrule: bool(STORE) and any(d.source.blend or d.source.model for d in BUILD.scenes.values())
     resources:
         mem_mb=8000,
         runtime=30,
@@ -98,13 +87,13 @@ rule inventory:
 
 
 # The users' .blend files, by path. Several scenes may share one.
-BLENDS = {d.source.blend: name for name, d in SCENES.items() if d.source.blend}
+BLENDS = {d.source.blend: name for name, d in BUILD.scenes.items() if d.source.blend}
 # Only a file that is missing is downloaded. Snakemake removes a rule's output before it makes it
 # again, as with --forceall, and a user's file may be the work of weeks.
 MISSING = [
     blend
     for blend, name in BLENDS.items()
-    if SCENES[name].source.url and not Path(blend).exists()
+    if BUILD.scenes[name].source.url and not Path(blend).exists()
 ]
 
 
@@ -130,7 +119,7 @@ rule fetch_blend:
 rule store_blend:
     input:
         # The checked file may have changed, although it is older than the copy.
-        check=lambda wildcards: SCENES[BLENDS[wildcards.blend]].blend_check,
+        check=lambda wildcards: BUILD.scenes[BLENDS[wildcards.blend]].blend_check,
         blend=local("{blend}"),
     output:
         "{blend}",

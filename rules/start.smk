@@ -49,8 +49,10 @@ def check_disk_space():
         needs.append(disk_space.Need(Path(RESULTS), size, views))
     batches = [job.wildcards for job in jobs if is_of(job, "build_members")]
     for wildcards in batches:
-        size = batch_cost(wildcards).disk_bytes
-        needs.append(disk_space.Need(Path(RESULTS), size, batch_views(wildcards)))
+        size = asked(BUILD.batch_cost, wildcards).disk_bytes
+        needs.append(
+            disk_space.Need(Path(RESULTS), size, asked(BUILD.batch_views, wildcards))
+        )
     # A built scene takes at most 100 MB.
     for _ in {dataset.scene_name for dataset in datasets.values()}:
         needs.append(disk_space.Need(Path(WORK), 1e8))
@@ -147,4 +149,14 @@ def remove_leftovers():
         print(
             f"removed {len(removed)} files and folders that killed runs have left",
             file=sys.stderr,
+        )
+
+
+def check_consumers():
+    """Raise `UserError` for a job that learns without the consumers' environment."""
+    learns = any(is_of(job, "measure_learning") for job in needed_jobs())
+    if learns and not (CONSUMERS / "complete").exists():
+        raise UserError(
+            f"learn: torch is missing: set up {os.path.relpath(CONSUMERS)} "
+            f"with `make -C {shlex.quote(os.path.relpath(FOLDER))} .venv-consumers/complete`"
         )

@@ -1,14 +1,11 @@
 # The quality of views synthesised inside a light field. It is not part of a dataset: name the target.
 
 
-include: "helpers/synthesis.smk"
-
-
 rule measure_synthesis:
     input:
-        settings=settings_of("synthesis", synthesis_settings),
-        records=lambda wildcards: dataset_of(wildcards).records("render"),
-        truth=truth_records,
+        settings=settings("synthesis"),
+        records=of_build(BUILD.rendered_records),
+        truth=of_build(BUILD.truth_records),
         lightfield=PATHS.lightfield,
     output:
         multiext(

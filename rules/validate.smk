@@ -1,21 +1,11 @@
 # Validation of datasets, and the checksums of all published files.
 
 
-include: "helpers/validate.smk"
-
-
 # An invalid dataset is an outcome too: it gets its validation.json, and fails below. It also gets its
 # page, because the profile lets a run go on with other jobs after a failure (`keep-going`).
 rule validate:
     input:
-        settings=settings_of(
-            "validate",
-            lambda dataset: ValidationSettings(
-                reprojections=[*dataset.reprojections],
-                exports=dataset.export_lists,
-                records=dataset.all_records,
-            ).as_json(),
-        ),
+        settings=settings("validate"),
         records=of_dataset("all_records"),
         published=of_dataset("published"),
         cameras=of_dataset("cameras"),
@@ -73,9 +63,9 @@ rule checksums:
 # The frames of a sequence are datasets. This is for the exports of all of them.
 rule validate_sequence:
     input:
-        settings=sequence_validation_settings,
-        exports=sequence_exports,
-        views=validated_frames,
+        settings=settings("validate_sequence"),
+        exports=of_build(BUILD.sequence_exports),
+        views=of_build(BUILD.validated_frames),
     output:
         validation=PATHS.validation,
         sums=PATHS.sums,

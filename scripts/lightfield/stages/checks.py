@@ -9,7 +9,7 @@ from pydantic import Field
 from lightfield.core.names import INVENTORY
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
-from lightfield.core.stage import ByHand, NoSettings, Stage, option, reads, writes
+from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 
 
 class ValidationSettings(Settings):
@@ -116,7 +116,7 @@ class ValidateSequence(Stage[SequenceValidationSettings]):
     )
 
 
-class Verify(Stage[NoSettings]):
+class Verify(PlainStage):
     """Checks every byte of datasets against the checksums of their files."""
 
     name = "verify"
@@ -129,7 +129,7 @@ class Verify(Stage[NoSettings]):
     )
 
 
-class Status(Stage[NoSettings]):
+class Status(PlainStage):
     """Prints the progress of the chosen datasets."""
 
     name = "status"

@@ -8,13 +8,13 @@ from pydantic import Field
 
 from lightfield.configuration.scene_yaml import Credits, load_scene
 from lightfield.core.settings import Settings
-from lightfield.core.stage import ByHand, NoSettings, Stage, option, reads, writes
+from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.workflow.view_store import VARIABLE
 
 FOLDER = "folder of a rig, with one or more datasets"
 
 
-class PublishChecksums(Stage[NoSettings]):
+class PublishChecksums(PlainStage):
     """Publishes the checksums of a valid dataset."""
 
     name = "publish_checksums"
@@ -94,7 +94,7 @@ class Publish(Stage[PackSettings]):
     output: Path = writes("folder to write")
 
 
-class TakeDataset(Stage[NoSettings]):
+class TakeDataset(PlainStage):
     """Copies finished datasets from a storage."""
 
     name = "take_dataset"
@@ -104,7 +104,7 @@ class TakeDataset(Stage[NoSettings]):
     store: str = option("URL or folder of the storage")
 
 
-class TakeViews(Stage[NoSettings]):
+class TakeViews(PlainStage):
     """Copies the files that records and exports list from the view store."""
 
     name = "take_views"

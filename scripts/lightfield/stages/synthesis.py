@@ -6,13 +6,13 @@ from typing import Annotated
 from pydantic import Field
 
 from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.stage import NoSettings, Stage, option, reads, writes
+from lightfield.core.stage import PlainStage, Stage, option, reads, writes
 
 # A picture is made of this many views.
 BEST = 6
 
 
-class Synthesize(Stage[NoSettings]):
+class Synthesize(PlainStage):
     """Synthesises views from anywhere in a dataset."""
 
     name = "synthesize"

@@ -1,0 +1,404 @@
+"""All datasets of a run, and which of them a job concerns.
+
+A job has the wildcards of its output's path: ``scene`` and ``rig`` name the folders of a dataset,
+``name`` names a scene YAML. ``reprojection`` or ``source`` say which of its views are meant, and
+``format`` says which export.
+"""
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TypeVar
+
+from lightfield.configuration.config_file import Configuration
+from lightfield.configuration.corpus import CORPUS_FILES
+from lightfield.configuration.dataset import Cluster, Dataset
+from lightfield.configuration.exports import Export
+from lightfield.configuration.family import RECORD, Family, Member
+from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.scene_yaml import load_scene, scene_path
+from lightfield.core.errors import UserError
+from lightfield.core.names import VIEWS
+from lightfield.formats.export_lists import MANIFEST
+from lightfield.planning.cost import Cost, members_cost
+from lightfield.workflow.loading import (
+    chosen_families,
+    family_folder,
+    load_datasets,
+    scene_datasets,
+)
+
+Wildcards = Mapping[str, str]
+Entry = TypeVar("Entry")
+SMOKE = "smoke"
+RENDER = "render"
+"""The stage that makes the rendered views. A reprojection's stage has its name."""
+
+
+def stage_of(wildcards: Wildcards) -> str:
+    """Return the stage whose views a job makes or reads."""
+    source = wildcards.get("source", "").rstrip("/")
+    return wildcards.get("reprojection", source or RENDER)
+
+
+def source_of(wildcards: Wildcards) -> str:
+    """Return the name of the views that an export reads: of a reprojection, or `VIEWS`."""
+    return wildcards["source"].rstrip("/") or VIEWS
+
+
+@dataclass(frozen=True)
+class Build:
+    """The datasets of a run: those that it makes, and those that these may need.
+
+    ``chosen`` are those that it makes. ``datasets`` have all by their names, also those that may
+    test what is trained on the chosen ones. ``families`` have the chosen ones by their scene YAMLs.
+    """
+
+    config: Configuration
+    chosen: list[Dataset]
+    datasets: dict[str, Dataset]
+    families: dict[str, Family]
+
+    @classmethod
+    def load(cls, config: Configuration, cluster: Cluster | None = None) -> "Build":
+        """Load the datasets of a configuration. Raises `UserError` for a mistake in it."""
+        chosen = load_datasets(config, cluster)
+        every_rig = load_datasets(config.model_copy(update={"rigs": "all"}), cluster)
+        smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
+        datasets = {dataset.name: dataset for dataset in [*smoke, *every_rig]}
+        return cls(config, chosen, datasets, chosen_families(config))
+
+    @cached_property
+    def smoke(self) -> list[Dataset]:
+        """The datasets of the smoke scene."""
+        return [d for d in self.datasets.values() if d.scene_name == SMOKE]
+
+    @cached_property
+    def scenes(self) -> dict[str, Dataset]:
+        """Any dataset of each scene YAML, by its name: all of them have the same .blend."""
+        return {dataset.scene_name: dataset for dataset in self.datasets.values()}
+
+    def dataset(self, wildcards: Wildcards) -> Dataset:
+        """Return the dataset that a job concerns."""
+        name = f"{wildcards['scene']}/{wildcards['rig']}"
+        results = self.config.results
+        return _entry(self.datasets, name, results, "dataset of the chosen scenes")
+
+    def scene(self, wildcards: Wildcards) -> Dataset:
+        """Return any dataset of the scene that a job concerns."""
+        return _entry(self.scenes, wildcards["name"], self.config.work, "chosen scene")
+
+    def reprojection(self, wildcards: Wildcards) -> Reprojection | None:
+        """Return the reprojection that a job concerns. None for the rendered views."""
+        stage = stage_of(wildcards)
+        if stage == RENDER:
+            return None
+        dataset = self.dataset(wildcards)
+        return _entry(dataset.reprojections, stage, dataset.paths.folder, "reprojection of it")
+
+    def records(self, wildcards: Wildcards) -> list[str]:
+        """Return the records of the shards whose views a job reads."""
+        return self.dataset(wildcards).records(stage_of(wildcards))
+
+    def rendered_records(self, wildcards: Wildcards) -> list[str]:
+        """Return the records of a dataset's rendered views."""
+        return self.dataset(wildcards).records(RENDER)
+
+    def lens_maps(self, wildcards: Wildcards) -> list[str]:
+        """Return the lens maps of a reprojection. Empty if there is no such reprojection."""
+        dataset = self.dataset(wildcards)
+        name = wildcards["reprojection"]
+        return dataset.lens_maps(name) if name in dataset.reprojections else []
+
+    def export(self, wildcards: Wildcards) -> Export:
+        """Return the options of the export that a job makes."""
+        dataset = self.dataset(wildcards)
+        folder = f"{dataset.paths.folder}/exports"
+        return _entry(dataset.exports.selected, wildcards["format"], folder, "export of it")
+
+    def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
+        """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
+        rigs = dataset.tested_by if export.is_for_training else ()
+        return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
+
+    def exported_views(self, wildcards: Wildcards) -> list[str]:
+        """Return the inputs of an export: the views of its dataset, and of those that test it.
+
+        Points follow from the depth of the rendered views, for any source.
+        """
+        dataset = self.dataset(wildcards)
+        files = [*dataset.records(RENDER), *dataset.records(stage_of(wildcards))]
+        for test in self.testing(dataset, self.export(wildcards)):
+            files += _views_of_source(test, wildcards)
+        return list(dict.fromkeys(files))
+
+    def folder_of_views(self, wildcards: Wildcards) -> str:
+        """Return the folder of the views that an export reads."""
+        source = wildcards["source"].rstrip("/")
+        return f"{self.dataset(wildcards).paths.folder}/{source or 'exr'}"
+
+    def training_transforms(self, wildcards: Wildcards) -> list[str]:
+        """Return the transforms.json of the training views that a dataset tests, if any."""
+        dataset = self.dataset(wildcards)
+        if dataset.trained_by is None:
+            return []
+        paths = replace(dataset.paths, rig=dataset.trained_by)
+        return [paths.transforms(wildcards["source"])]
+
+    def rig(self, wildcards: Wildcards) -> list[Dataset]:
+        """Return the dataset of a rig, or those of all frames of a sequence."""
+        rigs: dict[str, list[Dataset]] = {}
+        for dataset in self.datasets.values():
+            name = f"{dataset.scene_folder}/{dataset.rig_name}"
+            rigs.setdefault(name, []).append(dataset)
+        name = f"{wildcards['scene']}/{wildcards['rig']}"
+        return _entry(rigs, name, self.config.results, "dataset of the chosen scenes")
+
+    def frames(self, wildcards: Wildcards) -> list[Dataset]:
+        """Return the datasets of a rig's sequence, in the order of time.
+
+        Raises `UserError` if there is none, and if it has no export of the job's format.
+        """
+        frames = [dataset for dataset in self.rig(wildcards) if dataset.rig.sequence]
+        export_format = wildcards.get("format")
+        if not frames or (export_format and export_format not in frames[0].exports.selected):
+            name = f"{wildcards['scene']}/{wildcards['rig']}"
+            raise UserError(
+                f"{self.config.results}/{name}/exports/{export_format}: the scene YAML asks for "
+                "no such export of a sequence"
+            )
+        return frames
+
+    def exported_frames(self, wildcards: Wildcards) -> list[str]:
+        """Return the inputs of an export of a sequence: the views of all frames."""
+        files = []
+        for frame in self.frames(wildcards):
+            export = frame.exports.selected[wildcards["format"]]
+            for dataset in (frame, *self.testing(frame, export)):
+                files += _views_of_source(dataset, wildcards)
+        return list(dict.fromkeys(files))
+
+    def validated_frames(self, wildcards: Wildcards) -> list[str]:
+        """Return what exports of a sequence are compared with: the views of all frames.
+
+        Views of other rigs may test what these train. Their lightfield.json has their poses.
+        """
+        files = []
+        for frame in self.frames(wildcards):
+            files += [*frame.all_records, *frame.lightfields]
+            for export in frame.exports.selected.values():
+                if export.is_of_sequence:
+                    for test in self.testing(frame, export):
+                        files += test.lightfields
+        return list(dict.fromkeys(files))
+
+    def sequence_exports(self, wildcards: Wildcards) -> list[str]:
+        """Return the lists of the exports of a sequence."""
+        return self.frames(wildcards)[0].sequence_exports
+
+    @property
+    def probes(self) -> list[tuple[str, int, str]]:
+        """Name, number of frames, and probe of each chosen rig.
+
+        The probe of a sequence is that of its first frame.
+        """
+        frames_of_rig: dict[str, list[Dataset]] = {}
+        for dataset in self.chosen:
+            if not dataset.imported:
+                name = f"{dataset.scene_folder}/{dataset.rig_name}"
+                frames_of_rig.setdefault(name, []).append(dataset)
+        return [
+            (name, len(frames), frames[0].paths.probe) for name, frames in frames_of_rig.items()
+        ]
+
+    @property
+    def documents(self) -> list[str]:
+        """The descriptions of the chosen datasets whose scene YAML says how to publish them."""
+        return [
+            document
+            for dataset in self.chosen
+            if load_scene(dataset.scene_name).publish
+            for document in dataset.sequence_paths.documents
+        ]
+
+    @property
+    def verified_folders(self) -> list[str]:
+        """The folders of the chosen datasets, of sequences with exports, and of families."""
+        folders = []
+        for dataset in self.chosen:
+            folders.append(dataset.paths.folder)
+            if dataset.sequence_exports:
+                folders.append(dataset.sequence_paths.folder)
+        return list(dict.fromkeys([*folders, *self.family_results]))
+
+    def first_of_scene(self, folder: str) -> Dataset:
+        """Return the dataset of a scene's first rig, whose views are the scene's probes.
+
+        The folder of a scene that is not chosen is its name, and means the scene at full size.
+        """
+        for dataset in self.datasets.values():
+            if dataset.scene_folder == folder:
+                name, preset, limits = dataset.scene_name, dataset.preset, dataset.limits
+                return scene_datasets(name, preset, limits, self.config)[0]
+        return scene_datasets(folder, settings=self.config)[0]
+
+    def truth_records(self, wildcards: Wildcards) -> list[str]:
+        """Return the records of the views with which synthesised views are compared."""
+        truths = self.held_out(self.dataset(wildcards))
+        return [record for truth in truths for record in truth.records(RENDER)]
+
+    def held_out(self, dataset: Dataset) -> list[Dataset]:
+        """Return the scene's chosen datasets that reach less far than this one.
+
+        Empty for a rig whose cameras span no surface, because nothing lies between them.
+        """
+        if dataset.rig.cells() is None:
+            return []
+        return [
+            other
+            for other in self.chosen
+            if other.scene_folder == dataset.scene_folder
+            and other.rig.cells() is not None
+            and _reach(other) < _reach(dataset)
+        ]
+
+    def learned_from(self, wildcards: Wildcards) -> list[str]:
+        """Return the lists of a dataset's exports that benchmarks/learn.py reads."""
+        return learned_exports(self.dataset(wildcards))
+
+    def split_lightfields(self, wildcards: Wildcards) -> list[str]:
+        """Return the light fields of those rigs of a scene that have a split."""
+        return [
+            dataset.paths.lightfield
+            for dataset in self.datasets.values()
+            if dataset.scene_folder == wildcards["scene"] and dataset.splits
+        ]
+
+    # Families.
+
+    @cached_property
+    def family_names(self) -> dict[str, str]:
+        """The names of the chosen families, by their folders."""
+        return {family_folder(name, self.config): name for name in self.families}
+
+    @cached_property
+    def batches(self) -> dict[str, dict[str, list[Member]]]:
+        """The members of each batch of each family, by the folder of the family.
+
+        Raises `UserError` for a family without members.
+        """
+        batches = {}
+        for folder, name in self.family_names.items():
+            try:
+                batches[folder] = self.families[name].batches()
+            except UserError as error:
+                raise UserError(f"{scene_path(name)}: {error}") from None
+        return batches
+
+    def batch_records(self, wildcards: Wildcards) -> list[str]:
+        """Return the records of all batches of a family."""
+        return self._batch_records(wildcards["family"])
+
+    def _batch_records(self, folder: str) -> list[str]:
+        return [self.batch_record(folder, batch) for batch in self.batches[folder]]
+
+    def batch_record(self, folder: str, batch: str) -> str:
+        """Return the record of a batch."""
+        return f"{self.config.work}/{folder}/batches/{batch}.json"
+
+    def members(self, wildcards: Wildcards) -> list[Member]:
+        """Return the members of the batch that a job builds."""
+        batches = self.batches[wildcards["family"]]
+        return _entry(batches, wildcards["batch"], self.config.work, "batch of it")
+
+    def missing_members(self, wildcards: Wildcards) -> int:
+        """Return how many members of a batch have no record yet."""
+        folder = Path(self.config.results, wildcards["family"])
+        names = [member.name for member in self.members(wildcards)]
+        return sum(not (folder / name / RECORD).exists() for name in names)
+
+    @cached_property
+    def member_datasets(self) -> dict[str, list[Dataset]]:
+        """By a family's folder: the datasets of a member that stands for all its members."""
+        config = self.config
+        limits = config.presets[config.preset]
+        return {
+            folder: scene_datasets(name, config.preset, limits, config)
+            for folder, name in self.family_names.items()
+        }
+
+    def batch_views(self, wildcards: Wildcards) -> int:
+        """Return how many views the missing members of a batch have."""
+        datasets = self.member_datasets[wildcards["family"]]
+        return self.missing_members(wildcards) * sum(d.view_count for d in datasets)
+
+    def batch_cost(self, wildcards: Wildcards) -> Cost:
+        """Return the cost of the missing members of a batch."""
+        datasets = self.member_datasets[wildcards["family"]]
+        return members_cost(datasets, self.missing_members(wildcards))
+
+    @property
+    def family_results(self) -> list[str]:
+        """The folders of the chosen families that have members."""
+        folders = [f"{self.config.results}/{folder}" for folder in self.family_names]
+        return [folder for folder in folders if any(Path(folder).glob(f"*/{RECORD}"))]
+
+    @property
+    def corpora(self) -> list[str]:
+        """The files of the chosen families' corpora."""
+        return [
+            f"{self.config.results}/{folder}/{name}"
+            for folder in self.family_names
+            for name in CORPUS_FILES
+        ]
+
+    @property
+    def family_targets(self) -> list[str]:
+        """The files that a run with families makes."""
+        files = self.corpora
+        for folder in self.family_names:
+            files += [f"{self.config.work}/{folder}/members.json", *self._batch_records(folder)]
+        return files
+
+
+def learned_exports(dataset: Dataset) -> list[str]:
+    """Return the lists of a dataset's exports with depth that benchmarks/learn.py reads."""
+    options = dataset.exports.nerfstudio
+    if options is None or not options.depth:
+        return []
+    return [path for path in dataset.exported if path.endswith(f"exports/nerfstudio/{MANIFEST}")]
+
+
+@cache
+def full_datasets(scene: str) -> dict[str, Dataset]:
+    """Return a scene YAML's datasets at full size, by rig."""
+    return {dataset.rig_folder: dataset for dataset in scene_datasets(scene)}
+
+
+def _views_of_source(dataset: Dataset, wildcards: Wildcards) -> list[str]:
+    """Return the records and light fields of a dataset's views, and of those of the source."""
+    return [
+        *dataset.records(RENDER),
+        *dataset.records(stage_of(wildcards)),
+        dataset.paths.lightfield,
+        dataset.paths.source_lightfield(wildcards["source"]),
+    ]
+
+
+def _entry(by_name: Mapping[str, Entry], name: str, folder: str, kind: str) -> Entry:
+    """Return the entry that a file's path names. Raises `UserError` if there is none."""
+    if name not in by_name:
+        near = " or ".join(difflib.get_close_matches(name, by_name))
+        hint = f"; is {near} meant?" if near else ""
+        raise UserError(f"{folder}/{name}: no {kind}{hint}")
+    return by_name[name]
+
+
+def _reach(dataset: Dataset) -> float:
+    """Return the largest distance of a rig's cameras from their middle, in metres."""
+    places: Sequence[Sequence[float]] = [pose.position for pose in dataset.rig.poses()]
+    middle = [sum(axis) / len(places) for axis in zip(*places, strict=True)]
+    return max(math.dist(place, middle) for place in places)
