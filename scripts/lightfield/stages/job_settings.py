@@ -15,7 +15,6 @@ from lightfield.configuration import keys
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
-from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
@@ -23,6 +22,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.geometry.rigs import Poses
+from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
 from lightfield.stages.measurement import (

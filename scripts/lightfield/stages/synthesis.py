@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.stage import PlainStage, Stage, option, reads, writes
+from lightfield.core.stage import PlainStage, option, reads, writes
 
 # A picture is made of this many views.
 BEST = 6
