@@ -26,7 +26,6 @@ from lightfield.core.files import sha256
 from lightfield.export import disparity
 from lightfield.export.points import evenly, one_a_voxel
 from lightfield.export.source import SourceDataset, Surface
-from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -1082,7 +1081,7 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
     sets, _ = validation_files.read_sets(tmp_path / "dataset", ["fisheye"])
 
     def checked():
-        return validation_files.of_exports(tmp_path / "dataset", sets, [], MANIFESTS)
+        return validation_files.of_exports(tmp_path / "dataset", sets, [])
 
     exports_check, others, check = checked()
     assert check.passed

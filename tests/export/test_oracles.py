@@ -24,7 +24,6 @@ from lightfield.core.files import read_json, write_json
 from lightfield.core.flags import parsed
 from lightfield.export import zarr_store
 from lightfield.export.source import SourceDataset
-from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.imaging import images
@@ -171,7 +170,7 @@ def sets_and_lists(folder, name, kind):
 def problems(folder, name, kind):
     """Return what is wrong with the cameras, points and depth of one export."""
     sets, lists = sets_and_lists(folder, name, kind)
-    lines, exports = exported_cameras.check(folder, sets, MANIFESTS, lists)
+    lines, exports = exported_cameras.check(folder, sets, lists)
     lines += exported_depth.faults(folder, sets, exports)
     return [line.replace(f"{folder}/", "") for line in lines]
 
@@ -179,7 +178,7 @@ def problems(folder, name, kind):
 def picture_problems(folder, name, kind):
     """Return what is wrong with the pictures of one export."""
     sets, lists = sets_and_lists(folder, name, kind)
-    _, exports = exported_cameras.check(folder, sets, MANIFESTS, lists)
+    _, exports = exported_cameras.check(folder, sets, lists)
     lines = exported_pictures.faults(folder, sets, exports)
     return [line.replace(f"{folder}/", "") for line in lines]
 

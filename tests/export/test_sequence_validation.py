@@ -16,7 +16,6 @@ from lightfield import export
 from lightfield.configuration.exports import settings_of
 from lightfield.core.files import sha256
 from lightfield.export.sequence import SourceSequence
-from lightfield.formats.export_lists import IN_FOLDERS
 from lightfield.imaging import images
 from lightfield.validation.integrity import Integrity
 from lightfield.validation.sequence import (
@@ -73,7 +72,7 @@ def flow(tmp_path_factory):
 
 def problems(rig):
     """Return what validation and the oracles say of a sequence."""
-    result = validate_sequence(rig, frame_folders(rig), export_lists(rig), IN_FOLDERS)
+    result = validate_sequence(rig, frame_folders(rig), export_lists(rig))
     lines = [line for check in result.checks for line in check.problems]
     assert result.valid == (not lines)
     return [*lines, *sequence_oracle.faults(rig)]
@@ -87,7 +86,7 @@ def test_correct_exports_of_a_sequence_are_valid(rigs, name):
 
 def test_a_sequence_behind_links_is_valid_and_has_the_same_sums(rigs, rig, tmp_path):
     def sums():
-        return validate_sequence(rig, frame_folders(rig), export_lists(rig), IN_FOLDERS).checksums
+        return validate_sequence(rig, frame_folders(rig), export_lists(rig)).checksums
 
     expected = sums()
     disk = tmp_path / "disk"
@@ -103,7 +102,7 @@ def test_a_sequence_behind_links_is_valid_and_has_the_same_sums(rigs, rig, tmp_p
     assert sums() == expected
     (disk / "perspective/mine.txt").write_text("mine")
     lists = export_lists(rig)
-    remove_strays(rig, frame_folders(rig), lists, IN_FOLDERS, tmp_path / "removed")
+    remove_strays(rig, frame_folders(rig), lists, tmp_path / "removed")
     assert (disk / "perspective/mine.txt").is_file()
     (problem,) = problems(rig)
     assert problem.startswith("perspective/mine.txt: is not a file of this sequence; remove it")

@@ -8,7 +8,6 @@ same for the exports of a sequence.
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import ImageSet
 from lightfield.validation.files import read_sets
 from oracles import exported_cameras, exported_depth, exported_pictures
@@ -30,7 +29,7 @@ def faults_of_sets(
     dataset: Path, sets: Sequence[ImageSet], lists: Collection[Path] | None = None
 ) -> list[str]:
     """Return what is wrong in the exports of a dataset whose light fields are read already."""
-    problems, set_exports = exported_cameras.check(dataset, sets, MANIFESTS, lists)
+    problems, set_exports = exported_cameras.check(dataset, sets, lists)
     problems += exported_depth.faults(dataset, sets, set_exports)
     problems += exported_pictures.faults(dataset, sets, set_exports)
     return [problem.replace(f"{dataset}/", "") for problem in problems]

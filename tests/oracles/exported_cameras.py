@@ -15,7 +15,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
-from lightfield.formats.layout import ImageSet, Manifest
+from lightfield.formats.export_lists import MANIFESTS
+from lightfield.formats.layout import ImageSet
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.splits_file import SPLITS
 from lightfield.geometry import rotations
@@ -128,7 +129,6 @@ def _views(path: Path) -> Sequence[View]:
 def check(
     dataset: Path,
     sets: Sequence[ImageSet],
-    manifests: Sequence[Manifest],
     export_lists: Collection[Path] | None = None,
 ) -> tuple[list[str], list[SetExport]]:
     """Return what is wrong with the cameras of all exports, and the exports that could be read.
@@ -142,7 +142,7 @@ def check(
         lens = image_set.lightfield.lens
         paths = [
             path
-            for manifest in manifests
+            for manifest in MANIFESTS
             for path in lists_of(dataset, image_set, manifest, export_lists)
         ]
         for path in paths:

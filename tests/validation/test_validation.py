@@ -13,7 +13,6 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -26,18 +25,15 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.passes import NAMES, PASSES, matte_header
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import to_8_bit
 from lightfield.validation import consistency, files, geometry
-from lightfield.validation import validate as validation
 from lightfield.validation.cameras import grain_of
 from lightfield.validation.result import Check, Result
-
-validate = partial(validation.validate, manifests=MANIFESTS)
+from lightfield.validation.validate import validate
 
 CYCLES_ROOM = BLENDER / "cycles_room.py"
 
@@ -1509,13 +1505,13 @@ def test_stray_files_are_moved_before_they_make_a_dataset_invalid(
     for name in ("index.html", "panorama.png"):
         (folder / "report" / name).write_text("drawn")
     assert not check(validate(folder), "files").passed
-    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == before + 2
+    assert files.remove_strays(folder, [], Path("removed")) == before + 2
     assert [path.name for path in (folder / "report").iterdir()] == ["index.html"]
     assert check(validate(folder), "files").passed
     assert not (folder / "former").exists()
     assert Path("removed/room/sphere/exr/view_9999f.exr").is_file()
     assert len(list((folder / "exr").iterdir())) == before - 1
-    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
+    assert files.remove_strays(folder, [], Path("removed")) == 0
 
 
 def test_views_behind_a_link_are_published_and_nothing_there_is_moved(
@@ -1533,7 +1529,7 @@ def test_views_behind_a_link_are_published_and_nothing_there_is_moved(
     (tmp_path / "notes/a.txt").write_text("mine")
     (folder / "notes").symlink_to(tmp_path / "notes")
     # The link itself is moved, and not the notes.
-    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 1
+    assert files.remove_strays(folder, [], Path("removed")) == 1
     assert Path("removed/room/sphere/notes").is_symlink()
     assert (tmp_path / "notes/a.txt").is_file()
     (problem,) = check(validate(folder), "files").problems
@@ -1576,7 +1572,7 @@ def test_an_export_that_is_no_longer_requested_is_moved_away(
     for lists, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
         assert check(validate(small_dataset, export_lists=lists), "files").passed == (not moved)
         removed = tmp_path / "removed"
-        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, lists) == moved
+        assert files.remove_strays(small_dataset, [], removed, lists) == moved
         assert check(validate(small_dataset, export_lists=lists), "files").passed
     assert len(list((tmp_path / "removed").rglob("poses.csv"))) == 1
 
@@ -1591,7 +1587,7 @@ def test_nothing_is_moved_from_a_dataset_that_cannot_be_read(
     if broken:
         (small_dataset / broken).write_text("{")
     sets = [] if broken == NAME else ["panorama"]
-    moved = files.remove_strays(small_dataset, sets, MANIFESTS, tmp_path / "removed")
+    moved = files.remove_strays(small_dataset, sets, tmp_path / "removed")
     assert moved == (0 if broken else 1)
     assert (small_dataset / "stray").exists() == bool(broken)
 

@@ -22,6 +22,7 @@ from lightfield.core.paths import (
     link_above,
     stray_places,
 )
+from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import (
     CARD,
     DEPTH_PICTURE,
@@ -145,7 +146,6 @@ def of_exports(
     dataset: Path,
     sets: Sequence[ImageSet],
     views: Iterable[File],
-    manifests: Sequence[Manifest],
     export_lists: Collection[Path] | None = None,
 ) -> tuple[list[File], list[str], Check]:
     """Return the pictures beside the views, the exports' other files, and a check of both.
@@ -161,7 +161,7 @@ def of_exports(
         patterns = [DEPTH_PICTURE]
         if image_set.sensor and image_set.sensor.bracket is not None:
             patterns += BRACKET_FILES.values()
-        for manifest in manifests:
+        for manifest in MANIFESTS:
             set_lists = lists_of(dataset, image_set, manifest, export_lists)
             if set_lists or export_lists is None:
                 patterns += manifest.beside
@@ -283,7 +283,6 @@ def stray_problems(dataset: Path, strays: Iterable[str], kind: str) -> list[str]
 def remove_strays(
     dataset: Path,
     reprojections: Sequence[str],
-    manifests: Sequence[Manifest],
     folder: Path,
     export_lists: Collection[Path] | None = None,
 ) -> int:
@@ -298,9 +297,7 @@ def remove_strays(
         return 0
     views, _ = of_views(dataset, sets)
     views += pass_files(dataset, sets)[0]
-    extras, lists, exports = of_exports(
-        absolute_path(dataset), sets, views, manifests, export_lists
-    )
+    extras, lists, exports = of_exports(absolute_path(dataset), sets, views, export_lists)
     if exports.passed is False:
         return 0
     owned = {*lists, *json_files(sets), *(file.path for file in [*views, *extras])}

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
-from lightfield.formats.export_lists import MANIFEST
-from lightfield.formats.layout import Manifest
+from lightfield.formats.export_lists import IN_FOLDERS, MANIFEST
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -39,14 +38,11 @@ def export_lists(rig: Path) -> list[Path]:
     return sorted(path for path in lists if path.relative_to(rig).parts[0] not in frames)
 
 
-def validate_sequence(
-    rig: Path, frames: Sequence[str], lists: Sequence[Path], manifest: Manifest
-) -> Result:
+def validate_sequence(rig: Path, frames: Sequence[str], lists: Sequence[Path]) -> Result:
     """Check the exports of the sequence in a rig's folder.
 
     - ``frames``: the folders of the frames in it.
     - ``lists``: the export.json of each export that it must have.
-    - ``manifest``: how to read such a list.
 
     The result holds all faults. Its checksums are those of the exports' files.
     """
@@ -57,8 +53,8 @@ def validate_sequence(
     views = 0
     for path in map(absolute_path, lists):
         try:
-            owned += _owned(rig, path, manifest)
-            listed = listed_files(rig, path, manifest)
+            owned += _owned(rig, path)
+            listed = listed_files(rig, path, IN_FOLDERS)
             first = _first_frame(rig, path, frames)
         except UserError as error:
             problems.append(str(error))
@@ -78,9 +74,7 @@ def validate_sequence(
     return Result(f"{rig.parent.name}/{rig.name}", views, [exports, files], digests)
 
 
-def remove_strays(
-    rig: Path, frames: Collection[str], lists: Sequence[Path], manifest: Manifest, folder: Path
-) -> None:
+def remove_strays(rig: Path, frames: Collection[str], lists: Sequence[Path], folder: Path) -> None:
     """Move former exports out of a rig's folder into ``folder``.
 
     Moves nothing if a list of an export cannot be read.
@@ -88,16 +82,16 @@ def remove_strays(
     owned: list[str] = []
     for path in map(absolute_path, lists):
         try:
-            owned += _owned(absolute_path(rig), path, manifest)
+            owned += _owned(absolute_path(rig), path)
         except UserError:
             return
     set_strays_aside(rig, _strays(rig, frames, owned), folder)
 
 
-def _owned(rig: Path, path: Path, manifest: Manifest) -> list[str]:
+def _owned(rig: Path, path: Path) -> list[str]:
     """Return an export's list and the files in it, by their paths in the rig's folder."""
     folder = path.parent.relative_to(rig)
-    return [(folder / name).as_posix() for name in (path.name, *manifest.files(path))]
+    return [(folder / name).as_posix() for name in (path.name, *IN_FOLDERS.files(path))]
 
 
 def _strays(rig: Path, frames: Collection[str], owned: Collection[str]) -> list[str]:

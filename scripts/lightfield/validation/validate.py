@@ -25,7 +25,7 @@ from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
 from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
-from lightfield.formats.layout import File, ImageSet, Manifest
+from lightfield.formats.layout import File, ImageSet
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.validation import files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
@@ -41,7 +41,6 @@ def validate(
     clearance: Path | None = None,
     inventory: Path | None = None,
     processes: int = 1,
-    manifests: Sequence[Manifest] = (),
     splits: Path | None = None,
     export_lists: Collection[Path] | None = None,
     ledger_sums: Mapping[str, str] | None = None,
@@ -53,7 +52,6 @@ def validate(
     - ``clearance``: a JSON file with each camera's distance to the nearest surface (``views``:
       name: ``distance`` in metres, ``inside``).
     - ``inventory``: a JSON file of what the scene contains.
-    - ``manifests``: the kinds of exports that the dataset may hold.
     - ``splits``: the scene's splits.json, if it has one.
     - ``export_lists``: the lists of the exports that the dataset must have. None takes all that
       exist.
@@ -68,9 +66,7 @@ def validate(
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence_checks = files.of_views(dataset, sets)
     passes, missing_passes = layout.pass_files(dataset, sets)
-    extras, export_files, exports_check = files.of_exports(
-        dataset, sets, views, manifests, export_lists
-    )
+    extras, export_files, exports_check = files.of_exports(dataset, sets, views, export_lists)
     # Do first what needs no images: a wrong file then stops the run before hours of reading.
     recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)

@@ -7,7 +7,6 @@ from pathlib import Path
 from lightfield.core import leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.formats.export_lists import IN_FOLDERS, MANIFESTS
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
@@ -32,7 +31,7 @@ def check(job: Validate) -> Result:
     exports = job.settings.exports
     export_lists = None if exports is None else [Path(path).resolve() for path in exports]
     if job.removed:
-        remove_strays(job.dataset, reprojections, MANIFESTS, job.removed, export_lists)
+        remove_strays(job.dataset, reprojections, job.removed, export_lists)
     result = validate(
         job.dataset,
         reprojections,
@@ -40,7 +39,6 @@ def check(job: Validate) -> Result:
         job.clearance,
         job.inventory,
         job.processes,
-        MANIFESTS,
         job.splits,
         export_lists,
         _noted_sums(job.ledger, job.dataset) if job.ledger else None,
@@ -60,8 +58,8 @@ def check_sequence(job: ValidateSequence) -> None:
     if job.settings.exports is not None:
         lists = [Path(path) for path in job.settings.exports]
     if job.removed:
-        sequence.remove_strays(job.rig, frames, lists, IN_FOLDERS, job.removed)
-    result = sequence.validate_sequence(job.rig, frames, lists, IN_FOLDERS)
+        sequence.remove_strays(job.rig, frames, lists, job.removed)
+    result = sequence.validate_sequence(job.rig, frames, lists)
     _print(result)
     if not result.valid:
         raise UserError(f"{job.rig}: the exports of its sequence are not valid")
