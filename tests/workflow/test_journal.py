@@ -53,13 +53,13 @@ def test_a_journal_continues_after_a_truncated_line(tmp_path):
 HANG = """
 import sys, time
 from pathlib import Path
-from lightfield.formats.lightfield import LightField
-from lightfield.rendering import colour_pass, geometry_pass, shard
+from lightfield.rendering import colour_pass, geometry_pass
+from lightfield.stages.views import RenderShard
 def hang(*_): time.sleep(60)
 colour_pass.render_colour = geometry_pass.render_geometry = hang
 lightfield, blend = map(Path, sys.argv[1:])
-options = {"blend": blend, "inventory": None, "device": "cpu", "threads": 1, "stall": 1}
-shard.render(LightField.read(lightfield), ":", lightfield.with_name("exr"), **options)
+folder = lightfield.with_name("exr")
+RenderShard(lightfield=lightfield, blend=blend, output=folder, device="cpu", stall=1).run()
 """
 
 
