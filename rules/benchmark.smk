@@ -15,9 +15,9 @@ rule reprojection_benchmark:
     log:
         log_of("reprojection_benchmark"),
     # Alone on the machine, so that nothing else is in the figures.
-    threads: lambda wildcards: workflow.cores or 1
+    threads: ALL_CORES
     params:
-        folder=lambda wildcards, output: str(Path(output[0]).parent),
+        folder=subpath(output[0], parent=True),
     message:
         "Measuring the error of reprojection against its run time"
     shell:
@@ -35,7 +35,7 @@ rule stability:
     log:
         log_of("stability"),
     params:
-        folder=lambda wildcards, output: str(Path(output[0]).parent),
+        folder=subpath(output[0], parent=True),
     message:
         "Taking every pair of lenses to its extremes"
     shell:
@@ -48,7 +48,7 @@ rule extremes:
     log:
         log_of("extremes"),
     params:
-        folder=lambda wildcards, output: str(Path(output[0]).parent),
+        folder=subpath(output[0], parent=True),
     message:
         "Rendering what is hard for a renderer"
     shell:
@@ -60,7 +60,7 @@ rule render_overhead:
         f"{MEASURED}/render_overhead.md",
     log:
         log_of("render_overhead"),
-    threads: lambda wildcards: workflow.cores or 1
+    threads: ALL_CORES
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
@@ -80,7 +80,7 @@ rule check_gpu:
     log:
         log_of("{scene}/gpu_check"),
     # Alone on the machine, so that nothing else is in the times.
-    threads: lambda wildcards: workflow.cores or 1
+    threads: ALL_CORES
     resources:
         mem_mb=6000,
         runtime=60,
@@ -89,7 +89,7 @@ rule check_gpu:
         device=SETTINGS.device,
         cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
-        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+        stem=subpath(output[0], strip_suffix=".json"),
     message:
         "Comparing what the GPU and the processor make of {wildcards.scene}"
     shell:

@@ -53,8 +53,11 @@ NAMING = GIVEN if "scenes" in GIVEN else OWN
 if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
     config["rigs"] = "all"
 
+# The cores of this machine, or of each job on a cluster.
+ALL_CORES = CORES or 1
+
 # On a cluster, shards are small, so that no job waits long for the last one.
-CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
+CLUSTER = Cluster(jobs=NODES, cores=ALL_CORES) if NODES else None
 
 try:
     SETTINGS = load_config(config)
@@ -182,7 +185,9 @@ def optional(*names, **flags):
     flags |= dict(zip(names, names))
 
     def arguments(wildcards, input):
-        given = [(flag, input[name]) for flag, name in flags.items() if input[name]]
+        given = [
+            (flag, input.get(name)) for flag, name in flags.items() if input.get(name)
+        ]
         return shlex.join(
             word for flag, path in given for word in (f"--{flag}", str(path))
         )

@@ -16,7 +16,7 @@ rule costs:
         log_of("{scene}/{rig}/costs"),
     localrule: True
     params:
-        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
+        dataset=subpath(output[0], ancestor=2),
         # These folders hold the journals and benchmarks of all earlier runs.
         journals=f"{PATHS.work}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",

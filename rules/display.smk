@@ -178,7 +178,7 @@ def begin_display():
     if jobs and not is_quiet_about("ALL"):
         announce_calibrations(jobs)
         TASKS.update({job: task_of(job) for job in jobs})
-        DISPLAY.begin(TASKS, workflow.cores or 1)
+        DISPLAY.begin(TASKS, ALL_CORES)
         DISPLAY.start()
         # This runs even if the run fails.
         atexit.register(DISPLAY.stop)

@@ -6,7 +6,7 @@
 PROBES = [f"{WORK}/{name}/probes.json" for name in RENDERED_SCENES]
 
 
-rule probe_cameras:
+use rule lightfield as probe_cameras with:
     input:
         settings=settings("probes"),
         inventory=of_first("lightfield_inventory"),
@@ -16,17 +16,11 @@ rule probe_cameras:
         PATHS.probes,
     log:
         log_of("{scene}/probe_cameras"),
+    benchmark:
+        times_of("{scene}/probe_cameras")
     localrule: True
-    params:
-        places=optional("places"),
-        inventory=optional("inventory"),
-        model=optional("model"),
     message:
         "Placing the probe cameras of {wildcards.scene}"
-    shell:
-        f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.places} {params.inventory} {params.model}"
-        " --output {output} > {log} 2>&1"
 
 
 # Only scenes with a target error need this. Its output is reproducible, except for --seconds.
@@ -42,7 +36,7 @@ rule calibrate:
         log_of("{scene}/calibrate"),
     benchmark:
         times_of("{scene}/calibrate")
-    threads: lambda wildcards: workflow.cores or 1
+    threads: ALL_CORES
     resources:
         mem_mb=6000,
         runtime=240,
@@ -79,7 +73,7 @@ rule measure_error:
     log:
         log_of("{scene}/error_vs_time"),
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
-    threads: lambda wildcards: workflow.cores or 1
+    threads: ALL_CORES
     resources:
         mem_mb=6000,
         runtime=240,
@@ -88,7 +82,7 @@ rule measure_error:
         device=SETTINGS.device,
         cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
         calibration=optional("calibration"),
-        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+        stem=subpath(output[0], strip_suffix=".json"),
     message:
         "Measuring error against render time in {wildcards.scene}"
     shell:

@@ -20,7 +20,7 @@ rule measure_learning:
         runtime=120,
     params:
         folders=lambda wildcards, input: [str(Path(path).parent) for path in input],
-        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+        stem=subpath(output[0], strip_suffix=".csv"),
     message:
         "Learning what the exports of {wildcards.scene}/{wildcards.rig} show"
     shell:

@@ -1,7 +1,7 @@
 # Pictures and pages of datasets.
 
 
-rule panorama_lightfield:
+use rule lightfield as panorama_lightfield with:
     input:
         settings=settings("panorama"),
         inventory=of_dataset("blend_inventory"),
@@ -14,16 +14,8 @@ rule panorama_lightfield:
     benchmark:
         times_of("{scene}/{rig}/panorama/lightfield")
     localrule: True
-    params:
-        calibration=optional("calibration"),
-        inventory=optional("inventory"),
-        model=optional("model"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
-    shell:
-        f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.calibration} {params.inventory} {params.model}"
-        " --output {output} > {log} 2>&1"
 
 
 rule render_panorama:
@@ -77,7 +69,7 @@ rule figures:
         times_of("{scene}/{rig}/report/figures")
     localrule: True
     params:
-        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
+        dataset=subpath(output[0], ancestor=2),
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -103,7 +95,7 @@ rule page:
         times_of("{scene}/{rig}/report/page")
     localrule: True
     params:
-        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
+        dataset=subpath(output[0], ancestor=2),
         inventory=optional("inventory"),
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
@@ -125,7 +117,7 @@ rule index:
         log_of("index"),
     localrule: True
     params:
-        results=lambda wildcards, output: str(Path(output[0]).parent),
+        results=subpath(output[0], parent=True),
     message:
         "Making the page of all datasets"
     shell:

@@ -47,6 +47,7 @@ rule lens_map:
 use rule lens_map as lens_maps with:
     output:
         [PATHS.lens_map(face=face) for face in CUBE_FACES],
+    localrule: True
 
 
 rule reproject:

@@ -42,16 +42,12 @@ rule lightfield:
         times_of("{scene}/{rig}/cameras/lightfield")
     localrule: True
     params:
-        calibration=optional("calibration"),
-        places=optional("places"),
-        inventory=optional("inventory"),
-        model=optional("model"),
+        optional=optional("calibration", "places", "inventory", "model"),
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.calibration} {params.places}"
-        " {params.inventory} {params.model} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.optional} --output {output} > {log} 2>&1"
 
 
 rule check_cameras:

@@ -12,7 +12,7 @@ def threads_of_shard(wildcards):
     """Return the cores of each shard, so that the shards at work fit this machine's memory."""
     shards = sum(len(dataset.shards) for dataset in CHOSEN)
     need = shard_cost(wildcards).memory_bytes
-    return shard_threads(workflow.cores or 1, shards, need, MEMORY)
+    return shard_threads(ALL_CORES, shards, need, MEMORY)
 
 
 @of_each_shard
@@ -45,7 +45,7 @@ def panorama_memory(wildcards, attempt):
 def batch_threads(wildcards):
     """Return the cores of each batch: one, or more if there are fewer batches than cores."""
     count = sum(map(len, BUILD.batches.values()))
-    return max(1, (workflow.cores or 1) // count)
+    return max(1, ALL_CORES // count)
 
 
 def blend_of(wildcards):

@@ -69,7 +69,7 @@ def check_disk_space():
         view_size = max(
             temporary_bytes(d.pixels, light_group_count(d)) for d in datasets.values()
         )
-        at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
+        at_once = min(len(renders), max(1, ALL_CORES // renders[0].threads))
         size = at_once * view_size
         if not disk_space.fast_folder(size):
             needs.append(disk_space.Need(Path(tempfile.gettempdir()), size))

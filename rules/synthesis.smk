@@ -16,8 +16,8 @@ rule measure_synthesis:
     resources:
         mem_mb=4000,
     params:
-        dataset=lambda wildcards, input: str(Path(input.lightfield).parent),
-        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+        dataset=subpath(input.lightfield, parent=True),
+        stem=subpath(output[0], strip_suffix=".csv"),
     message:
         "Measuring how well views of {wildcards.scene}/{wildcards.rig} are synthesised"
     shell:
