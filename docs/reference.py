@@ -252,7 +252,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("package.py and publish.py: scene", scene_yaml.Credits),
             Section("report_figures.py", report.FiguresSettings),
             Section("report_html.py", report.PageSettings),
-            Section("report_html.py: measurements", report.Measurement),
+            Section("report_html.py: measurements", report.MeasurementFile),
         ],
     ),
     "measurement-keys.md": Page(

@@ -7,7 +7,7 @@ point.
 """
 
 from lightfield.core.flags import program
-from lightfield.stages.views import Flow
+from lightfield.stages.views import ComputeFlow
 
 if __name__ == "__main__":
-    program(Flow, __doc__)
+    program(ComputeFlow, __doc__)

@@ -6,7 +6,7 @@ source does not see has a line of text instead of a map.
 """
 
 from lightfield.core.flags import program
-from lightfield.stages.lenses import LensMap
+from lightfield.stages.lenses import ComputeLensMap
 
 if __name__ == "__main__":
-    program(LensMap, __doc__)
+    program(ComputeLensMap, __doc__)

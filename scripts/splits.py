@@ -1,7 +1,7 @@
 """List which views of a scene's rigs are for training, validation and testing."""
 
 from lightfield.core.flags import program
-from lightfield.stages.views import Splits
+from lightfield.stages.views import ListSplits
 
 if __name__ == "__main__":
-    program(Splits, __doc__)
+    program(ListSplits, __doc__)

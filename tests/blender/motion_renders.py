@@ -14,7 +14,7 @@ from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
-from lightfield.measurement.trials import Trials, Window
+from lightfield.measurement.trials import Trials, ViewWindow
 from lightfield.rendering import blend_file, cycles
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
@@ -122,7 +122,7 @@ content = content.changed(views=[View.placed("wall", np.eye(4))])
 trials = Trials(
     FOLDER / "wall.blend", FOLDER / "inventory.json", content, "cpu", 1, FOLDER / "cache"
 )
-window = Window(content.views[0], 8, 40, 48, 20)
+window = ViewWindow(content.views[0], 8, 40, 48, 20)
 for name, part in (("trial", trials.first_view), ("trial_window", window)):
     pictures[name] = trials.render(part, 1, {"samples": 64}).colour[..., 0]
 np.savez(FOLDER / "results.npz", **pictures)

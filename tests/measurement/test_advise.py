@@ -71,13 +71,13 @@ class Simulated:
         return trials.Trial(light.astype(np.float32), None, samples, seconds, "CPU", parts)
 
 
-def experiment_of(maker, size, windows, reference_samples):
-    chosen, areas = strata.choose(maker, size, windows)
-    return Experiment.stratified(maker, chosen, areas, reference_samples, "room")
+def experiment_of(renderer, size, windows, reference_samples):
+    chosen, areas = strata.choose(renderer, size, windows)
+    return Experiment.stratified(renderer, chosen, areas, reference_samples, "room")
 
 
-def advice_of(maker, windows, reference_samples):
-    experiment = experiment_of(maker, 32, windows, reference_samples)
+def advice_of(renderer, windows, reference_samples):
+    experiment = experiment_of(renderer, 32, windows, reference_samples)
     return advice.measure(experiment, RenderBlock(**RENDER), INVENTORY, "room")
 
 
@@ -171,16 +171,16 @@ def test_a_clamp_is_reported_and_never_advised():
 @pytest.mark.slow
 def test_the_value_of_a_key_that_saves_most_is_advised(monkeypatch):
     """Guiding has fireflies. The prefilter "fast" is faster than "none"."""
-    maker = Simulated()
-    render = maker.render
+    renderer = Simulated()
+    render = renderer.render
 
     def faster(window, seed, sampling):
         times = {"fast": 2, "none": 1.5}.get(sampling.get("denoise_prefilter"), 1)
         trial = render(window, seed, sampling)
         return replace(trial, seconds=trial.seconds / times)
 
-    monkeypatch.setattr(maker, "render", faster)
-    advice_content = advice_of(maker, 1, 64)
+    monkeypatch.setattr(renderer, "render", faster)
+    advice_content = advice_of(renderer, 1, 64)
     assert advice_content["yaml"]["denoise_prefilter"] == "fast"
 
 

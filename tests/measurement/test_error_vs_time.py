@@ -20,7 +20,7 @@ from lightfield.measurement.error_vs_time import evaluated, measured_point, whol
 from lightfield.measurement.experiment import Method
 from lightfield.measurement.metrics import Reference, disagreement, make_reference
 from lightfield.measurement.strata import STRATA
-from lightfield.measurement.trials import SURFACES, Window
+from lightfield.measurement.trials import SURFACES, ViewWindow
 from lightfield.report import tables
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -153,7 +153,7 @@ class SimulatedPilot:
     has_volumes = True
 
     def __init__(self, lens):
-        self.lens, self.lightfield, self.mask = lens, lightfield(), trial_maker().mask
+        self.lens, self.lightfield, self.mask = lens, lightfield(), trial_renderer().mask
         self.changes = {}
 
     def pilot(self, lens):
@@ -173,18 +173,18 @@ class SimulatedPilot:
 
 @pytest.mark.slow
 def test_a_small_fire_gets_windows_of_its_own():
-    maker = SimulatedPilot(lenses.from_camera(CAMERA))
-    windows, areas = strata.choose(maker, 16, 2)
+    renderer = SimulatedPilot(lenses.from_camera(CAMERA))
+    windows, areas = strata.choose(renderer, 16, 2)
     assert set(areas) == {"diffuse", "volume"}
     circle = np.pi / 4 * 64 * 64
     assert areas["volume"] == pytest.approx(48 / circle, rel=0.02)
     assert len(windows) == 4
     for window in windows[2:]:
         assert window.x < 41 and window.x + 16 > 47 and window.y < 21 and window.y + 16 > 25
-    whole_view = Window(windows[0].view, 0, 0, 64, 64)
-    kinds, _ = strata.classes(maker, whole_view)
+    whole_view = ViewWindow(windows[0].view, 0, 0, 64, 64)
+    kinds, _ = strata.classes(renderer, whole_view)
     assert (kinds == STRATA.index("volume")).sum() == 48
-    assert ((kinds == strata.NONE) == ~maker.mask(whole_view)).all()
+    assert ((kinds == strata.NONE) == ~renderer.mask(whole_view)).all()
 
 
 @pytest.mark.parametrize(
@@ -198,13 +198,13 @@ def test_a_small_fire_gets_windows_of_its_own():
     ],
 )
 def test_a_surfaces_stratum_follows_from_its_light(shows, stratum):
-    maker = SimulatedPilot(lenses.from_camera(CAMERA))
-    maker.changes = {name: np.full((64, 64), value, np.float32) for name, value in shows.items()}
-    kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
+    renderer = SimulatedPilot(lenses.from_camera(CAMERA))
+    renderer.changes = {name: np.full((64, 64), value, np.float32) for name, value in shows.items()}
+    kinds, _ = strata.classes(renderer, ViewWindow(renderer.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == stratum
     # Without fog or fire, light without a surface is a lamp too small for its pixel.
-    maker.has_volumes = False
-    kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
+    renderer.has_volumes = False
+    kinds, _ = strata.classes(renderer, ViewWindow(renderer.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == ("emission" if stratum == "volume" else stratum)
 
 
@@ -399,43 +399,43 @@ def test_a_target_error_without_calibration_is_refused(measured, run_program, ro
     assert "Traceback" not in result.stderr
 
 
-def trial_maker():
+def trial_renderer():
     return trials.Trials("none.blend", "none.json", lightfield(), "cpu", 1, "none")
 
 
 def test_windows_lie_in_the_image_circle_and_in_different_views():
-    maker = trial_maker()
-    windows = maker.windows(16, 4)
+    renderer = trial_renderer()
+    windows = renderer.windows(16, 4)
     assert len({window.view.name for window in windows}) == 4
     for window in windows:
         assert 0 <= window.x <= 48 and 0 <= window.y <= 48
-        assert maker.mask(window).mean() >= 0.75
+        assert renderer.mask(window).mean() >= 0.75
     # If the view is small, the window is the whole view: its circle fills π/4 of it.
-    (whole_view,) = maker.windows(100, 1)
+    (whole_view,) = renderer.windows(100, 1)
     assert (whole_view.x, whole_view.y, whole_view.width, whole_view.height) == (0, 0, 64, 64)
-    assert maker.mask(whole_view).mean() == pytest.approx(np.pi / 4, abs=0.01)
+    assert renderer.mask(whole_view).mean() == pytest.approx(np.pi / 4, abs=0.01)
     # Here the circle fills less of every window.
-    maker.lens = replace(maker.lens, principal_point=(60.0, 60.0))
-    (corner,) = maker.windows(64, 1)
-    assert 0 < maker.mask(corner).mean() < 0.75
+    renderer.lens = replace(renderer.lens, principal_point=(60.0, 60.0))
+    (corner,) = renderer.windows(64, 1)
+    assert 0 < renderer.mask(corner).mean() < 0.75
 
 
 def test_the_same_wall_is_found_in_both_views():
     """Two cameras 0.4 m apart look at a wall 2 m away: rays of θ and θ' meet it in one point."""
-    maker = trial_maker()
+    renderer = trial_renderer()
     looking = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
     beside = looking.copy()
     beside[0, 3] = 0.4
     views = [View.placed(str(number), matrix) for number, matrix in enumerate((looking, beside))]
-    windows = tuple(trials.Window(view, 8, 8, 48, 48) for view in views)
-    mask = maker.mask(windows[0])
+    windows = tuple(trials.ViewWindow(view, 8, 8, 48, 48) for view in views)
+    mask = renderer.mask(windows[0])
     rows, columns = np.mgrid[8:56, 8:56] + 0.5
-    rays = maker.lens.rays(columns, rows)
+    rays = renderer.lens.rays(columns, rows)
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(mask, 2 / -rays[..., 2], np.inf)
     zero = np.zeros((48, 48, 3))
     reference = Reference(zero, zero, depth, mask, 0.0)
-    cameras = tuple(maker.camera(view) for view in views)
+    cameras = tuple(renderer.camera(view) for view in views)
     pixels_here, pixels_there = trials.both_see(cameras, windows, (reference, reference))
     middle = 24 * 48 + 24
     # The pixel right of the optical axis is at 1/32 of 90 degrees, half a pixel on.
@@ -462,8 +462,8 @@ lightfield = LightField.read(folder / "lightfield.json")
 
 def kept(device):
     scene = (Path(sys.argv[2]), folder / "inventory.json")
-    maker = trials.Trials(*scene, lightfield, device, 1, folder / "cache")
-    maker.render(maker.windows(8, 1)[0], 1, {"samples": 1})
+    renderer = trials.Trials(*scene, lightfield, device, 1, folder / "cache")
+    renderer.render(renderer.windows(8, 1)[0], 1, {"samples": 1})
     return len(list((folder / "cache").iterdir()))
 
 

@@ -8,7 +8,7 @@ from lightfield.geometry import lenses
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, split_by_stratum
 from lightfield.measurement.metrics import exposed_alike, make_reference
 from lightfield.measurement.strata import FEWEST_PIXELS, STRATA
-from lightfield.measurement.trials import Trial, Window
+from lightfield.measurement.trials import Trial, ViewWindow
 
 SIZE = 64
 LIGHT = 0.2
@@ -24,7 +24,7 @@ class SimulatedTrials:
         rig = {"type": "plane", "cameras": [2, 1], "size": 0.3}
         views = LightField.from_rig(rig, lens, render={"samples": 4}).views
         self.lens = lens
-        self.windows = [Window(view, 0, 0, SIZE, SIZE) for view in views]
+        self.windows = [ViewWindow(view, 0, 0, SIZE, SIZE) for view in views]
         self.rendered = []
 
     def render(self, window, seed, settings):
@@ -45,14 +45,14 @@ class SimulatedTrials:
 
 
 @pytest.fixture
-def maker():
+def renderer():
     return SimulatedTrials()
 
 
-def test_errors_fall_in_proportion_to_the_samples(maker):
+def test_errors_fall_in_proportion_to_the_samples(renderer):
     few = Method("few", {"samples": 4})
     many = Method("many", {"samples": 64})
-    experiment = Experiment(maker, maker.windows, maker.references())
+    experiment = Experiment(renderer, renderer.windows, renderer.references())
     experiment.run([few, many], [1, 2])
     errors = {
         method.name: np.mean(experiment.errors(method, experiment.all_windows, left_out=0))
@@ -63,32 +63,32 @@ def test_errors_fall_in_proportion_to_the_samples(maker):
     assert np.array(experiment.errors(few, experiment.all_windows)).shape == (2, 2)
 
 
-def test_seconds_are_those_of_a_megapixel(maker):
+def test_seconds_are_those_of_a_megapixel(renderer):
     method = Method("plain", {"samples": 8})
-    experiment = Experiment(maker, maker.windows, maker.references())
+    experiment = Experiment(renderer, renderer.windows, renderer.references())
     experiment.run([method], [1])
     expected = 8 * SECONDS_PER_SAMPLE * 1e6 / SIZE**2
     assert experiment.seconds(method) == [[pytest.approx(expected)]] * 2
 
 
-def test_methods_take_turns_and_equal_settings_render_once(maker):
-    experiment = Experiment(maker, maker.windows, maker.references())
-    maker.rendered.clear()
+def test_methods_take_turns_and_equal_settings_render_once(renderer):
+    experiment = Experiment(renderer, renderer.windows, renderer.references())
+    renderer.rendered.clear()
     methods = [Method(name, {"samples": n}) for name, n in (("a", 1), ("b", 2), ("again", 1))]
     experiment.run(methods, [1, 2])
-    assert [settings["samples"] for _, _, settings in maker.rendered] == [1, 2] * 4
+    assert [settings["samples"] for _, _, settings in renderer.rendered] == [1, 2] * 4
     assert experiment.renders(methods[0]) == experiment.renders(methods[2])
 
 
-def test_an_error_in_one_stratum_stays_in_it(maker):
+def test_an_error_in_one_stratum_stays_in_it(renderer):
     """The left half of each window is glossy, and twice too bright in the renders."""
     method = Method("plain", {"samples": 256})
     classes = np.full((SIZE, SIZE), STRATA.index("diffuse"))
     classes[:, : SIZE // 2] = STRATA.index("glossy")
-    strata = split_by_stratum(maker.references(), [classes, classes])
+    strata = split_by_stratum(renderer.references(), [classes, classes])
     areas = {"diffuse": 0.75, "glossy": 0.25}
     assert set(strata) == set(areas)
-    experiment = Experiment(maker, maker.windows, maker.references(), strata, areas)
+    experiment = Experiment(renderer, renderer.windows, renderer.references(), strata, areas)
     experiment.run([method], [1])
     for trials in experiment.renders(method):
         trials[0].colour[:, : SIZE // 2] *= 2
@@ -98,24 +98,24 @@ def test_an_error_in_one_stratum_stays_in_it(maker):
     assert experiment.over_views(errors) == pytest.approx(expected)
 
 
-def test_a_window_with_too_few_pixels_of_a_stratum_does_not_count_in_it(maker):
+def test_a_window_with_too_few_pixels_of_a_stratum_does_not_count_in_it(renderer):
     plain = np.full((SIZE, SIZE), STRATA.index("diffuse"))
     with_lamp = plain.copy()
     with_lamp.flat[:FEWEST_PIXELS] = STRATA.index("emission")
     with_spark = plain.copy()
     with_spark.flat[: FEWEST_PIXELS - 1] = STRATA.index("emission")
-    strata = split_by_stratum(maker.references(), [with_lamp, with_spark])
+    strata = split_by_stratum(renderer.references(), [with_lamp, with_spark])
     assert {name: list(windows) for name, windows in strata.items()} == {
         "diffuse": [0, 1],
         "emission": [0],
     }
 
 
-def test_without_strata_all_pixels_are_whole_views(maker):
-    experiment = Experiment(maker, maker.windows, maker.references())
+def test_without_strata_all_pixels_are_whole_views(renderer):
+    experiment = Experiment(renderer, renderer.windows, renderer.references())
     assert list(experiment.strata) == [WHOLE_VIEWS]
     assert experiment.described() == {
-        "probes": [window.name for window in maker.windows],
+        "probes": [window.name for window in renderer.windows],
         "size": SIZE,
         "resolution": [2 * SIZE, SIZE],
     }

@@ -21,8 +21,8 @@ from pathlib import Path
 from lightfield.formats.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 lightfield = LightField.read("lightfield.json")
-maker = trials.Trials(*sys.argv[1:], lightfield, "cpu", 1, Path("cache"))
-print(json.dumps(gpu_check.check(maker, "cpu", lightfield.render, {})))
+renderer = trials.Trials(*sys.argv[1:], lightfield, "cpu", 1, Path("cache"))
+print(json.dumps(gpu_check.check(renderer, "cpu", lightfield.render, {})))
 """
 
 
@@ -56,9 +56,9 @@ class Simulated:
 
 @pytest.fixture(scope="module")
 def trials():
-    maker = Simulated(lenses.from_camera(CAMERA))
-    made = [maker.render(maker.first_view, seed, {"samples": 4}) for seed in range(8)]
-    return made[:4], made[4:], maker.mask(maker.first_view)
+    renderer = Simulated(lenses.from_camera(CAMERA))
+    made = [renderer.render(renderer.first_view, seed, {"samples": 4}) for seed in range(8)]
+    return made[:4], made[4:], renderer.mask(renderer.first_view)
 
 
 def test_renders_of_other_seeds_are_the_same_picture(trials):
@@ -96,8 +96,8 @@ def test_pictures_without_noise_are_compared_exactly(trials):
 
 def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": FullSize(views=10, resolution=[2000, 1000])}
-    maker = Simulated(lenses.from_camera(CAMERA))
-    content = gpu_check.check(maker, "gpu", RenderBlock(samples=256), full)
+    renderer = Simulated(lenses.from_camera(CAMERA))
+    content = gpu_check.check(renderer, "gpu", RenderBlock(samples=256), full)
     assert content["devices"] == ["CPU", "GPU"]
     assert content["core_seconds"] == pytest.approx(1)
     assert content["gpu_seconds"] == pytest.approx(0.1)

@@ -32,7 +32,7 @@ from lightfield.report import (
 )
 from lightfield.stages.report import (
     FiguresSettings,
-    Measurement,
+    MeasurementFile,
     PageSettings,
     ReportFigures,
     ReportHtml,
@@ -86,7 +86,7 @@ def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
         yaml=YAML,
         command="snakemake --cores all",
         panorama=panorama,
-        measurements=[Measurement(file=str(file)) for file in measurements],
+        measurements=[MeasurementFile(file=str(file)) for file in measurements],
     )
     ReportHtml(settings=settings, dataset=folder, dataset_name=name, output=output).run()
     return output

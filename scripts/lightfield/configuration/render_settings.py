@@ -9,7 +9,7 @@ from lightfield.formats import light_groups
 from lightfield.formats.render_block import RenderOptions, TargetError
 
 # The keys of `Render` that a calibration chooses for a target error.
-CHOSEN = ("samples", "adaptive_threshold", "denoise")
+CALIBRATED_KEYS = ("samples", "adaptive_threshold", "denoise")
 
 
 def _check_groups(groups: dict[str, list[str]]) -> None:
@@ -64,7 +64,7 @@ class Render(RenderOptions):
     def _samples_or_target(self) -> Self:
         if self.target_error is None and self.samples is None:
             raise ValueError("is missing the key samples (or target_error)")
-        for name in CHOSEN:
+        for name in CALIBRATED_KEYS:
             if self.target_error is not None and name in self.model_fields_set:
                 raise ValueError(f"{name}: does not go with target_error, which chooses it")
         if self.camera_motion and "motion" in (self.passes or ()):

@@ -14,11 +14,11 @@ from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import FLOW
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
-from lightfield.stages.views import Flow
+from lightfield.stages.views import ComputeFlow
 from lightfield.workflow.records import ShardRecord
 
 
-def write_flow(job: Flow) -> None:
+def write_flow(job: ComputeFlow) -> None:
     """Write the flow of the chosen views. Raises `UserError` for a view without a neighbour."""
     lightfield = LightField.read(job.lightfield)
     source = SourceDataset(lightfield.folder, "", ".exr")

@@ -4,10 +4,10 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
-from lightfield.stages.views import Splits
+from lightfield.stages.views import ListSplits
 
 
-def write_splits(job: Splits) -> None:
+def write_splits(job: ListSplits) -> None:
     """Write the splits of the rigs. Raises `UserError` for a rig outside the scene's folder."""
     scene = absolute_path(job.output).parent
     lightfields: dict[str, LightField] = {}

@@ -18,7 +18,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
-from lightfield.measurement.trials import Trials, Window, nearest_view
+from lightfield.measurement.trials import Trials, ViewWindow, nearest_view
 from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples
 from lightfield.planning.sampling import (
     FEWEST_SEEDS,
@@ -88,8 +88,8 @@ class Bench:
 
     def __init__(
         self,
-        maker: Trials,
-        windows: Sequence[Window],
+        renderer: Trials,
+        windows: Sequence[ViewWindow],
         seed: int,
         target: float,
         exposure: float | None = None,
@@ -97,18 +97,20 @@ class Bench:
         self.seed = seed
         self.reference_seeds = FEWEST_SEEDS
         while True:
-            references = metrics.exposed_alike(self._references(maker, windows), exposure)
-            self.experiment = Experiment(maker, windows, references)
+            references = metrics.exposed_alike(self._references(renderer, windows), exposure)
+            self.experiment = Experiment(renderer, windows, references)
             self.own_error = self.experiment.reference_error
             if self.own_error <= REFERENCE_PART * target or self.reference_seeds >= MOST_SEEDS:
                 break
             self.reference_seeds *= 2
 
-    def _references(self, maker: Trials, windows: Sequence[Window]) -> list[metrics.Reference]:
+    def _references(
+        self, renderer: Trials, windows: Sequence[ViewWindow]
+    ) -> list[metrics.Reference]:
         references = []
         samples = self.reference_seeds * REFERENCE_SAMPLES
         for number, window in enumerate(windows, 1):
-            references.append(maker.reference(window, self.reference_seeds, REFERENCE_SAMPLES))
+            references.append(renderer.reference(window, self.reference_seeds, REFERENCE_SAMPLES))
             _print_progress(f"reference {number} of {len(windows)}, {samples} spp")
         return references
 
@@ -288,9 +290,9 @@ def write(job: Calibrate) -> None:
     lightfield = LightField.read(job.lightfield)
     if lightfield.render.target_error is None:
         raise UserError(f"{job.lightfield}: render: is missing the key target_error")
-    maker = Trials.of(job, lightfield)
+    renderer = Trials.of(job, lightfield)
     settings = job.settings
-    record, seconds = calibrate(maker, lightfield.render, settings.size, settings.probes)
+    record, seconds = calibrate(renderer, lightfield.render, settings.size, settings.probes)
     write_json(job.output, record)
     if job.seconds:
         write_json(job.seconds, seconds)
@@ -335,7 +337,7 @@ def _problem(record: Mapping[str, Any], most_samples: int | None) -> str | None:
 
 
 def calibrate(
-    maker: Trials, render: RenderBlock, size: int, count: int
+    renderer: Trials, render: RenderBlock, size: int, count: int
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
 
@@ -344,15 +346,15 @@ def calibrate(
     """
     target = render.target_error
     assert target is not None
-    windows = maker.windows(size, count)
-    unseen_windows = _held_out_windows(maker, windows)
+    windows = renderer.windows(size, count)
+    unseen_windows = _held_out_windows(renderer, windows)
     # The pilot renders first, because it sets up Cycles for the parts of light.
-    classes = strata.classes_of(maker, [*windows, *unseen_windows])
-    bench = Bench(maker, windows, _PROBE_SEED, target)
+    classes = strata.classes_of(renderer, [*windows, *unseen_windows])
+    bench = Bench(renderer, windows, _PROBE_SEED, target)
     search = Search(bench.measure, target, render.most_samples, render.given_denoise)
     choice = search.choose()
     held_out = Bench(
-        maker, unseen_windows, _HELD_OUT_SEED, target, bench.experiment.references[0].exposure
+        renderer, unseen_windows, _HELD_OUT_SEED, target, bench.experiment.references[0].exposure
     )
     for each in (bench, held_out):
         each.measure(choice.method)
@@ -381,10 +383,10 @@ def calibrate(
     return record, _seconds_taken(search, choice, plain_samples)
 
 
-def _held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
+def _held_out_windows(renderer: Trials, windows: Sequence[ViewWindow]) -> list[ViewWindow]:
     """Return each window's place in the nearest view without a window, or else in its own view."""
     views_of_windows = [window.view for window in windows]
-    views = [view for view in maker.lightfield.views if view not in views_of_windows]
+    views = [view for view in renderer.lightfield.views if view not in views_of_windows]
     held_out = []
     for window in windows:
         held_out.append(replace(window, view=nearest_view(views, window.view) or window.view))

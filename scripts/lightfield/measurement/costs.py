@@ -42,7 +42,7 @@ _NOT_COUNTED = ("costs.json", "index.html")
 
 
 @dataclass
-class Stage:
+class StageCost:
     """The sums over the jobs of one stage. The peak memory is that of the largest job."""
 
     jobs: int = 0
@@ -82,13 +82,13 @@ def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {k: round(v, 3) if isinstance(v, float) else v for k, v in figures.items()}
 
 
-def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
+def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, StageCost]:
     """Add up the jobs' TSVs by stage: the name of a TSV's folder, or else its own name.
 
     Leaves out the TSVs of shards, because they hold only a shard's last run. Warns about a TSV that
     cannot be read, and leaves it out.
     """
-    stages: dict[str, Stage] = {}
+    stages: dict[str, StageCost] = {}
     tables = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
     tables += [
         (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
@@ -103,7 +103,7 @@ def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
             print(f"{path}: is not a table of a job's time; the job is left out", file=sys.stderr)
             continue
-        stage = stages.setdefault(name, Stage())
+        stage = stages.setdefault(name, StageCost())
         stage.jobs += 1
         stage.wall_seconds += wall
         stage.cpu_seconds += cpu
@@ -154,7 +154,7 @@ def _stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
 
 
 @dataclass(frozen=True)
-class Rendering:
+class RenderedView:
     """The time of one view: path tracing, the rest, and when it was finished.
 
     Times are seconds of one core, or of the whole machine if a graphics card renders.
@@ -168,7 +168,7 @@ class Rendering:
     first: bool
 
 
-def renderings(run: journal.Run) -> Iterator[Rendering]:
+def renderings(run: journal.Run) -> Iterator[RenderedView]:
     """Split the time of each view that a process rendered.
 
     While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
@@ -181,7 +181,7 @@ def renderings(run: journal.Run) -> Iterator[Rendering]:
             busy = run.start["threads"] * traced
             traced = view["cpu_seconds"] * busy / (busy + rest)
             rest = view["cpu_seconds"] - traced
-        yield Rendering(view["view"], view["finished"], traced, rest, first=index == 0)
+        yield RenderedView(view["view"], view["finished"], traced, rest, first=index == 0)
 
 
 def _on_processor(run: journal.Run) -> bool:
@@ -264,9 +264,9 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
     }
 
 
-def _render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
+def _render_stage(shards: Sequence[Mapping[str, Any]]) -> StageCost:
     """Return the sums over the jobs of all shards."""
-    return Stage(
+    return StageCost(
         jobs=len(shards),
         wall_seconds=sum(shard["wall_seconds"] for shard in shards),
         cpu_seconds=sum(shard["cpu_seconds"] for shard in shards),
@@ -274,14 +274,16 @@ def _render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
     )
 
 
-def in_order(stages: Mapping[str, Stage]) -> dict[str, Stage]:
+def in_order(stages: Mapping[str, StageCost]) -> dict[str, StageCost]:
     """Return the stages in the order of the work."""
     between = sorted(stages.keys() - {*_FIRST_STAGES, *_LAST_STAGES})
     names = [*_FIRST_STAGES, *between, *_LAST_STAGES]
     return {name: stages[name] for name in names if name in stages}
 
 
-def _machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], cores: int) -> float:
+def _machine_seconds(
+    stages: Mapping[str, StageCost], runs: Sequence[journal.Run], cores: int
+) -> float:
     """Return the seconds of the whole machine that the work took.
 
     Work on processors takes its part of the ``cores``. A run on a graphics card takes the machine.
@@ -326,7 +328,7 @@ class Scale:
 
 def extrapolation(
     runs: Sequence[journal.Run],
-    stages: Mapping[str, Stage],
+    stages: Mapping[str, StageCost],
     view_bytes: int,
     lightfield: LightField,
     energy: Energy,
@@ -385,7 +387,7 @@ def extrapolation(
     }
 
 
-def _latest_renderings(all_renderings: Sequence[Rendering]) -> list[Rendering]:
+def _latest_renderings(all_renderings: Sequence[RenderedView]) -> list[RenderedView]:
     """Return the latest rendering of each view, without the first views of processes.
 
     First views do not represent the others. They count only if there are no others.

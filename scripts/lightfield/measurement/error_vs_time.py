@@ -49,7 +49,7 @@ PLAIN = "plain"
 ADAPTIVE = "adaptive"
 BOTH = "adaptive + denoised"
 _GUIDED = "path guiding"
-OWN = "this scene's settings"
+SCENE_SETTINGS = "this scene's settings"
 
 # Thresholds above 0.2 have no effect: adaptive sampling takes its fewest samples.
 _THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
@@ -124,12 +124,12 @@ class Point:
 
 def make(job: ErrorVsTime) -> None:
     """Measure every method on a scene, and write the figures, tables and plots."""
-    lightfield, maker = trials.of_calibrated(job)
-    write(job.output, measure(maker, lightfield.render, job.settings, job.output.name))
+    lightfield, renderer = trials.of_calibrated(job)
+    write(job.output, measure(renderer, lightfield.render, job.settings, job.output.name))
 
 
 def measure(
-    maker: Trials,
+    renderer: Trials,
     render: RenderBlock,
     settings: ErrorVsTimeSettings,
     name: str,
@@ -141,20 +141,22 @@ def measure(
     whole views are the mean of the strata's, weighted by their areas. Then try changes of the
     settings on the same windows. ``name`` starts the progress lines.
     """
-    chosen, areas = strata.choose(maker, settings.size, settings.probes)
-    neighbour = nearest_view(maker.lightfield.views, chosen[0].view)
+    chosen, areas = strata.choose(renderer, settings.size, settings.probes)
+    neighbour = nearest_view(renderer.lightfield.views, chosen[0].view)
     if neighbour:
         chosen.insert(1, replace(chosen[0], view=neighbour))
-    experiment = Experiment.stratified(maker, chosen, areas, settings.reference, name)
+    experiment = Experiment.stratified(renderer, chosen, areas, settings.reference, name)
     on_cpu = experiment.device == "CPU"
     methods = _all_methods(render, settings.octaves, guiding=on_cpu)
     experiment.run(methods, range(1, 1 + settings.seeds), f"{name}: trials")
     points = {
         stratum: [
-            measured_point(method, [experiment.renders(method)[n] for n in places], places.values())
+            measured_point(
+                method, [experiment.renders(method)[n] for n in references], references.values()
+            )
             for method in methods
         ]
-        for stratum, places in experiment.strata.items()
+        for stratum, references in experiment.strata.items()
     }
     return {
         "measured_on": {
@@ -168,13 +170,13 @@ def measure(
         "strata": {
             stratum: {
                 "area": areas[stratum],
-                "pixels": sum(int(place.counted.sum()) for place in places.values()),
-                **evaluated(points[stratum], mean_own_error(places.values())),
+                "pixels": sum(int(reference.counted.sum()) for reference in references.values()),
+                **evaluated(points[stratum], mean_own_error(references.values())),
             }
-            for stratum, places in experiment.strata.items()
+            for stratum, references in experiment.strata.items()
         },
         "neighbouring_views": _neighbour_disagreements(experiment, methods) if neighbour else [],
-        "changes": advice.measure(experiment, render, maker.inventory, name),
+        "changes": advice.measure(experiment, render, renderer.inventory, name),
     }
 
 
@@ -195,7 +197,7 @@ def _all_methods(render: RenderBlock, octaves: int, guiding: bool) -> list[Metho
         "adaptive_threshold": render.adaptive_threshold,
         "denoise": render.denoise,
     }
-    return [*methods, Method(OWN, own_settings)]
+    return [*methods, Method(SCENE_SETTINGS, own_settings)]
 
 
 def measured_point(
@@ -298,7 +300,7 @@ def evaluated(points: Sequence[Point], reference_error: float) -> dict[str, Any]
         "methods_at_most_samples": by_method(resolved, 1),
         "pareto_front": [resolved[index].figures() for index in front],
         "against_plain_at_equal_error": savings(resolved, lines[PLAIN]),
-        "settings": [point.figures() for point in points if point.method == OWN],
+        "settings": [point.figures() for point in points if point.method == SCENE_SETTINGS],
         "points": [point.figures() for point in points],
     }
 
@@ -336,7 +338,7 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
         return []
     equal = plain[int(part * (len(plain) - 1) + 0.5)]
     rows = []
-    for method in dict.fromkeys(p.method for p in points if p.method != OWN):
+    for method in dict.fromkeys(p.method for p in points if p.method != SCENE_SETTINGS):
         line = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
         seconds = seconds_to(equal.relative_mse, line)
         rows.append(
@@ -402,8 +404,8 @@ def _neighbour_disagreements(
         return []
     windows = (experiment.windows[0], experiment.windows[1])
     cameras = (
-        experiment.maker.camera(windows[0].view),
-        experiment.maker.camera(windows[1].view),
+        experiment.renderer.camera(windows[0].view),
+        experiment.renderer.camera(windows[1].view),
     )
     common_pixels = both_see(cameras, windows, references)
     entries = []
@@ -568,7 +570,7 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
 
 def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
     """Draw the methods, the Pareto front, the scene's own settings, and the references' error."""
-    methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
+    methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != SCENE_SETTINGS)
     for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
         points = [p for p in content["points"] if p["method"] == method and p["resolved"]]
         if not points:
@@ -601,7 +603,7 @@ def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
             linestyle="none",
             color="black",
             markerfacecolor="none",
-            label=OWN,
+            label=SCENE_SETTINGS,
         )
     # A logarithmic axis has no place for references without noise.
     if content["pareto_front"] and content["reference_error"] > 0:

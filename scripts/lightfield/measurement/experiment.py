@@ -17,7 +17,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.metrics import Reference
-from lightfield.measurement.trials import Trial, Trials, Window
+from lightfield.measurement.trials import Trial, Trials, ViewWindow
 
 # The name of all strata together in reports.
 WHOLE_VIEWS = "whole views"
@@ -53,13 +53,13 @@ class Experiment:
 
     def __init__(
         self,
-        maker: Trials,
-        windows: Sequence[Window],
+        renderer: Trials,
+        windows: Sequence[ViewWindow],
         references: Sequence[Reference],
         by_stratum: Mapping[str, References] | None = None,
         areas: Mapping[str, float] | None = None,
     ) -> None:
-        self.maker = maker
+        self.renderer = renderer
         self.windows = windows
         self.references = references
         self.all_windows = dict(enumerate(references))
@@ -71,8 +71,8 @@ class Experiment:
     @classmethod
     def stratified(
         cls,
-        maker: Trials,
-        windows: Sequence[Window],
+        renderer: Trials,
+        windows: Sequence[ViewWindow],
         areas: Mapping[str, float],
         samples: int,
         name: str,
@@ -83,12 +83,12 @@ class Experiment:
         Raises `UserError` if no window has enough pixels of a stratum.
         """
         # The pilot renders first, because it sets up Cycles for the parts of light.
-        classes = strata.classes_of(maker, windows)
+        classes = strata.classes_of(renderer, windows)
         progress = Progress(len(windows), f"{name}: references")
         samples_of_seed = samples_of_reference(samples) // _REFERENCE_SEEDS
         references = []
         for window in windows:
-            references.append(maker.reference(window, _REFERENCE_SEEDS, samples_of_seed))
+            references.append(renderer.reference(window, _REFERENCE_SEEDS, samples_of_seed))
             progress.done()
         references = metrics.exposed_alike(references)
         by_stratum = split_by_stratum(references, classes)
@@ -99,12 +99,12 @@ class Experiment:
                 f"{strata.FEWEST_PIXELS} pixels that show the same kind of light; give a larger "
                 "--size, or more pixels to the views"
             )
-        return cls(maker, windows, references, counted, areas)
+        return cls(renderer, windows, references, counted, areas)
 
     @cached_property
     def device(self) -> str:
         """The device that Cycles renders on, CPU or GPU."""
-        return self.maker.render(self.windows[0], 1, {"samples": 1}).device
+        return self.renderer.render(self.windows[0], 1, {"samples": 1}).device
 
     @property
     def megapixels(self) -> float:
@@ -124,7 +124,7 @@ class Experiment:
         for seed in seeds:
             for number, window in enumerate(self.windows):
                 for key, method in by_key.items():
-                    trial = self.maker.render(window, seed, method.settings)
+                    trial = self.renderer.render(window, seed, method.settings)
                     self._renders[key][number].append(trial)
                     if progress:
                         progress.done()
@@ -162,7 +162,10 @@ class Experiment:
     def reference_error(self) -> float:
         """The expected error of the references themselves, in whole views."""
         return self.over_views(
-            {stratum: mean_own_error(places.values()) for stratum, places in self.strata.items()}
+            {
+                stratum: mean_own_error(references.values())
+                for stratum, references in self.strata.items()
+            }
         )
 
     def described(self) -> dict[str, Any]:
@@ -170,7 +173,7 @@ class Experiment:
         return {
             "probes": [window.name for window in self.windows],
             "size": self.windows[0].width,
-            "resolution": [self.maker.lens.width, self.maker.lens.height],
+            "resolution": [self.renderer.lens.width, self.renderer.lens.height],
         }
 
 

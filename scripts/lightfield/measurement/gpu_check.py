@@ -36,7 +36,7 @@ _SILHOUETTES = 1e-3
 
 
 @dataclass(frozen=True)
-class Comparison:
+class DeviceComparison:
     """The difference between renders of the same view on two devices.
 
     - ``colour``: the mean squared difference of block means, relative as in `metrics.relative_mse`.
@@ -62,7 +62,7 @@ class Comparison:
 
 def compare(
     first: Sequence[Trial], second: Sequence[Trial], mask: metrics.Mask, block: int = BLOCK
-) -> Comparison:
+) -> DeviceComparison:
     """Compare at least two renders, of different seeds, with as many of another device.
 
     ``mask`` (h, w) says which pixels the lens has a ray for.
@@ -82,7 +82,7 @@ def compare(
     differ = np.zeros(mask.shape, dtype=bool)
     if first_depth is not None and second_depth is not None:
         differ = _depths_differ(first_depth, second_depth)
-    return Comparison(_over(difference, noise), light, float(differ[mask].mean()))
+    return DeviceComparison(_over(difference, noise), light, float(differ[mask].mean()))
 
 
 def _depths_differ(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -118,8 +118,8 @@ def make(job: GpuCheck) -> None:
     Raises `UserError` if there is no GPU, or if it renders another picture.
     """
     device = _gpu_of(job)
-    lightfield, maker = trials.of_calibrated(job)
-    content = check(maker, device, lightfield.render, job.settings.full)
+    lightfield, renderer = trials.of_calibrated(job)
+    content = check(renderer, device, lightfield.render, job.settings.full)
     name = job.output.name
     text = table(name, content)
     print(text)
@@ -151,7 +151,7 @@ def _gpu_of(job: GpuCheck) -> str:
 
 
 def check(
-    maker: Trials, device: str, render: RenderBlock, full: Mapping[str, FullSize]
+    renderer: Trials, device: str, render: RenderBlock, full: Mapping[str, FullSize]
 ) -> dict[str, Any]:
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
@@ -160,19 +160,19 @@ def check(
     returns the GPU hours of each dataset.
     """
     assert isinstance(render.samples, int)
-    lens = maker.lens
+    lens = renderer.lens
     scale = min(1.0, SIZE / max(lens.width, lens.height))
     small = lens.resized(*(max(BLOCK, round(side * scale)) for side in (lens.width, lens.height)))
     settings = {"samples": SAMPLES}
     renders = []
     for first_seed, name in ((1, "cpu"), (1 + SEEDS, device)):
-        on_device = maker.on(name, small)
+        on_device = renderer.on(name, small)
         seeds = range(first_seed, first_seed + SEEDS)
         renders.append([on_device.render(on_device.first_view, s, settings) for s in seeds])
     comparison = compare(renders[0], renders[1], on_device.mask(on_device.first_view))
     core = median(trial.seconds for trial in renders[0]) / (small.width * small.height * SAMPLES)
     # Time a large view: a small one would not keep a GPU busy.
-    on_gpu = maker.on(device, lens)
+    on_gpu = renderer.on(device, lens)
     timed = on_gpu.render(on_gpu.first_view, 1, settings)
     gpu = timed.seconds / (lens.width * lens.height * SAMPLES)
     return {

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_erosion
 from lightfield.formats.lightfield import View
 from lightfield.formats.passes import PARTS_OF_LIGHT
 from lightfield.measurement.metrics import Mask
-from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
+from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, ViewWindow
 
 Classes = NDArray[np.int64]
 
@@ -39,7 +39,7 @@ _SMALLEST_AREA = 0.0005
 FEWEST_PIXELS = 64
 
 
-def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
+def classes(pilot: Trials, window: ViewWindow) -> tuple[Classes, NDArray[Any]]:
     """Return the stratum of each pixel of a window, (h, w), and its noise over its light."""
     trials = [pilot.render(window, 1 + seed, {"samples": SAMPLES}) for seed in range(SEEDS)]
     parts = {name: np.mean([t.parts[name] for t in trials], axis=0) for name in trials[0].parts}
@@ -59,26 +59,26 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     return np.where(pilot.mask(window), kinds, NONE), noise
 
 
-def classes_of(maker: Trials, windows: Sequence[Window]) -> list[Classes]:
-    """Return the stratum of each pixel (h, w) of some windows, from a pilot of ``maker``."""
-    pilot = maker.pilot()
+def classes_of(renderer: Trials, windows: Sequence[ViewWindow]) -> list[Classes]:
+    """Return the stratum of each pixel (h, w) of the ``windows``, from a pilot."""
+    pilot = renderer.pilot()
     return [classes(pilot, window)[0] for window in windows]
 
 
-def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str, float]]:
+def choose(renderer: Trials, size: int, count: int) -> tuple[list[ViewWindow], dict[str, float]]:
     """Choose ``count`` windows of ``size``² pixels for each stratum.
 
     Returns all windows, and each stratum's part of the whole views. A stratum's windows lie around
     pixels that represent its noise: at even steps of the pixels sorted by noise. If the stratum is
     large enough, the windows avoid its borders.
     """
-    small = maker.lens.fitted(SIZE)
-    pilot = maker.pilot(small)
-    views = maker.lightfield.views
+    small = renderer.lens.fitted(SIZE)
+    pilot = renderer.pilot(small)
+    views = renderer.lightfield.views
     views = [views[(2 * n + 1) * len(views) // (2 * VIEWS)] for n in range(min(VIEWS, len(views)))]
-    pilots = [classes(pilot, Window(view, 0, 0, small.width, small.height)) for view in views]
+    pilots = [classes(pilot, ViewWindow(view, 0, 0, small.width, small.height)) for view in views]
     total = sum(int((kinds != NONE).sum()) for kinds, _ in pilots)
-    windows: list[Window] = []
+    windows: list[ViewWindow] = []
     areas: dict[str, float] = {}
     for number, name in enumerate(STRATA):
         members = [kinds == number for kinds, _ in pilots]
@@ -89,7 +89,7 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
         inner = [binary_erosion(member) for member in members]
         if np.any(inner):
             members = inner
-        around = _around(maker, views, members, [noise for _, noise in pilots], size)
+        around = _around(renderer, views, members, [noise for _, noise in pilots], size)
         for step in range(count):
             window = around[int((step + 0.5) / count * len(around))]
             if window not in windows:
@@ -98,17 +98,17 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
 
 
 def _around(
-    maker: Trials,
+    renderer: Trials,
     views: Sequence[View],
     members: Sequence[Mask],
     noise: Sequence[NDArray[Any]],
     size: int,
-) -> list[Window]:
+) -> list[ViewWindow]:
     """Return a window around each member pixel of the pilot's views, the least noisy first.
 
     Leaves out windows that reach too far out of the image circle, unless all of them do.
     """
-    lens = maker.lens
+    lens = renderer.lens
     side = min(size, lens.width, lens.height)
     by_noise = []
     for view, member, noisy in zip(views, members, noise, strict=True):
@@ -118,10 +118,10 @@ def _around(
             top_edge = (row + 0.5) / height * lens.height - side / 2
             x = round(min(max(left_edge, 0), lens.width - side))
             y = round(min(max(top_edge, 0), lens.height - side))
-            by_noise.append((float(noisy[row, column]), Window(view, x, y, side, side)))
+            by_noise.append((float(noisy[row, column]), ViewWindow(view, x, y, side, side)))
     by_noise.sort(key=lambda entry: entry[0])
     windows = [window for _, window in by_noise]
     # The views have windows at the same places.
     places = {(w.x, w.y): w for w in windows}
-    full = {place for place, w in places.items() if maker.mask(w).mean() >= FULL_ENOUGH}
+    full = {place for place, w in places.items() if renderer.mask(w).mean() >= FULL_ENOUGH}
     return [w for w in windows if (w.x, w.y) in full] or windows

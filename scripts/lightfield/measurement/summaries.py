@@ -23,10 +23,10 @@ MEANS = (
 PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}
 # The region of all pixels. The other regions are named after the light that dominates their pixels:
 # glossy is the light of metal and mirrors, transmission that of glass, volume that of fog and fire.
-WHOLE = "all"
+ALL_PIXELS = "all"
 
 
-def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[str, Any]]:
+def means(rows: Sequence[Mapping[str, Any]], region: str = ALL_PIXELS) -> list[dict[str, Any]]:
     """Return a row of means over the views for each variant and truth.
 
     ``rows`` may have numbers or their texts. A view counts by its part of the ``region``; ``part``
@@ -41,7 +41,7 @@ def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[s
         if not in_region:
             continue
         parts = [float(row["part"]) for row in in_region]
-        count = sum(row["region"] == WHOLE for row in group)
+        count = sum(row["region"] == ALL_PIXELS for row in group)
         mean: dict[str, Any] = dict(zip(COLUMNS, names, strict=True))
         mean["part"] = sum(parts) / count
         for name in MEANS:

@@ -40,7 +40,7 @@ _Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class MeasuredSurface:
     """A surface read from ``path``: corners (n, 3, 3) of its triangles, or its points (n, 3)."""
 
     path: Path
@@ -54,7 +54,7 @@ class Surface:
         return float(_areas(self.triangles).sum())
 
 
-def read_surface(path: Path) -> Surface:
+def read_surface(path: Path) -> MeasuredSurface:
     """Read a mesh or a point cloud. Raises `UserError` if it is neither, or not finite."""
     if path.suffix.lower() not in SUFFIXES:
         raise UserError(
@@ -74,7 +74,7 @@ def read_surface(path: Path) -> Surface:
         corners = corners @ _Z_UP.T
     if not np.isfinite(vertices).all():
         raise UserError(f"{path}: has points that are not finite")
-    return Surface(path, corners if len(corners) else None, vertices)
+    return MeasuredSurface(path, corners if len(corners) else None, vertices)
 
 
 def evaluate(job: EvaluateSurface) -> None:
@@ -89,7 +89,9 @@ def evaluate(job: EvaluateSurface) -> None:
     print(", ".join(f"{name} {value:.6g}" for name, value in figures.items()))
 
 
-def _figures(candidate: Surface, reference: Surface, settings: SurfaceSettings) -> dict[str, float]:
+def _figures(
+    candidate: MeasuredSurface, reference: MeasuredSurface, settings: SurfaceSettings
+) -> dict[str, float]:
     """Return the figures of a surface by a protocol."""
     if settings.protocol == "dtu":
         spacing = settings.spacing or _DTU_SPACING
@@ -101,8 +103,8 @@ def _figures(candidate: Surface, reference: Surface, settings: SurfaceSettings) 
 
 
 def dtu(
-    candidate: Surface,
-    reference: Surface,
+    candidate: MeasuredSurface,
+    reference: MeasuredSurface,
     spacing: float = _DTU_SPACING,
     most_distance: float = _DTU_MOST_DISTANCE,
 ) -> dict[str, float]:
@@ -130,7 +132,7 @@ def dtu(
 
 
 def nerf_synthetic(
-    candidate: Surface, reference: Surface, count: int = NERF_SYNTHETIC_POINTS
+    candidate: MeasuredSurface, reference: MeasuredSurface, count: int = NERF_SYNTHETIC_POINTS
 ) -> dict[str, float]:
     """Return the figures of NeRF-synthetic in metres, from ``count`` points on each surface.
 
@@ -146,7 +148,9 @@ def nerf_synthetic(
     }
 
 
-def tanks_and_temples(candidate: Surface, reference: Surface, tau: float) -> dict[str, float]:
+def tanks_and_temples(
+    candidate: MeasuredSurface, reference: MeasuredSurface, tau: float
+) -> dict[str, float]:
     """Return precision, recall, and their harmonic mean, the F-score.
 
     Precision is the part of the candidate's points that are nearer than ``tau`` metres to the
@@ -194,7 +198,7 @@ def _voxel_means(points: Points, size: float) -> Points:
     return means
 
 
-def _dense(surface: Surface, spacing: float, seed: int) -> Points:
+def _dense(surface: MeasuredSurface, spacing: float, seed: int) -> Points:
     """Return points much denser than one in a square of ``spacing``. A cloud is returned as is."""
     if surface.triangles is None:
         return surface.points
@@ -208,7 +212,7 @@ def _dense(surface: Surface, spacing: float, seed: int) -> Points:
     return np.concatenate([surface.points, _sampled(surface, count, seed)])
 
 
-def _sampled(surface: Surface, count: int, seed: int) -> Points:
+def _sampled(surface: MeasuredSurface, count: int, seed: int) -> Points:
     """Return ``count`` random points (count, 3) on a mesh, uniform by area.
 
     A cloud with more points is thinned at random. One with fewer is returned as is.

@@ -27,7 +27,7 @@ from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics, summaries
-from lightfield.measurement.summaries import PLACES, WHOLE
+from lightfield.measurement.summaries import ALL_PIXELS, PLACES
 from lightfield.stages.measurement import SynthesisQuality, SynthesisSettings
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis.view import Sources, reader
@@ -181,7 +181,7 @@ def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]
     If the view has the passes of all kinds of light, each kind has a region. Black pixels show
     none.
     """
-    by_region = {WHOLE: inside}
+    by_region = {ALL_PIXELS: inside}
     if {*PARTS_OF_LIGHT} <= {render_pass.name for render_pass in truth.lightfield.passes}:
         folder = truth.lightfield.folder
         paths = [PASSES[name].path(folder, view.name) for name in PARTS_OF_LIGHT]

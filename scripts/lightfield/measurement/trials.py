@@ -57,7 +57,7 @@ _DEVICE_ATTRIBUTE = "plenoforge:device"
 
 
 @dataclass(frozen=True)
-class Window:
+class ViewWindow:
     """A part of one view at the view's resolution: its top left pixel, and its size in pixels."""
 
     view: View
@@ -159,11 +159,11 @@ class Trials:
         return bool(self.inventory["volumes"])
 
     @property
-    def first_view(self) -> Window:
+    def first_view(self) -> ViewWindow:
         """The whole first view."""
-        return Window(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
+        return ViewWindow(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
 
-    def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
+    def render(self, window: ViewWindow, seed: int, sampling: Mapping[str, Any]) -> Trial:
         """Render a window with the render settings changed by ``sampling``."""
         settings = self.lightfield.render.changed(**{**PLAIN, **sampling, "seed": seed})
         place = [window.x, window.y, window.width, window.height]
@@ -185,7 +185,7 @@ class Trials:
             parts={name: image.channels[f"{name}.Y"] for name in part_names},
         )
 
-    def reference(self, window: Window, seeds: int, samples: int) -> Reference:
+    def reference(self, window: ViewWindow, seeds: int, samples: int) -> Reference:
         """Return the mean of renders of a window with ``seeds`` seeds, ``samples`` samples each."""
         renders = [
             self.render(window, _REFERENCE_SEED + number, {"samples": samples})
@@ -195,7 +195,7 @@ class Trials:
         colours = [render.colour for render in renders]
         return make_reference(colours, depths or None, self.mask(window))
 
-    def mask(self, window: Window) -> Mask:
+    def mask(self, window: ViewWindow) -> Mask:
         """Return which pixels (h, w) of a window the lens has a ray for."""
         rows, columns = np.mgrid[: window.height, : window.width]
         rays = self.lens.rays(columns + window.x + 0.5, rows + window.y + 0.5)
@@ -206,25 +206,25 @@ class Trials:
         """Return the camera of a view for `lightfield.validation.consistency`."""
         return Camera(self.lens, view.world_from_camera, conventional_depth(self.lens))
 
-    def windows(self, size: int, count: int) -> list[Window]:
+    def windows(self, size: int, count: int) -> list[ViewWindow]:
         """Choose ``count`` windows of ``size``² pixels, spread evenly over the views and the image.
 
         A smaller view is one window.
         """
         views = self.lightfield.views
         size = min(size, self.lens.width, self.lens.height)
-        chosen: list[Window] = []
+        chosen: list[ViewWindow] = []
         point = 0
         for number in range(count):
             view = views[int((number + 0.5) * len(views) / count)]
             # The corners of a fisheye view have no pixels in the image circle.
-            places: list[tuple[float, Window]] = []
+            places: list[tuple[float, ViewWindow]] = []
             while not places or (places[-1][0] < FULL_ENOUGH and len(places) < _MOST_PLACES):
                 point += 1
                 across, down = (point * step % 1 for step in _R2)
                 x = round(across * (self.lens.width - size))
                 y = round(down * (self.lens.height - size))
-                window = Window(view, x, y, size, size)
+                window = ViewWindow(view, x, y, size, size)
                 places.append((float(self.mask(window).mean()), window))
             chosen.append(max(places, key=lambda place: place[0])[1])
         return chosen
@@ -238,7 +238,7 @@ class Trials:
             from lightfield.rendering import cycles
         return cycles.device_name(self._device)
 
-    def _render(self, window: Window, settings: RenderBlock, path: Path, key: str) -> None:
+    def _render(self, window: ViewWindow, settings: RenderBlock, path: Path, key: str) -> None:
         with processors.only(self._threads):
             from lightfield.rendering import cycles
             from lightfield.rendering.colour_pass import render_colour
@@ -338,7 +338,7 @@ SAME_DEPTH = 0.03
 
 def both_see(
     cameras: tuple[Camera, Camera],
-    windows: tuple[Window, Window],
+    windows: tuple[ViewWindow, ViewWindow],
     references: tuple[Reference, Reference],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the pixels of surfaces that two windows see, as flat indices (n,) into each window.

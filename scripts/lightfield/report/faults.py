@@ -26,7 +26,7 @@ MISS = (176, 176, 176)
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultyView:
     """One view: colour and depth as data URIs. ``depth`` is None if the file has none."""
 
     name: str
@@ -34,13 +34,13 @@ class Fault:
     depth: str | None
 
 
-def collect(folder: Path, views: Sequence[str]) -> list[Fault]:
+def collect(folder: Path, views: Sequence[str]) -> list[FaultyView]:
     """Return pictures of the first of the ``views`` in ``folder``. Leaves out unreadable files."""
     candidates = (_fault(folder, view) for view in views[:MOST])
     return [fault for fault in candidates if fault]
 
 
-def _fault(folder: Path, view: str) -> Fault | None:
+def _fault(folder: Path, view: str) -> FaultyView | None:
     exr = folder / f"{view}.exr"
     png = folder / f"{view}.png"
     path = exr if exr.is_file() or not png.is_file() else png
@@ -50,7 +50,7 @@ def _fault(folder: Path, view: str) -> Fault | None:
     except (UserError, LookupError):
         return None
     depth = webp(_depth(image.channels["Z"])) if "Z" in image.channels else None
-    return Fault(path.name, webp(shown), depth)
+    return FaultyView(path.name, webp(shown), depth)
 
 
 def _colour(colour: Array) -> Array:

@@ -59,7 +59,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Dataset:
+class DatasetFiles:
     """A finished dataset, or a frame of a sequence: its samples, and its files without a view.
 
     The ``others`` have their paths in the package. The exports of a whole sequence have no samples.
@@ -69,7 +69,7 @@ class Dataset:
     others: Mapping[str, Path]
 
 
-def read_dataset(root: Path, folder: Path) -> Dataset:
+def read_dataset(root: Path, folder: Path) -> DatasetFiles:
     """Read the dataset in a ``folder`` that is the package's ``root``, or lies in it.
 
     Names and checksums are those of sha256sums.txt. Raises `UserError` without that file.
@@ -78,7 +78,7 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
     sums = read_sums(folder / SUMS)
     if folder == root and NAME not in sums:
-        return Dataset([], _others(root, folder, [*sums, SUMS]))
+        return DatasetFiles([], _others(root, folder, [*sums, SUMS]))
     reprojections = sorted(Path(name).parent.name for name in sums if name.endswith(f"/{NAME}"))
     source = read_set(folder, "")
     sets = [source]
@@ -94,7 +94,7 @@ def read_dataset(root: Path, folder: Path) -> Dataset:
         _add_file(samples, source, sets[file.set], file, folder, sums)
     taken = {path for sample in samples for path in sample.files.values()}
     others = [name for name in (*sums, SUMS) if folder / name not in taken]
-    return Dataset(samples, _others(root, folder, others))
+    return DatasetFiles(samples, _others(root, folder, others))
 
 
 def _others(root: Path, folder: Path, names: Iterable[str]) -> dict[str, Path]:
@@ -152,7 +152,7 @@ def _add_file(
 
 
 def write_shards(
-    output: Path, name: str, datasets: Sequence[Dataset], most: float
+    output: Path, name: str, datasets: Sequence[DatasetFiles], most: float
 ) -> dict[str, list[Path]]:
     """Write the samples as tars of at most ``most`` bytes. Return the tars of each split.
 
@@ -189,7 +189,7 @@ def write_shards(
     return shards
 
 
-def write_others(output: Path, name: str, datasets: Sequence[Dataset]) -> Path:
+def write_others(output: Path, name: str, datasets: Sequence[DatasetFiles]) -> Path:
     """Write all files without a view as a tar that unpacks to the folder ``name``."""
     path = output / f"{_OTHER_FILES}.tar"
     files = {inside: file for dataset in datasets for inside, file in dataset.others.items()}

@@ -67,7 +67,7 @@ def of_family(name: str, folder: Path, count: int) -> str:
 
 
 @dataclass
-class Rendering:
+class RenderProgress:
     """The rendering of one dataset.
 
     - ``finished``: the names of the rendered views.
@@ -83,9 +83,9 @@ class Rendering:
     killed: list[str] = field(default_factory=list)
 
 
-def look(folder: Path, work: Path, count: int, now: float) -> Rendering:
+def look(folder: Path, work: Path, count: int, now: float) -> RenderProgress:
     """Return the progress of the rendering of ``count`` views at ``now``, in seconds since 1970."""
-    rendering = Rendering()
+    rendering = RenderProgress()
     views: Sequence[View] = ()
     try:
         if (folder / NAME).exists():
@@ -135,7 +135,7 @@ def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]
 
 
 def _add_shard(
-    rendering: Rendering, name: str, runs: Sequence[journal.Run], missing: bool, now: float
+    rendering: RenderProgress, name: str, runs: Sequence[journal.Run], missing: bool, now: float
 ) -> None:
     """Add the state of a shard's processes. ``missing`` says whether it lacks views."""
     last = runs[-1]
@@ -162,7 +162,7 @@ def _add_shard(
 
 
 def lines(
-    name: str, folder: Path, count: int, reprojections: Sequence[str], rendering: Rendering
+    name: str, folder: Path, count: int, reprojections: Sequence[str], rendering: RenderProgress
 ) -> list[str]:
     """Return lines about the progress of a dataset of ``count`` views."""
     rendered = len(rendering.finished)

@@ -143,7 +143,7 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
             ["truth", "place", *names], by_place
         ),
     }
-    if {row["region"] for row in all_views} > {summaries.WHOLE}:
+    if {row["region"] for row in all_views} > {summaries.ALL_PIXELS}:
         title = "By the kind of light that dominates a pixel"
         tables[title] = Table(["truth", "region", "part", *names], by_region)
     return Measurement(page.plot(path.with_suffix("")), tables)

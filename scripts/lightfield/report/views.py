@@ -54,7 +54,7 @@ _NOISE_SIDE = 512
 
 
 @dataclass(frozen=True)
-class View:
+class PageView:
     """One view for the page: small linear colour, small depth as stored, and its noise."""
 
     colour: Array
@@ -108,7 +108,7 @@ def collect(
     lens = lightfield.lens
     meaning = lightfield.depth
 
-    def load(number: int, small: Lens) -> View:
+    def load(number: int, small: Lens) -> PageView:
         if names[number] in unreadable:
             return _black(small, meaning)
         return read(folder / f"{names[number]}.exr", small, meaning)
@@ -199,7 +199,7 @@ def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
     ]
 
 
-def _depths(views: list[View], small: Lens) -> Array | None:
+def _depths(views: list[PageView], small: Lens) -> Array | None:
     """Return the depth of the views, NaN where ``small`` sees nothing. None if they have none."""
     stored = [view.depth for view in views if view.depth is not None]
     if not stored:
@@ -208,7 +208,7 @@ def _depths(views: list[View], small: Lens) -> Array | None:
 
 
 def _pictures(
-    views: list[View],
+    views: list[PageView],
     depths: Array | None,
     embedded: list[int],
     lightfield: LightField,
@@ -248,7 +248,7 @@ def _missed(depths: Array) -> float | None:
     return float(np.isposinf(defined).mean()) if defined.size else None
 
 
-def read(path: Path, small: Lens, meaning: str | None) -> View:
+def read(path: Path, small: Lens, meaning: str | None) -> PageView:
     """Read a view at the resolution of ``small``. Averages colour, takes depth from one pixel."""
     image = images.read_image(path, "RGBZ" if meaning else "RGB")
     colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
@@ -261,14 +261,14 @@ def read(path: Path, small: Lens, meaning: str | None) -> View:
     depth = None
     if meaning:
         depth = image.channels["Z"][_picked(height, width, small)].astype(np.float32)
-    return View(colour, depth, float(np.median(noise)) if noise.size else math.nan)
+    return PageView(colour, depth, float(np.median(noise)) if noise.size else math.nan)
 
 
-def _black(lens: Lens, meaning: str | None) -> View:
+def _black(lens: Lens, meaning: str | None) -> PageView:
     """Return a black view in place of one that cannot be read."""
     shape = (lens.height, lens.width)
     depth = np.full(shape, np.nan, np.float32) if meaning else None
-    return View(np.zeros((*shape, 3), np.float32), depth, math.nan)
+    return PageView(np.zeros((*shape, 3), np.float32), depth, math.nan)
 
 
 def _middle(length: int) -> slice:
@@ -328,7 +328,7 @@ def _depth_scale(depths: Array, reach: tuple[float, float], meaning: str | None)
 
 
 def _epipolar_images(
-    load: Callable[[int, Lens], View],
+    load: Callable[[int, Lens], PageView],
     lightfield: LightField,
     row: epipolar.Row,
     kept: list[int],

@@ -4,12 +4,12 @@ from lightfield.core.files import write_text
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry
-from lightfield.stages.lenses import LensMap
+from lightfield.stages.lenses import ComputeLensMap
 
 _UNSEEN = "The source does not see this face.\n"
 
 
-def write(job: LensMap) -> None:
+def write(job: ComputeLensMap) -> None:
     """Compute and write the lens maps. A face that the source does not see gets a line of text."""
     _, source = job.read()
     geometry = Geometry.of(job.settings, source)

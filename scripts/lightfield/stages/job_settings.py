@@ -32,7 +32,7 @@ from lightfield.stages.measurement import (
     SynthesisSettings,
 )
 from lightfield.stages.publishing import PackSettings
-from lightfield.stages.report import FiguresSettings, Measurement, PageSettings
+from lightfield.stages.report import FiguresSettings, MeasurementFile, PageSettings
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import BuildSettings, ImportSettings
 from lightfield.workflow.build import Build, Wildcards, full_datasets, source_of
@@ -212,7 +212,7 @@ def _full_size(dataset: Dataset) -> FullSize:
 
 def _page(build: Build, dataset: Dataset) -> Content:
     measured = [
-        Measurement(file=str(path), modified_ns=path.stat().st_mtime_ns)
+        MeasurementFile(file=str(path), modified_ns=path.stat().st_mtime_ns)
         for path in _measurements(build, dataset)
     ]
     return PageSettings.of(

@@ -12,7 +12,7 @@ _CHOICE = "Choice of files"
 _RUNTIME = "Runtime"
 
 
-class LensMap(Source, Stage[Reprojection]):
+class ComputeLensMap(Source, Stage[Reprojection]):
     """Computes a lens map, which `Reproject` applies to every view of a rig."""
 
     name = "lens_map"

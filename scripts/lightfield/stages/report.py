@@ -33,7 +33,7 @@ class ReportFigures(Stage[FiguresSettings]):
     output: Path = writes("folder to write")
 
 
-class Measurement(Settings):
+class MeasurementFile(Settings):
     """A file that a measurement wrote, and that the page shows."""
 
     file: str = Field(description="Path of the file.")
@@ -55,7 +55,7 @@ class PageSettings(Settings):
         description="Whether the overview is a panorama. false: it is the view in the rig's "
         "middle.",
     )
-    measurements: list[Measurement] = Field(
+    measurements: list[MeasurementFile] = Field(
         [], description="Files of measurements that the page shows."
     )
 

@@ -54,7 +54,7 @@ class ImportViews(PlainStage):
     record: Path | None = writes("JSON to write: the sizes and checksums of the views", None)
 
 
-class Flow(PlainStage):
+class ComputeFlow(PlainStage):
     """Computes the optical flow from views of a dataset to their neighbours."""
 
     name = "flow"
@@ -66,7 +66,7 @@ class Flow(PlainStage):
     record: Path | None = writes("JSON to write: the sizes and checksums of the files", None)
 
 
-class Splits(PlainStage):
+class ListSplits(PlainStage):
     """Lists which views of a scene's rigs are for training, validation and testing."""
 
     name = "splits"

@@ -89,8 +89,9 @@ def _small_shape(shape: tuple[int, ...]) -> tuple[int, int]:
 
 def neighbours(world_from_cameras: Array, index: int) -> list[int]:
     """Return the views to compare a view with. ``world_from_cameras`` (n, 4, 4) has all views."""
-    apart = np.linalg.norm(world_from_cameras[:, :3, 3] - world_from_cameras[index, :3, 3], axis=1)
-    nearest = np.argsort(apart, kind="stable")
+    positions = world_from_cameras[:, :3, 3]
+    distances = np.linalg.norm(positions - positions[index], axis=1)
+    nearest = np.argsort(distances, kind="stable")
     return [int(other) for other in nearest if other != index][:NEIGHBOURS]
 
 
@@ -137,9 +138,9 @@ def _grown(steps: Array, comparison: "_Comparison", on_surface: tuple[Array, Arr
     A pixel near a reflection joins it if the views agree better there than ``on_surface``.
     """
     inverse = comparison.here.inverse
-    apart, (row, column) = distance_transform_edt(steps == 0, return_indices=True)
+    distances, (row, column) = distance_transform_edt(steps == 0, return_indices=True)
     nearest = steps[row, column]
-    is_near = (apart > 0) & (apart <= REACH)
+    is_near = (distances > 0) & (distances <= REACH)
     is_near &= np.abs(inverse - inverse[row, column]) < FLAT * inverse[row, column]
     there = comparison.differences(nearest, is_near)
     is_better = is_near & (
@@ -245,8 +246,8 @@ def _find_seen(
     for n in range(len(pixels)):
         x, y = places[n, 0], places[n, 1]
         if x >= 0 and y >= 0 and x < width and y < height:
-            apart = abs(inverse[int(y), int(x)] - expected[n])
-            is_seen[pixels[n]] = apart < SAME * expected[n]
+            difference = abs(inverse[int(y), int(x)] - expected[n])
+            is_seen[pixels[n]] = difference < SAME * expected[n]
 
 
 @kernel

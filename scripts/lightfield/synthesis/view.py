@@ -69,7 +69,7 @@ class Synthesised:
 
 
 @dataclass(frozen=True)
-class Surface:
+class ViewSurface:
     """A view as a surface with a vertex for each pixel.
 
     - ``inverse`` (h, w): 1 / distance.
@@ -132,7 +132,7 @@ class Sources:
         self.fills_holes = fills_holes
         self.most = most
         self.world_from_cameras: Array = np.array([view.world_from_camera for view in views])
-        self._held: OrderedDict[int, Surface] = OrderedDict()
+        self._held: OrderedDict[int, ViewSurface] = OrderedDict()
         self._pictures: OrderedDict[int, apparent.Picture] = OrderedDict()
         self._latest_layers: tuple[Array, Array] | None = None
 
@@ -147,7 +147,7 @@ class Sources:
         sample = range(0, len(self.views), max(1, len(self.views) // 4))
         return typical(np.concatenate([self._picture(index).inverse.ravel() for index in sample]))
 
-    def surface(self, index: int) -> Surface:
+    def surface(self, index: int) -> ViewSurface:
         """Return a view as a surface. Keeps the latest views in memory."""
         if index not in self._held:
             self._held[index] = self._surface(index, *self.read(self.views[index]))
@@ -175,7 +175,7 @@ class Sources:
         ]
         return farther(self._picture(index), others, self.lens)
 
-    def _surface(self, index: int, colour: Array, distance: Array) -> Surface:
+    def _surface(self, index: int, colour: Array, distance: Array) -> ViewSurface:
         inverse = apparent.inverse_of(colour, distance)
         right, down, torn = _links(inverse, self.lens)
         steps = self._steps(index)
@@ -192,7 +192,7 @@ class Sources:
         certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
         shade = np.dstack([sharp, certainty]).astype(np.float32)
         seeming = inverse * apparent.factors(steps)
-        return Surface(inverse, shade, right, down, torn, corners, steps > 0, seeming)
+        return ViewSurface(inverse, shade, right, down, torn, corners, steps > 0, seeming)
 
     @cached_property
     def _to_rim(self) -> Array:
@@ -364,7 +364,7 @@ def seeming_farther(
     )
 
 
-def _mirror_links(surface: Surface) -> tuple[Array, Array]:
+def _mirror_links(surface: ViewSurface) -> tuple[Array, Array]:
     """Return which vertices (h, w) of mirrors share a surface with their right and lower one."""
     mirror = surface.mirror
     right = surface.right & mirror

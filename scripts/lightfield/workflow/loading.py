@@ -9,7 +9,7 @@ from lightfield.configuration.config_file import Configuration, Preset
 from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
-from lightfield.configuration.render_settings import CHOSEN, Render
+from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
@@ -119,8 +119,8 @@ def scene_datasets(
     Uses the folders and the length of shards of ``settings``. ``cluster`` renders the datasets.
     """
     written = scene_yaml.load_scene(scene)
-    places = _folders_and_shards(settings) | {"cluster": cluster}
-    return datasets_of(scene, written, preset, limits or Preset(), places)
+    common_fields = _folders_and_shards(settings) | {"cluster": cluster}
+    return datasets_of(scene, written, preset, limits or Preset(), common_fields)
 
 
 def datasets_of(
@@ -128,11 +128,12 @@ def datasets_of(
     written: scene_yaml.Scene,
     preset: str,
     limits: Preset,
-    places: Mapping[str, Any],
+    common_fields: Mapping[str, Any],
 ) -> list[Dataset]:
     """Resolve every dataset of a scene as it is ``written``, under the ``limits`` of a preset.
 
-    ``places`` are fields of `Dataset`: folders, shards, the cluster, and the member.
+    ``common_fields`` are fields of `Dataset` with the same value in all of them: folders, shards,
+    the cluster, and the member.
     """
     source = written.scene
     if source.blend:
@@ -158,7 +159,7 @@ def datasets_of(
                 limits=limits,
                 shard_count=shard_count,
                 **_split_partners(rig, written, folder.removeprefix(name)),
-                **places,
+                **common_fields,
             )
             datasets.append(dataset)
     return datasets
@@ -294,7 +295,7 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> RenderBl
     content = render.model_dump(exclude_none=True)
     if render.samples is None:
         # The calibration chooses these.
-        for key in CHOSEN:
+        for key in CALIBRATED_KEYS:
             content.pop(key, None)
     if isinstance(render.samples, int):
         content["samples"] = min(render.samples, limits.samples or render.samples)
