@@ -17,7 +17,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import size_and_time
 from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.imaging.images import write_png
+from lightfield.stages.checks import Validate
 from lightfield.stages.family import BatchSettings
+from lightfield.stages.views import RenderShard
 
 ROOT = Path(__file__).parents[2]
 
@@ -345,16 +347,14 @@ def test_a_texture_that_was_missing_makes_its_batch_outdated(face, tmp_path, run
 
 @pytest.mark.slow
 def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, monkeypatch):
-    from lightfield.family.stages import Stages
-
     path = tmp_path / "face.obj"
-    render = Stages._render
+    render = RenderShard.run
 
-    def change_and_render(*arguments):
+    def change_and_render(job):
         path.write_text(FACE.replace("1 0 0", "2 0 0"))
-        render(*arguments)
+        render(job)
 
-    monkeypatch.setattr(Stages, "_render", change_and_render)
+    monkeypatch.setattr(RenderShard, "run", change_and_render)
     build = build_of(face())
     assert build.build("cpu", 1)["state"] == "valid"
     assert not build.is_finished()
@@ -363,6 +363,24 @@ def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, mo
     path.write_text(FACE)
     assert build.is_finished()
     assert build.source_stamps()[str(path)] == size_and_time(path)
+
+
+@pytest.mark.slow
+def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_path, monkeypatch):
+    validate = Validate.run
+
+    def damage_and_validate(job):
+        (job.dataset / "exr/view_0000f.exr").write_bytes(b"damaged")
+        return validate(job)
+
+    monkeypatch.setattr(Validate, "run", damage_and_validate)
+    failure = build_of(face()).build("cpu", 1)["failure"]
+    assert failure["stage"] == "validate"
+    assert "exr/view_0000f.exr" in failure["cause"]
+    validation = tmp_path / "results/faces/face/ring/validation.json"
+    assert failure["cause"].endswith(f"see {validation}")
+    assert json.loads(validation.read_text())["valid"] is False
+    assert not validation.with_name("sha256sums.txt").exists()
 
 
 @pytest.mark.slow

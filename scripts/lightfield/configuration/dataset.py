@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -172,6 +172,12 @@ class Dataset(Capture):
     def sequence_sums(self) -> str | None:
         """The checksums of the exports of the whole sequence, if it has any."""
         return self.sequence_paths.sums if self.sequence_exports else None
+
+    def training_transforms(self, prefix: str) -> str | None:
+        """Return the export of a source to instant-ngp that trains what this dataset tests."""
+        if self.trained_by is None:
+            return None
+        return replace(self.paths, rig=self.trained_by).transforms(prefix)
 
     # Files of which there are several.
 

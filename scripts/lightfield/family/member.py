@@ -19,16 +19,16 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import DAMAGE, listed, read_json, sha256, size_and_time, write_json
+from lightfield.family.stages import Run, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import SPLITS, splits_content
 from lightfield.rendering import model_files
-from lightfield.stages.family import BatchSettings
+from lightfield.stages.family import BatchSettings, BuildMembers
+from lightfield.stages.views import Device
 from lightfield.workflow.loading import datasets_of
 from lightfield.workflow.view_store import ViewStore
 
-# Raise this number when the stages make something else of equal settings.
-VERSION = 1
 # What a member is made of does not depend on these keys of a scene YAML.
 _DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
 
@@ -71,7 +71,7 @@ class MemberBuild:
         ``model_sums`` are the path and SHA-256 of each file that its model was read from.
         """
         content = [
-            VERSION,
+            BuildMembers.version,
             {k: v for k, v in self.content.items() if k not in _DESCRIPTIVE_KEYS},
             self.settings.limits.as_json(),
             self.settings.fingerprint,
@@ -169,7 +169,7 @@ class MemberBuild:
             names.setdefault(str(path.parent), set()).add(path.name)
         return all(expected <= {*self.store.names(path)} for path, expected in names.items())
 
-    def build(self, device: str, threads: int) -> dict[str, Any]:
+    def build(self, device: Device, threads: int) -> dict[str, Any]:
         """Make the member's datasets, and return and write its record.
 
         A failure is in the record, and the traceback in the log. Raises `UserError` only if
@@ -180,10 +180,7 @@ class MemberBuild:
         (self.work / "model.json").unlink(missing_ok=True)
         if self.store:
             self.store.remove(str(self.record))
-        # Only now, because the process that starts workers needs no Blender.
-        from lightfield.family.stages import Stages
-
-        stages: Stages | None = None
+        run = Run()
         with _output_to(self.log):
             try:
                 written = self._written()
@@ -192,16 +189,15 @@ class MemberBuild:
                 if self.member.model:
                     # List the files before they are read, because they may change meanwhile.
                     write_json(self.work / SOURCES, {"files": self._known_sources()})
-                name = f"{self.settings.family}/{self.member.name}"
-                stages = Stages(self.settings, name, written, datasets, device, threads)
-                stages.run()
+                scene = f"{self.settings.family}/{self.member.name}"
+                work = self.settings.work
+                run.run(jobs_of(datasets, written, scene, work, device, threads))
             except (Exception, SystemExit) as error:
                 traceback.print_exc()
                 if problem := obstacle(self.folder) or obstacle(self.work):
                     raise UserError(f"{self.folder}: cannot be written: {problem}") from None
-                stage = stages.stage if stages else "settings"
-                return self.fail(stage, _cause(error))
-        write_json(self.work / "cpu_seconds.json", stages.seconds)
+                return self.fail(run.stage, _cause(error))
+        write_json(self.work / "cpu_seconds.json", run.seconds)
         entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
         return self._write({"state": "valid", "datasets": entries})
 

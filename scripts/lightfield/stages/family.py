@@ -1,7 +1,7 @@
 """The stages that build the members of a family, collect them, and count them."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
@@ -11,6 +11,7 @@ from lightfield.configuration.family import Draw, Member
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.core.stage import Stage, cause, option, writes
+from lightfield.stages.views import Device
 
 
 class BatchSettings(Settings):
@@ -41,10 +42,9 @@ class BuildMembers(Stage[BatchSettings]):
 
     name = "build_members"
     function = "lightfield.family.batch:run"
+    version = 1
 
-    device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = option(
-        "device on which Cycles renders", "auto"
-    )
+    device: Device = option("device on which Cycles renders", "auto")
     threads: AtLeastOne = option("CPU threads", 1)
     record: Path = writes("JSON to write: the state of each member")
 

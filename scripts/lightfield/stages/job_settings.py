@@ -1,12 +1,14 @@
 """The settings files of all jobs: what the plan writes, and the programs read with --settings.
 
-`settings_file` is the only provider. Each stage has an entry in one of its tables, by what the
-stage works on: a scene, a dataset, a reprojection, or something else with wildcards of its own.
+`settings_file` is the only provider of the rules. Each stage has an entry in one of its tables, by
+what the stage works on: a scene, a dataset, a reprojection, or something else with wildcards of its
+own. The functions that need no build also serve the stages of a family's members.
 """
 
 import os
 import shlex
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,13 +16,15 @@ from typing import Any
 from lightfield.configuration import keys
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.exports import Export, InstantNgp, export_settings_of
+from lightfield.configuration.dataset_paths import prefix_of
+from lightfield.configuration.exports import Export, ExportSettings, InstantNgp, export_settings_of
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
+from lightfield.core.settings import Settings
 from lightfield.geometry.rigs import Poses
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
@@ -34,7 +38,7 @@ from lightfield.stages.measurement import (
 from lightfield.stages.publishing import PackSettings
 from lightfield.stages.report import FiguresSettings, MeasurementFile, PageSettings
 from lightfield.stages.rig import FreePlacesSettings
-from lightfield.stages.scene import BuildSettings, ImportSettings
+from lightfield.stages.scene import BuildSettings, ImportSettings, Inventory
 from lightfield.workflow.build import Build, Wildcards, full_datasets, source_of
 from lightfield.workflow.loading import rendered_frames, scene_datasets
 
@@ -48,39 +52,48 @@ def settings_file(stage: str, build: Build, wildcards: Wildcards) -> tuple[str, 
     """
     if stage in _OF_SCENE:
         dataset = build.scene(wildcards)
-        return f"{dataset.paths.scene_work}/settings/{stage}.json", _OF_SCENE[stage](dataset)
+        path = f"{dataset.paths.scene_work}/settings/{stage}.json"
+        return path, _content(_OF_SCENE[stage](dataset))
     if stage in _OF_DATASET:
         dataset = build.dataset(wildcards)
-        return dataset.paths.settings(stage), _OF_DATASET[stage](build, dataset)
+        return dataset.paths.settings(stage), _OF_DATASET[stage](dataset).as_json()
+    if stage in _OF_DATASET_AND_BUILD:
+        dataset = build.dataset(wildcards)
+        settings = _OF_DATASET_AND_BUILD[stage](build, dataset)
+        return dataset.paths.settings(stage), settings.as_json()
     if stage in _OF_REPROJECTION:
         dataset = build.dataset(wildcards)
         reprojection = build.reprojection(wildcards)
         assert reprojection
         path = dataset.paths.settings(f"{wildcards['reprojection']}/{stage}")
         return path, _OF_REPROJECTION[stage](reprojection)
-    name, content = _OTHERS[stage](build, wildcards)
+    name, others = _OTHERS[stage](build, wildcards)
     folder = "/".join(wildcards[key] for key in ("scene", "rig", "family") if key in wildcards)
-    return os.path.normpath(f"{build.config.work}/{folder}/settings/{name}.json"), content
+    return os.path.normpath(f"{build.config.work}/{folder}/settings/{name}.json"), _content(others)
+
+
+def _content(settings: Settings | Content) -> Content:
+    return settings.as_json() if isinstance(settings, Settings) else settings
 
 
 # Of a scene.
 
 
-def _build_scene(dataset: Dataset) -> Content:
+def build_scene(dataset: Dataset) -> BuildSettings:
+    """Return the settings that build a dataset's scene."""
     source = dataset.source
     if source.builder is None:
         raise UserError(f"{dataset.paths.built_blend}: the scene YAML has no builder that makes it")
-    settings = BuildSettings(
+    return BuildSettings(
         builder=source.builder, parameters=source.parameters, fingerprint=dataset.fingerprint
     )
-    return settings.as_json()
 
 
-def _import_model(dataset: Dataset) -> Content:
+def _import_model(dataset: Dataset) -> ImportSettings:
     source = load_scene(dataset.scene_name).scene
     if source.model is None:
         raise UserError(f"{dataset.paths.model_blend}: the scene YAML has no model that makes it")
-    return ImportSettings.of_source(source).as_json()
+    return ImportSettings.of_source(source)
 
 
 def _check_blend(dataset: Dataset) -> Content:
@@ -99,8 +112,7 @@ def _inventory(dataset: Dataset) -> Content:
     source = written.scene
     assert written.render
     content: Content = {
-        # Raise this number when the program lists something else.
-        "version": 5,
+        "version": Inventory.version,
         "scene_name": source.scene_name,
         "view_layers": source.view_layers,
         "allow_missing": source.allow_missing,
@@ -119,8 +131,8 @@ def _inventory(dataset: Dataset) -> Content:
     return content
 
 
-_OF_SCENE: Mapping[str, Callable[[Dataset], Content]] = {
-    "build_scene": _build_scene,
+_OF_SCENE: Mapping[str, Callable[[Dataset], Settings | Content]] = {
+    "build_scene": build_scene,
     "import_model": _import_model,
     "check_blend": _check_blend,
     "inventory": _inventory,
@@ -130,7 +142,8 @@ _OF_SCENE: Mapping[str, Callable[[Dataset], Content]] = {
 # Of a dataset.
 
 
-def _free_places(build: Build, dataset: Dataset) -> Content:
+def free_places(dataset: Dataset) -> FreePlacesSettings:
+    """Return the settings that place the cameras of a random rig."""
     if not dataset.places:
         raise UserError(
             f"{dataset.paths.places}: is for rigs of type random; "
@@ -142,28 +155,29 @@ def _free_places(build: Build, dataset: Dataset) -> Content:
         frame=source.frame,
         scene_name=source.scene_name,
         view_layers=source.view_layers,
-    ).as_json()
+    )
 
 
-def _lightfield(build: Build, dataset: Dataset) -> Content:
+def lightfield(dataset: Dataset) -> LightfieldSettings:
+    """Return the settings of a dataset's lightfield.json."""
     file = dataset.rig.file if isinstance(dataset.rig, Poses) else None
     return LightfieldSettings.of_capture(
         dataset,
         flow=bool(dataset.flow),
         fingerprint=dataset.builder_fingerprint,
         poses_sha256=sha256(file) if file else None,
-    ).as_json()
+    )
 
 
-def _panorama(build: Build, dataset: Dataset) -> Content:
+def _panorama(dataset: Dataset) -> LightfieldSettings:
     return LightfieldSettings.of_capture(
         dataset,
         panorama_width=dataset.panorama_width,
         fingerprint=dataset.builder_fingerprint,
-    ).as_json()
+    )
 
 
-def _mesh(build: Build, dataset: Dataset) -> Content:
+def _mesh(dataset: Dataset) -> MeshSettings:
     if not dataset.mesh:
         raise UserError(f"{dataset.paths.folder}/{MESH}: the scene YAML asks for no mesh of it")
     source = dataset.source
@@ -173,27 +187,41 @@ def _mesh(build: Build, dataset: Dataset) -> Content:
         scene_name=source.scene_name,
         view_layers=source.view_layers,
         numbered=not {"object", "instance"}.isdisjoint(dataset.render.passes or ()),
-    ).as_json()
+    )
 
 
-def _validate(build: Build, dataset: Dataset) -> Content:
+def validate(dataset: Dataset) -> ValidationSettings:
+    """Return the settings that check a dataset."""
     return ValidationSettings(
         reprojections=[*dataset.reprojections],
         exports=dataset.export_lists,
         records=dataset.all_records,
-    ).as_json()
+    )
 
 
-def _figures(build: Build, dataset: Dataset) -> Content:
-    return FiguresSettings.of(rig=dataset.placed_rig).as_json()
+def _figures(dataset: Dataset) -> FiguresSettings:
+    return FiguresSettings.of(rig=dataset.placed_rig)
 
 
-def _costs(build: Build, dataset: Dataset) -> Content:
+_OF_DATASET: Mapping[str, Callable[[Dataset], Settings]] = {
+    "free_places": free_places,
+    "lightfield": lightfield,
+    "panorama": _panorama,
+    "mesh": _mesh,
+    "validate": validate,
+    "figures": _figures,
+}
+
+
+# Of a dataset in a build.
+
+
+def _costs(build: Build, dataset: Dataset) -> CostSettings:
     return CostSettings(
         energy=build.config.energy,
         full=_full_size(dataset),
         reprojections=[*dataset.reprojections],
-    ).as_json()
+    )
 
 
 def _full_size(dataset: Dataset) -> FullSize:
@@ -210,7 +238,7 @@ def _full_size(dataset: Dataset) -> FullSize:
     )
 
 
-def _page(build: Build, dataset: Dataset) -> Content:
+def _page(build: Build, dataset: Dataset) -> PageSettings:
     measured = [
         MeasurementFile(file=str(path), modified_ns=path.stat().st_mtime_ns)
         for path in _measurements(build, dataset)
@@ -221,7 +249,7 @@ def _page(build: Build, dataset: Dataset) -> Content:
         command=_rebuilding(dataset),
         panorama=bool(dataset.panorama),
         measurements=measured,
-    ).as_json()
+    )
 
 
 def _measurements(build: Build, dataset: Dataset) -> list[Path]:
@@ -249,18 +277,12 @@ def _rebuilding(dataset: Dataset) -> str:
     return shlex.join(["snakemake", *arguments])
 
 
-def _synthesis(build: Build, dataset: Dataset) -> Content:
+def _synthesis(build: Build, dataset: Dataset) -> SynthesisSettings:
     truths = build.held_out(dataset)
-    return SynthesisSettings(truth=[truth.paths.folder for truth in truths]).as_json()
+    return SynthesisSettings(truth=[truth.paths.folder for truth in truths])
 
 
-_OF_DATASET: Mapping[str, Callable[[Build, Dataset], Content]] = {
-    "free_places": _free_places,
-    "lightfield": _lightfield,
-    "panorama": _panorama,
-    "mesh": _mesh,
-    "validate": _validate,
-    "figures": _figures,
+_OF_DATASET_AND_BUILD: Mapping[str, Callable[[Build, Dataset], Settings]] = {
     "costs": _costs,
     "page": _page,
     "synthesis": _synthesis,
@@ -276,95 +298,109 @@ _OF_REPROJECTION: Mapping[str, Callable[[Reprojection], Content]] = {
 }
 
 
-# Others. Each returns the name of the settings file, and its content.
+# Of an export.
 
 
-def _export(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    dataset = build.dataset(wildcards)
-    options = build.export(wildcards)
-    tests = {test.rig_name: test.paths.folder for test in build.testing(dataset, options)}
-    return _export_content(dataset, wildcards["format"], options, wildcards, tested_by=tests)
+def export(dataset: Dataset, name: str, options: Export, source: str) -> ExportSettings[Export]:
+    """Return the settings that export a source of a dataset in the format ``name``."""
+    rigs = dataset.tested_by if options.is_for_training else ()
+    # In a sequence the frame's folder follows the rig's name.
+    folders = {rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder for rig in rigs}
+    return _export_settings(dataset, name, options, source, tested_by=folders)
 
 
-def _export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    frames = build.frames(wildcards)
-    first = frames[0]
-    options = first.exports.selected[wildcards["format"]]
-    return _export_content(
-        first,
-        wildcards["format"],
-        options,
-        wildcards,
-        tested_by={
-            test.rig_name: test.sequence_paths.folder for test in build.testing(first, options)
-        },
-        frames=[Path(frame.paths.folder).name for frame in frames],
-    )
-
-
-def _instant_ngp(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    dataset = build.dataset(wildcards)
+def instant_ngp(dataset: Dataset, source: str) -> ExportSettings[Export]:
+    """Return the settings that export a source of a dataset for instant-ngp."""
     # A user may name a transforms.json that the scene YAML does not export.
-    options = dataset.exports.instant_ngp or InstantNgp(sources=[source_of(wildcards)])
-    transforms = build.training_transforms(wildcards)
-    roles = {"trained_by": transforms[0]} if transforms else {}
-    return _export_content(dataset, "instant_ngp", options, wildcards, **roles)
+    options = dataset.exports.instant_ngp or InstantNgp(sources=[source])
+    transforms = dataset.training_transforms(prefix_of(source))
+    roles = {"trained_by": transforms} if transforms else {}
+    return _export_settings(dataset, "instant_ngp", options, source, **roles)
 
 
-def _export_content(
-    dataset: Dataset, export_format: str, options: Export, wildcards: Wildcards, **roles: Any
-) -> tuple[str, Content]:
-    source = source_of(wildcards)
-    settings = export_settings_of(export_format).of(
+def _export_settings(
+    dataset: Dataset, name: str, options: Export, source: str, **roles: Any
+) -> ExportSettings[Export]:
+    return export_settings_of(name).of(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
         **roles,
     )
-    return f"exports/{source}/{export_format}", settings.as_json()
 
 
-def _validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+# Others. Each returns the name of the settings file, and its content.
+
+
+def _export(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    name, source = wildcards["format"], source_of(wildcards)
+    settings = export(build.dataset(wildcards), name, build.export(wildcards), source)
+    return f"exports/{source}/{name}", settings
+
+
+def _export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    name, source = wildcards["format"], source_of(wildcards)
+    frames = build.frames(wildcards)
+    first = frames[0]
+    options = first.exports.selected[name]
+    tests = build.testing(first, options)
+    settings = _export_settings(
+        first,
+        name,
+        options,
+        source,
+        tested_by={test.rig_name: test.sequence_paths.folder for test in tests},
+        frames=[Path(frame.paths.folder).name for frame in frames],
+    )
+    return f"exports/{source}/{name}", settings
+
+
+def _instant_ngp(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    source = source_of(wildcards)
+    return f"exports/{source}/instant_ngp", instant_ngp(build.dataset(wildcards), source)
+
+
+def _validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     frames = build.frames(wildcards)
     settings = SequenceValidationSettings(
         frames=[Path(frame.paths.folder).name for frame in frames],
         exports=frames[0].sequence_exports,
     )
-    return "validate", settings.as_json()
+    return "validate", settings
 
 
-def _probes(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     """Return the settings of a scene's probe cameras: those of its first rig."""
-    return "probes", _lightfield(build, build.first_of_scene(wildcards["scene"]))
+    return "probes", lightfield(build.first_of_scene(wildcards["scene"]))
 
 
-def _gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     """Return the settings of a scene's GPU check: the full sizes of its rigs."""
     sizes = {
         rig: FullSize(views=dataset.view_count, resolution=[*dataset.rig.camera.resolution])
         for rig, dataset in full_datasets(wildcards["scene"]).items()
     }
-    return "gpu_check", GpuCheckSettings(full=sizes).as_json()
+    return "gpu_check", GpuCheckSettings(full=sizes)
 
 
 def _splits(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
     return "splits", {"lightfields": build.split_lightfields(wildcards)}
 
 
-def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     datasets = build.rig(wildcards)
     settings = PackSettings.of(
         datasets=[dataset.name for dataset in datasets],
         gigabytes=build.config.package_gigabytes,
         scene=load_scene(datasets[0].scene_name),
     )
-    return "pack", settings.as_json()
+    return "pack", settings
 
 
 def _index(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
     return "index", {"pages": [dataset.paths.page for dataset in build.chosen]}
 
 
-def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     name = build.family_names[folder]
     family = build.families[name]
@@ -383,7 +419,7 @@ def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
         fingerprint=_source_fingerprint(load_scene(name).scene, family.values),
         bpy=version("bpy"),
     )
-    return f"batches/{wildcards['batch']}", settings.as_json()
+    return f"batches/{wildcards['batch']}", settings
 
 
 def _source_fingerprint(source: SceneSource, values: Mapping[str, Any]) -> str | None:
@@ -397,23 +433,23 @@ def _source_fingerprint(source: SceneSource, values: Mapping[str, Any]) -> str |
     return str(import_version) if import_version > 1 else None
 
 
-def _members(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _members(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     settings = CountSettings(
         family=build.family_names[folder], records=build.batch_records(wildcards)
     )
-    return "members", settings.as_json()
+    return "members", settings
 
 
-def _corpus(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
+def _corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     options = build.families[build.family_names[folder]].corpus
     members = [member.name for batch in build.batches[folder].values() for member in batch]
     settings = CorpusSettings(**dict(options), family=folder, members=sorted(members))
-    return "corpus", settings.as_json()
+    return "corpus", settings
 
 
-_OTHERS: Mapping[str, Callable[[Build, Wildcards], tuple[str, Content]]] = {
+_OTHERS: Mapping[str, Callable[[Build, Wildcards], tuple[str, Settings | Content]]] = {
     "export": _export,
     "export_sequence": _export_sequence,
     "instant_ngp": _instant_ngp,

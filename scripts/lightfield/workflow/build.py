@@ -8,7 +8,7 @@ A job has the wildcards of its output's path: ``scene`` and ``rig`` name the fol
 import difflib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -142,11 +142,8 @@ class Build:
 
     def training_transforms(self, wildcards: Wildcards) -> list[str]:
         """Return the transforms.json of the training views that a dataset tests, if any."""
-        dataset = self.dataset(wildcards)
-        if dataset.trained_by is None:
-            return []
-        paths = replace(dataset.paths, rig=dataset.trained_by)
-        return [paths.transforms(wildcards["source"])]
+        path = self.dataset(wildcards).training_transforms(wildcards["source"])
+        return [path] if path else []
 
     def rig(self, wildcards: Wildcards) -> list[Dataset]:
         """Return the dataset of a rig, or those of all frames of a sequence."""
