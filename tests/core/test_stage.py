@@ -4,6 +4,7 @@ import ast
 import importlib
 import inspect
 import json
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -113,6 +114,12 @@ def test_a_stage_names_a_function_that_takes_it(stage):
         getattr(importlib.import_module(module), name), eval_str=True
     ).parameters.values()
     assert parameter.annotation is stage
+
+
+def test_each_version_of_a_stage_is_in_a_key():
+    library = "\n".join(file.read_text() for file in SCRIPTS.glob("lightfield/**/*.py"))
+    with_version = {stage.__name__ for stage in STAGES if hasattr(stage, "version")}
+    assert with_version == set(re.findall(r"\b([A-Z]\w+)\.version\b", library))
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)

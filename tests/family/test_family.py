@@ -292,7 +292,7 @@ def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(
     before = batch_settings()
     assert all(before.values())
     text = folder / "scripts/lightfield/configuration/keys.py"
-    text.write_text(text.read_text().replace("SOFTBOXES_VERSION = ", "SOFTBOXES_VERSION = 1000"))
+    text.write_text(text.read_text().replace('"softboxes": ', '"softboxes": 1000'))
     after = batch_settings()
     assert [name for name in scenes if before[name] != after[name]] == ["boxes", "drawn"]
 

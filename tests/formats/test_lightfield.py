@@ -312,7 +312,7 @@ def test_the_key_of_a_flow_changes_with_lens_poses_and_views(
             first.changed(lens=WIDE, depth="distance"), first_view, second_view, ["a", "b"]
         ),
     ]
-    monkeypatch.setattr(keys, "FLOW_VERSION", 2)
+    monkeypatch.setitem(keys.VERSIONS, "flow", 2)
     flow_keys.append(keys.flow_key(first, first_view, second_view, ["a", "b"]))
     assert len(set(flow_keys)) == len(flow_keys)
 

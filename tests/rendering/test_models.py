@@ -101,7 +101,7 @@ def test_another_light_of_the_softboxes_leaves_models_in_environments_alone(monk
         return [keys.model_fingerprint({"light": light}, []) for light in ("softboxes", "city")]
 
     before = identities()
-    monkeypatch.setattr(keys, "SOFTBOXES_VERSION", keys.SOFTBOXES_VERSION + 1)
+    monkeypatch.setitem(keys.VERSIONS, "softboxes", keys.VERSIONS["softboxes"] + 1)
     softboxes, city = identities()
     assert softboxes != before[0]
     assert city == before[1]

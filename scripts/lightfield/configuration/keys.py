@@ -24,28 +24,32 @@ from lightfield.core.paths import files_below
 from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, LightField, View
 
-# Raise these when rendering, or the computation of flow, writes other files for equal settings.
-_RENDER_VERSION = 4
-FLOW_VERSION = 1
-# The same for the passes of surfaces. Only their views have it in their keys.
-_SURFACES_VERSION = 2
-# The same for denoised views of which only a part is rendered.
-_PART_VERSION = 1
-# The same for the views of a user's .blend.
-_BLEND_VERSION = 1
-# The same for those of them with a pass of numbers.
-_NUMBERS_VERSION = 1
-# The same for mattes of a user's .blend.
-_MATTES_VERSION = 1
-# The same for transparent views of a scene that may have shadow catchers.
-_CATCHERS_VERSION = 1
-# Raise this when the import of a model makes another scene of it.
-_MODEL_VERSION = 2
-# The same for models in softboxes.
-SOFTBOXES_VERSION = 1
-# Raise this when the import refuses other models. They are imported again, but scenes that stay the
-# same keep their views.
-_IMPORT_VERSION = 1
+# The versions of what makes views. Each is in the keys of the views that it concerns, and of no
+# others. Raise it when equal settings give other files.
+VERSIONS = {
+    # All rendered views.
+    "render": 4,
+    # Views with passes of surfaces.
+    "surfaces": 2,
+    # Denoised views of which only a part is rendered.
+    "part": 1,
+    # Views of a user's .blend.
+    "blend": 1,
+    # Those of them with a pass of numbers.
+    "numbers": 1,
+    # Those of them with mattes.
+    "mattes": 1,
+    # Transparent views of a scene that may have shadow catchers.
+    "catchers": 1,
+    # Optical flow.
+    "flow": 1,
+    # Views of models, if the import makes another scene of them.
+    "model": 2,
+    # Views of models in softboxes, for the same reason.
+    "softboxes": 1,
+    # The import of models, if it refuses others. Views keep their keys.
+    "import": 1,
+}
 
 
 # Cached, because a look-up in a package's files takes a millisecond.
@@ -93,12 +97,12 @@ def _builder_folders(builder: str) -> list[str]:
 
 def _model_version(light: str) -> int:
     """Return the version of the import of models in a ``light``."""
-    return _MODEL_VERSION + (SOFTBOXES_VERSION if light == SOFTBOXES else 0)
+    return VERSIONS["model"] + (VERSIONS["softboxes"] if light == SOFTBOXES else 0)
 
 
 def import_version(light: str) -> int:
     """Return what changes whenever models in a ``light`` must be imported again."""
-    return _model_version(light) + _IMPORT_VERSION
+    return _model_version(light) + VERSIONS["import"]
 
 
 def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str | None]]) -> str:
@@ -114,19 +118,19 @@ def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.world_from_camera.tolist()
     content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
-    key = [_RENDER_VERSION, version("bpy"), content, view.name, pose]
+    key = [VERSIONS["render"], version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
-        key.append(_SURFACES_VERSION)
+        key.append(VERSIONS["surfaces"])
     if renders_part(lightfield) and lightfield.render.denoise:
-        key.append(["part", _PART_VERSION])
+        key.append(["part", VERSIONS["part"]])
     if _is_of_blend(lightfield):
-        key.append(["blend", _BLEND_VERSION])
+        key.append(["blend", VERSIONS["blend"]])
         if any(view_pass.kind == "id" for view_pass in lightfield.passes):
-            key.append(["numbers", _NUMBERS_VERSION])
+            key.append(["numbers", VERSIONS["numbers"]])
         if any(view_pass.kind == "matte" for view_pass in lightfield.passes):
-            key.append(["mattes", _MATTES_VERSION])
+            key.append(["mattes", VERSIONS["mattes"]])
     if lightfield.transparent and _may_have_shadow_catchers(lightfield):
-        key.append(["catchers", _CATCHERS_VERSION])
+        key.append(["catchers", VERSIONS["catchers"]])
     return _digest(key)
 
 
@@ -156,13 +160,13 @@ def renders_part(lightfield: LightField) -> bool:
 
 def names_key(lightfield: LightField) -> str:
     """Return the key of the numbers of a light field's objects and materials."""
-    return _digest([_RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
+    return _digest([VERSIONS["render"], version("bpy"), lightfield.content.get("scene")])
 
 
 def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:
     """Return the key of the flow between two views, whose SHA-256 checksums are ``sums``."""
     poses = [view.world_from_camera.tolist(), other.world_from_camera.tolist()]
-    return _digest([FLOW_VERSION, lightfield.lens.to_lightfield(), poses, list(sums)])
+    return _digest([VERSIONS["flow"], lightfield.lens.to_lightfield(), poses, list(sums)])
 
 
 def view_seed(seed: int, name: str) -> int:

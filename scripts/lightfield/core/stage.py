@@ -55,8 +55,8 @@ class Stage(BaseModel, Generic[StageSettings]):
     # Does the work: "module:function". It takes the stage. Imported only then, because a program's
     # --help need not wait for it.
     function: ClassVar[str]
-    # A higher number makes everybody's results again.
-    version: ClassVar[int] = 1
+    # Part of the keys of what the stage writes. A higher number makes everybody's results again.
+    version: ClassVar[int]
     # The model whose fields are flags in place of a settings file.
     by_hand: ClassVar[type[Settings] | type[ByHand] | None] = None
 

@@ -30,8 +30,6 @@ from lightfield.stages.lenses import Reproject
 from lightfield.workflow import shard_files
 from lightfield.workflow.records import ShardRecord
 
-# The version of the files, which every key has. Raise it if equal settings give other files.
-VERSION = 4
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
@@ -172,7 +170,7 @@ class Job:
         ``identity`` stands for the source's content.
         """
         content = {
-            "version": VERSION,
+            "version": Reproject.version,
             "map": self.geometry.map_settings(target),
             **self.settings.development,
             "depth_png": self.settings.depth_png,

@@ -27,6 +27,7 @@ class Reproject(Source, Stage[Reprojection]):
 
     name = "reproject"
     function = "lightfield.reprojection.pipeline:run"
+    version = 4
     by_hand = ReprojectFlags
 
     input_dir: Path | None = reads(
