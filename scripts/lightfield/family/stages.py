@@ -25,7 +25,7 @@ from lightfield.stages.lenses import Reproject
 from lightfield.stages.publishing import PublishChecksums
 from lightfield.stages.rig import CheckCameras, FreePlaces, MakeLightfield
 from lightfield.stages.scene import BuildScene, ImportModel, ImportSettings, Inventory
-from lightfield.stages.views import Device, RenderShard, Splits
+from lightfield.stages.views import Device, ListSplits, RenderShard
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 
 # The names of stages in a member's log and record. Other stages have the names of their programs.
@@ -96,7 +96,7 @@ def jobs_of(
     for dataset in datasets:
         yield from _view_jobs(dataset, device, threads)
     if with_split := [dataset for dataset in datasets if dataset.splits]:
-        yield Splits(
+        yield ListSplits(
             lightfields=[Path(dataset.paths.lightfield) for dataset in with_split],
             output=Path(with_split[0].paths.splits),
         )
