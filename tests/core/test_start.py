@@ -33,9 +33,12 @@ HEAVY = {
 OF_LENSES_AND_SCENES = {"numpy", "yaml"}
 # The settings of these programs have no lenses, rigs or scenes.
 LIGHT = [
+    "build_members",
     "calibrate",
     "check_device",
+    "corpus",
     "costs",
+    "count_members",
     "error_vs_time",
     "evaluate",
     "evaluate_surface",

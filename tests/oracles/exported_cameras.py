@@ -15,13 +15,12 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
+from lightfield.core.names import PARTS, SPLITS
 from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import ImageSet
 from lightfield.formats.lightfield import NAME, LightField, View
-from lightfield.formats.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.files import lists_of
 from oracles import exported_boxes, unit_cube
 from oracles.readers import read

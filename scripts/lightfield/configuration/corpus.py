@@ -5,8 +5,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from lightfield.core.names import Part
 from lightfield.core.settings import Settings
-from lightfield.geometry.rigs.split_setting import Part
 
 CORPUS = "corpus.json"
 PAGE = "index.html"

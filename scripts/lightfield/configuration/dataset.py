@@ -14,11 +14,11 @@ from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
+from lightfield.core.names import PARTS
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
-from lightfield.geometry.rigs.split_setting import PARTS
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.core.names import MESH, VIEWS
+from lightfield.core.names import MESH, SPLITS, VIEWS
 from lightfield.formats.export_lists import MANIFEST
-from lightfield.formats.splits_file import SPLITS
 
 # The pictures of a report.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 
 from pydantic import Field, model_validator
 
-from lightfield.core.names import VIEWS
+from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -19,7 +19,6 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
-from lightfield.geometry.rigs.split_setting import PARTS
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""

@@ -21,9 +21,8 @@ from pydantic import Field, model_validator
 from lightfield.configuration.corpus import CorpusOptions, evenly_spread
 from lightfield.core.errors import UserError
 from lightfield.core.files import is_outdated, size_and_time
-from lightfield.core.names import MODELS
+from lightfield.core.names import MODELS, SPLITS
 from lightfield.core.settings import Settings, as_list, pattern
-from lightfield.formats.splits_file import SPLITS
 
 # Planning more members would take minutes.
 _MOST_MEMBERS = 100_000

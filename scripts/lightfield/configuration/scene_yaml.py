@@ -30,7 +30,7 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.configuration.scene_source import FILE, SceneSource
 from lightfield.core.errors import UserError
-from lightfield.core.names import MESH, ROOT, VIEWS
+from lightfield.core.names import MESH, PARTS, ROOT, VIEWS
 from lightfield.core.setting_types import Auto, unique_names
 from lightfield.core.settings import Name, Settings, checked, suggestion
 from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
@@ -40,7 +40,7 @@ from lightfield.formats.sensors import Sensor
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
-from lightfield.geometry.rigs.split_setting import PARTS, Chosen
+from lightfield.geometry.rigs.split_setting import Chosen
 
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.

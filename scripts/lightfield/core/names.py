@@ -1,12 +1,18 @@
-"""Names that programs offer in their --help. The models of settings would load slowly for that."""
+"""Names that quick programs and their --help need. The modules of their subjects load slowly."""
 
 from pathlib import Path
+from typing import Literal, get_args
 
 # The name of the rendered views among a dataset's reprojections.
 VIEWS = "views"
 
 # The folder of a dataset with the surface that its cameras can see.
 MESH = "mesh"
+
+# The file that lists which of a scene's views are in which part of the split.
+SPLITS = "splits.json"
+Part = Literal["train", "validation", "test"]
+PARTS: tuple[Part, ...] = get_args(Part)
 
 # What the programs' flags --inventory are for.
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"

@@ -25,6 +25,7 @@ from lightfield.configuration.exports import (
 )
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
+from lightfield.core.names import PARTS
 from lightfield.core.progress import Progress
 from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
 from lightfield.formats.export_lists import MASK
@@ -33,7 +34,6 @@ from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.stages.exports import ExportInstantNgp

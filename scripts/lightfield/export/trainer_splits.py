@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from lightfield.core.errors import UserError
+from lightfield.core.names import PARTS
 from lightfield.formats.lightfield import LightField, View
-from lightfield.geometry.rigs.split_setting import PARTS
 
 # Most trainers' own examples test with every eighth view. Used for rigs without a split.
 EVERY = 8

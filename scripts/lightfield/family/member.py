@@ -19,10 +19,11 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import DAMAGE, listed, read_json, sha256, size_and_time, write_json
+from lightfield.core.names import SPLITS
 from lightfield.family.stages import Run, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.formats.lightfield import LightField
-from lightfield.formats.splits_file import SPLITS, splits_content
+from lightfield.formats.splits_file import splits_content
 from lightfield.rendering import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device

@@ -5,10 +5,8 @@ It names a view by rig and view, without ``exr/`` and suffix: LFSphere/view_0000
 
 from collections.abc import Mapping
 
+from lightfield.core.names import PARTS
 from lightfield.formats.lightfield import LightField
-from lightfield.geometry.rigs.split_setting import PARTS
-
-SPLITS = "splits.json"
 
 
 def splits_content(lightfields: Mapping[str, LightField]) -> dict[str, list[str]]:

@@ -11,8 +11,8 @@ from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
+from lightfield.core.names import PARTS
 from lightfield.formats.layout import SUMS
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import corpus_looks, corpus_page, corpus_shards, corpus_store
 from lightfield.report.corpus_looks import Look
 from lightfield.stages.family import Corpus, CorpusSettings

@@ -14,8 +14,8 @@ from markupsafe import Markup
 
 from lightfield.configuration.corpus import PAGE
 from lightfield.core import units
+from lightfield.core.names import PARTS
 from lightfield.formats.layout import REPORT
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report import page
 
 # The size of a histogram in units of its SVG.

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from lightfield.configuration.corpus import SHARDS
 from lightfield.core.errors import UserError
+from lightfield.core.names import PARTS, Part
 from lightfield.core.progress import Progress
-from lightfield.geometry.rigs.split_setting import PARTS, Part
 from lightfield.report import shards
 from lightfield.stages.family import CorpusSettings
 from lightfield.workflow.member_record import MemberRecord

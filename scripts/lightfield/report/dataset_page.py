@@ -9,6 +9,7 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.files import absolute_path
+from lightfield.core.names import SPLITS
 from lightfield.export import transforms
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
@@ -16,7 +17,6 @@ from lightfield.formats.layout import IMAGES, REPORT, SUMS
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.formats.sensors import settings_in
-from lightfield.formats.splits_file import SPLITS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view

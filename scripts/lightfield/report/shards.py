@@ -16,7 +16,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_csv
-from lightfield.core.names import VIEWS
+from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
 from lightfield.formats.layout import (
     SUMS,
@@ -29,7 +29,6 @@ from lightfield.formats.layout import (
     view_files,
 )
 from lightfield.formats.lightfield import NAME
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.report.package import add_entry, tar_size
 
 # A shard's size without a size in the settings. WebDataset advises about this.

@@ -15,6 +15,7 @@ import numpy as np
 from lightfield.configuration.dataset_paths import REPORT_FILES
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json, set_aside, sha256
+from lightfield.core.names import PARTS
 from lightfield.core.paths import (
     files_below,
     kept_behind_link,
@@ -48,7 +49,6 @@ from lightfield.formats.sensors import (
 )
 from lightfield.geometry import rotations
 from lightfield.geometry.exposure import pose_between
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.result import Check
 
 

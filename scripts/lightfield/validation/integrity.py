@@ -25,11 +25,11 @@ from lightfield.core.files import (
     set_aside,
     sha256,
 )
+from lightfield.core.names import SPLITS
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
 from lightfield.formats.lightfield import NAME, LightField
-from lightfield.formats.splits_file import SPLITS
 from lightfield.workflow import ledger, shard_files
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, read_json
+from lightfield.core.names import PARTS
 from lightfield.core.paths import inside, place_in
 from lightfield.formats.layout import ImageSet, rendered, source_view
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.splits_file import splits_content
-from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.result import Check
 
 # Two poses are the same if they agree to this many decimals, in metres and in the rotation matrix.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_json, reading
-from lightfield.geometry.rigs.split_setting import PARTS
+from lightfield.core.names import PARTS
 from oracles.readers.cameras import Camera, Panorama, Pinhole, PolynomialFisheye
 from oracles.readers.contents import (
     DepthMap,

@@ -14,11 +14,12 @@ from pydantic import ConfigDict, Field, model_validator
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
+from lightfield.core.names import Part
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import CameraSettings, build_settings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
-from lightfield.geometry.rigs.split_setting import Chosen, Part, Split, part_of
+from lightfield.geometry.rigs.split_setting import Chosen, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
     euler_to_matrix,

@@ -1,13 +1,11 @@
 """The setting `split` of a rig: which of its views train, validate and test."""
 
-from typing import Literal, Self, get_args
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from lightfield.core.names import Part
 from lightfield.core.settings import Settings
-
-Part = Literal["train", "validation", "test"]
-PARTS: tuple[Part, ...] = get_args(Part)
 
 
 class Chosen(Settings):
