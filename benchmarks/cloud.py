@@ -297,10 +297,9 @@ def main() -> None:
     print(f"{len(renders)} views, {repeated} of them rendered twice, in {jobs} jobs")
     if repeated or not same or len(renders) != arguments.views:
         sys.exit(
-            "error: the bytes differ from those of a build on one disk, or a view was lost or "
-            "rendered twice"
+            "error: the bytes differ from a build on one disk, or a view was lost or rendered twice"
         )
-    print("all published bytes equal those of a build on one disk")
+    print("all published bytes equal the bytes of a build on one disk")
 
 
 if __name__ == "__main__":

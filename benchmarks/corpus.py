@@ -1,7 +1,8 @@
 """Build a family of 200 models, broken ones among them, kill the build, and check what comes out.
 
-The models are those of benchmarks/models.py. The build is killed some times, each time after a part
-of the members, and then finishes. It prints a table, and the CPU seconds of each stage a member.
+The models come from benchmarks/models.py. The program kills the build some times, each time after a
+part of the members, and then lets it finish. It prints a table, and the CPU seconds of each stage a
+member.
 
 The program fails if a model that can be rendered has failed, or if a broken one has not. It fails
 if a kill lost more than the members at hand, or if a byte is not as the sums over the corpus say.
@@ -26,8 +27,8 @@ from lightfield.core.files import read_json
 from lightfield.core.progress import Progress
 from lightfield.validation.corpus_integrity import corpus_faults
 
-# Angle of view, distance and elevation are those of allenai/objaverse-rendering, and so are
-# bounces, adaptive sampling and the denoiser.
+# Angle of view, distance and elevation are as in allenai/objaverse-rendering, and so are bounces,
+# adaptive sampling and the denoiser.
 SCENE = """
 scene: {{unit: box}}
 render:

@@ -52,7 +52,7 @@ COARSE = 10.0**-limits.DIGITS
 
 @dataclass(frozen=True)
 class Render:
-    """What a case's view shows: colour (h, w, 3), depth (h, w); rays (h, w, 3) in world space."""
+    """A case's view: colour (h, w, 3), depth (h, w), and rays (h, w, 3) in world space."""
 
     colour: Array
     depth: Array
@@ -219,7 +219,7 @@ def moving(obj: Any, axis: int, places: Mapping[int, float]) -> None:
 
 
 def largest(values: Array, truth: Array | float) -> float:
-    """Return the largest relative error; that of equal values is 0, that of a NaN is inf."""
+    """Return the largest relative error. Equal values have an error of 0, and NaN has inf."""
     values, truth = np.broadcast_arrays(np.asarray(values, np.float64), np.asarray(truth))
     with np.errstate(invalid="ignore", divide="ignore"):
         error = np.abs(values / truth - 1)

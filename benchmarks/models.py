@@ -34,7 +34,7 @@ from scenes.library.shapes import Shape, box, icosphere, join, lettering, prism,
 
 Random = np.random.Generator
 Part = tuple[Shape, str]
-# Of 20 sound models, in turn. Collections of the web are mostly GLB.
+# The formats of 20 sound models, in turn. Collections on the web are mostly GLB.
 FORMATS = (*("glb",) * 8, "gltf", "gltf", "usdc", "usdc", "usda", "usdz", "obj", "obj")
 FORMATS += ("ply", "ply", "stl", "stl")
 # Triangles of the huge model: 20 · 4ⁿ.
@@ -235,7 +235,7 @@ def build(number: int, textures: Path) -> str:
     scene = Scene(number, 1.0)
     parts = kind(scene, random)
     materials = [material for _, material in parts]
-    # Of several objects, the exporter of USD writes either first.
+    # The exporter of USD writes several objects in either order.
     shape = join(shape.painted(slot) for slot, (shape, _) in enumerate(parts))
     data = scene.add(kind.__name__, shape, *materials, smooth=math.radians(35)).data
     add_uv(data)

@@ -27,7 +27,7 @@ class Views:
     """Views through one lens.
 
     - ``rays`` (h, w, 3): of unit length, in the camera's own axes.
-    - ``kind``: that of the depth, "Z" or "distance".
+    - ``kind``: the kind of depth, "Z" or "distance".
     - ``poses`` (n, 4, 4): camera-to-world.
     - ``colour`` (n, h, w, 3): sRGB from 0 to 1.
     - ``depth`` (n, h, w): metres as the files have it, inf for none.

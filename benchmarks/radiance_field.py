@@ -1,9 +1,9 @@
 """A small radiance field in torch: a hash grid, a network for density and one for colour.
 
-Rays are integrated as in NeRF (Mildenhall et al. 2020, equation 3). The hash grid is that of
-Müller et al. 2022. The contraction of space is that of mip-NeRF 360 (Barron et al. 2022,
-equation 10). The field also learns depth: a training ray has dense samples around its surface. The
-loss adds the negative logarithm of the part of the light that comes from there.
+Rays are integrated as in NeRF (Mildenhall et al. 2020, equation 3). The hash grid follows Müller et
+al. 2022. The contraction of space follows mip-NeRF 360 (Barron et al. 2022, equation 10). The field
+also learns depth: a training ray has dense samples around its surface. The loss adds the negative
+logarithm of the part of the light that comes from there.
 """
 
 import torch

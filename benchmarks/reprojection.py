@@ -8,8 +8,8 @@ unity, magnified by 3. CPU time a view is reading, resampling and writing, EXR t
 Batches (--batch N): N views of 2048 x 2048 pixels with half R G B and Z are the input. The jobs are
 EXR with depth at the same size, and PNG at an eighth. The programs are scripts/reproject.py with
 its default filter and with st_warp, a bare read and write of the same files, and --peer. All CPU
-time counts, that of the start and of the lens map too, divided by the views. We compress at zlib's
-level 4. SILVR's tool has level 9 in its source: most of its time goes into 3 % fewer bytes.
+time counts, also for the start and the lens map, divided by the views. We compress at zlib's level
+4. SILVR's tool has level 9 in its source: most of its time goes into 3 % fewer bytes.
 
 --peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
 reprojection.csv, reprojection_batches.csv, reprojection.svg and reprojection.png into the output

@@ -181,7 +181,7 @@ def chosen_settings() -> configuration.Configuration:
 def row(label: str, *arguments: str) -> float:
     """Run Snakemake in the current folder, print a row of what it took, and return its seconds.
 
-    Memory is Snakemake's own peak, without that of its jobs.
+    Memory is Snakemake's own peak, without its jobs.
     """
     snakefile = str(ROOT / "Snakefile")
     command = ["snakemake", "--cores", "1", "--quiet", "all", "--snakefile", snakefile]

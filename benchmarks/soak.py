@@ -4,8 +4,8 @@ Builds a small dataset of the test room twice, each time in a folder of its own.
 the first build. The second one may write no large files at first. Then it is killed at random
 moments, and finishes at last. After that the program spoils its files in every way.
 `snakemake verify --mend` must find them and set them aside, and the next build makes them again. In
-the end all published bytes must be those of the undisturbed build. Prints a table. Fails if a fault
-was not found or not mended, or if anything was lost or made twice.
+the end all published bytes must equal the undisturbed build's. Prints a table. Fails if a fault was
+not found or not mended, or if anything was lost or made twice.
 """
 
 import argparse
@@ -231,7 +231,7 @@ def lost_bytes(before: dict[Path, tuple[str, int]]) -> int:
 
 @dataclass
 class Row:
-    """A row of the table: a kind of fault, and what became of it."""
+    """A row of the table: a kind of fault, and how many were found and mended."""
 
     fault: str
     injected: int = 0
@@ -367,7 +367,7 @@ def main() -> None:
     minutes = (time.monotonic() - began) / 60
     print(
         f"\n{arguments.views} views, seed {arguments.seed}, {minutes:.0f} minutes; all published "
-        f"bytes are {'' if same else 'NOT '}those of the undisturbed build."
+        f"bytes {'equal' if same else 'DIFFER FROM'} the undisturbed build's."
     )
     if not (same and all(row.passes() for row in rows)):
         sys.exit("error: something was not found, not mended, lost, or made twice")

@@ -371,7 +371,7 @@ class Worst:
 
 
 class Point:
-    """Exact answers for one point of a lens pair; those of both dtypes are compared with them."""
+    """Exact answers for one point of a lens pair, for comparison with both dtypes' answers."""
 
     def __init__(self, source: Lens, target: Lens, pixel: Vector) -> None:
         self.source = source

@@ -14,7 +14,7 @@ first measurement counts as busy throughout.
                   "overhead_seconds",       the rest of wall_seconds
                   "views_rendered",         renderings, repeated ones counted
                   "runs",                   processes that worked on it
-                  "killed_runs",            those of them that did not end by themselves
+                  "killed_runs",            runs among them that did not end by themselves
                   "repeated_seconds"}],     spent again: views rendered again, later start-ups
       "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
       "device", "cores", "watts", "energy_kwh", "attribution",
@@ -32,7 +32,7 @@ samples (see `lightfield.planning.cost`). The uncertainty is the standard error 
 over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
 a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
 views and pixels. Everything else stays as it was. The first view of each process prepares the scene
-for Cycles, so it counts for neither. Gigabytes are those of the rendered views, in proportion to
+for Cycles, so it counts for neither. Gigabytes are the size of the rendered views, in proportion to
 their pixels. They are an upper estimate, because larger views compress better. "device" and
 "extrapolation" are null if no journal has a rendered view. That happens if the working folder was
 deleted and the views were kept.

@@ -1,6 +1,6 @@
 """Tabulate the views, hours and gigabytes of the chosen datasets on this machine.
 
-Reads what scripts/probe.py measured. Hours are those of one processor core, or of the GPU if it
+Reads what scripts/probe.py measured. Hours count for one processor core, or for the GPU if it
 renders. Gigabytes are the size of the rendered views.
 """
 

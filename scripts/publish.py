@@ -3,7 +3,7 @@
 The descriptions are a card for Hugging Face, and Croissant. The scene YAML's key
 `publish` says what only the author knows. The same files give the same bytes.
 
-A settings file is JSON with the same keys as that of package.py.
+A settings file is JSON with the same keys as package.py's settings file.
 """
 
 from lightfield.core.flags import program

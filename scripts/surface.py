@@ -1,7 +1,7 @@
 """Write the surface that cameras can see as meshes, and the boxes and poses of its objects.
 
 A settings file is JSON: {"formats": ["glb", "ply"], "frame": 1}. `frame`, `scene_name` and
-`view_layers` are those of the scene YAML's `scene`. The output folder gets scene.glb, scene.ply and
+`view_layers` are as in the scene YAML's `scene`. The output folder gets scene.glb, scene.ply and
 objects.json, and export.json, which lists them. Earlier meshes in the folder are replaced.
 """
 

@@ -1,8 +1,8 @@
 """Synthesise views from anywhere in a dataset, from its nearest views and their depth.
 
 OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as in a dataset) and png/<view>.png.
-A surface that no view of the dataset sees is a hole. Its colour is that of its surroundings and of
-what is behind it. In the EXR its alpha is 0, and its Z is NaN.
+A surface that no view of the dataset sees is a hole. It gets the colour of its surroundings and of
+the surface behind it. In the EXR its alpha is 0, and its Z is NaN.
 
 Examples:
 

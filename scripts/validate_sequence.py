@@ -4,8 +4,8 @@ Prints a line for each failure. The exit status is then 1. For a valid sequence,
 validation.json, and --sums the checksums of the exports. The frames are datasets of their own,
 which validate.py checks.
 
-A settings file is JSON: {"frames": ["f00001", "f00002"], "exports": []}. Its paths are those of the
-working folder.
+A settings file is JSON: {"frames": ["f00001", "f00002"], "exports": []}. Its paths are relative to
+the working folder.
 """
 
 from lightfield.core.flags import program

@@ -82,8 +82,8 @@ SCENE = {
         ("rigs.around.split", {"test": ["view_0012f"]}, "there is no view 'view_0012f'"),
         ("rigs.around.split", "test", "rigs.around.split: is test, but no rig trains"),
         ("rigs.along.split", "odd", "rigs.around.split: is train, but no rig tests"),
-        ("rigs.along.camera.fov", 60, "rigs.along.camera: must be that of around, which trains"),
-        ("rigs.along.frames", {"first": 1, "last": 2}, "rigs.along.frames: must be that of around"),
+        ("rigs.along.camera.fov", 60, "rigs.along.camera: must be as in around, which trains"),
+        ("rigs.along.frames", {"first": 1, "last": 2}, "rigs.along.frames: must be as in around"),
         ("reprojections.small.rigs", ["around"], "reprojections.small.rigs: lacks along; must"),
     ],
 )

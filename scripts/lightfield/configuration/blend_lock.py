@@ -1,4 +1,4 @@
-"""The SHA-256 that a .blend must have: that of its download, or the one in its lock file."""
+"""The SHA-256 that a .blend must have. The scene YAML or a lock file records it."""
 
 from pathlib import Path
 

@@ -21,7 +21,8 @@ from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
-# The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
+# The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are not
+# among them.
 _SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
 # The same for a model.
 _MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
@@ -95,7 +96,7 @@ class Capture:
 
     @property
     def frame(self) -> float:
-        """The rendered frame. That of a .blend is known once the capture is `resolved`."""
+        """The rendered frame. The frame of a .blend is known once the capture is `resolved`."""
         assert not isinstance(self.source.frame, str)
         return self.source.frame
 
@@ -129,7 +130,7 @@ class Capture:
 
     @property
     def origin(self) -> dict[str, Any]:
-        """The keys of lightfield.json that say what is rendered, and how."""
+        """The keys of lightfield.json that describe the scene and its rendering."""
         origin: dict[str, Any] = {"depth": self.depth}
         if self.rig.stereo and self.rig.is_omnidirectional:
             origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
@@ -139,7 +140,7 @@ class Capture:
             **self.source.model_dump(
                 include=_MODEL_SOURCE_KEYS if self.source.model else _SOURCE_KEYS,
                 exclude_none=True,
-                # A .blend's own frame may have a fraction, which a scene YAML's has not.
+                # The frame in a .blend may have a fraction. The frame in a scene YAML has none.
                 warnings=False,
             ),
             "fingerprint": self.fingerprint,

@@ -99,7 +99,7 @@ class Energy(Settings):
 
     @property
     def core_count(self) -> int:
-        """The number of cores. auto means those of this machine."""
+        """The number of cores. auto means all cores of this machine."""
         return os.cpu_count() or 1 if self.cores == "auto" else self.cores
 
 
@@ -214,7 +214,8 @@ def load_config(content: Any) -> Configuration:
 
 def read_config(path: Path) -> dict[str, Any]:
     """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
-    # Only now, because stages have settings of this module, and their --help needs no YAML.
+    # Import it only here: stages import this module for its settings, and their --help needs no
+    # YAML.
     from lightfield.core.yaml_files import read_yaml
 
     content = read_yaml(path, path.name)

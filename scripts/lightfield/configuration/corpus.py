@@ -12,7 +12,7 @@ CORPUS = "corpus.json"
 PAGE = "index.html"
 # The files of a corpus that every family has.
 CORPUS_FILES = (CORPUS, PAGE, "sha256sums.txt")
-# The folders of a corpus beside those of its members. No member may have such a name.
+# A corpus has these folders beside its members' folders. No member may have such a name.
 THUMBNAILS = "thumbnails"
 SHARDS = "shards"
 

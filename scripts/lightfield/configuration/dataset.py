@@ -1,4 +1,4 @@
-"""A dataset: what is rendered, what the views become, and the files of both."""
+"""A dataset: its scene and cameras, what is made of the views, and the paths of all files."""
 
 import math
 from collections.abc import Callable
@@ -50,9 +50,9 @@ class Dataset(Capture):
     limits: Preset
     # Returns the number of shards, which depends on costs and on earlier runs.
     shard_count: Callable[["Dataset"], int]
-    # The folders of the rigs that test what is trained on this rig.
+    # The folders of the rigs whose views test models that were trained on this rig's views.
     tested_by: tuple[str, ...] = ()
-    # The folder of the rig that trains what this rig tests.
+    # The folder of the rig whose views train the models that this rig's views test.
     trained_by: str | None = None
     results_root: str = "results"
     work_root: str = "work"
@@ -126,7 +126,7 @@ class Dataset(Capture):
 
     @property
     def inventory(self) -> str | None:
-        """The list of what the scene contains. An import has none."""
+        """The inventory: it lists what the scene contains. An import has none."""
         return None if self.imported else self.paths.inventory
 
     @property
@@ -151,7 +151,7 @@ class Dataset(Capture):
 
     @property
     def cameras(self) -> str | None:
-        """The list of what surrounds each camera. An import has none."""
+        """The report on the cameras: the space around each of them. An import has none."""
         return None if self.imported else self.paths.cameras
 
     @property
@@ -179,7 +179,7 @@ class Dataset(Capture):
             return None
         return replace(self.paths, rig=self.trained_by).transforms(prefix)
 
-    # Files of which there are several.
+    # Files that a dataset has several of.
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
@@ -271,7 +271,7 @@ class Dataset(Capture):
 
     @property
     def published(self) -> list[str]:
-        """The files that have a job each: all but views and reports."""
+        """The files that one job each makes: all files except views and reports."""
         return [*self.lightfields, *self.exported, *_present(self.mesh_list)]
 
     @property

@@ -23,10 +23,10 @@ def prefix_of(source: str) -> str:
 class Paths:
     """The paths of a dataset's files, as Snakemake compares them.
 
-    ``scene`` is the folder of a scene under its preset, and ``rig`` that of a rig. In a sequence
-    the frame's folder follows, as in LFSphere/f00001. ``name`` is the folder in ``work_root`` of
-    what all presets share. The rules leave these names out, and get wildcards in their place. A
-    dataset may lack some of these files: see `Dataset`.
+    ``scene`` is the folder of a scene under its preset. ``rig`` is the folder of a rig. In a
+    sequence the frame's folder follows, as in LFSphere/f00001. ``name`` is the folder in
+    ``work_root`` with the files that all presets share. The rules leave these names out, and get
+    wildcards in their place. A dataset may lack some of these files: see `Dataset`.
     """
 
     results_root: str
@@ -35,7 +35,7 @@ class Paths:
     rig: str = "{rig}"
     name: str = "{name}"
 
-    # Of a scene, under all presets.
+    # Files of a scene that all presets share.
 
     @property
     def scene_work(self) -> str:
@@ -61,7 +61,7 @@ class Paths:
 
     @property
     def inventory(self) -> str:
-        """The list of what the scene contains."""
+        """The inventory: it lists what the scene contains."""
         return f"{self.scene_work}/inventory.json"
 
     @property
@@ -69,7 +69,7 @@ class Paths:
         """The folder of trial renders."""
         return f"{self.scene_work}/trials"
 
-    # Of a scene under its preset.
+    # Files of a scene under one preset.
 
     @property
     def scene_results(self) -> str:
@@ -94,7 +94,7 @@ class Paths:
         """The list of the views that train, validate and test."""
         return f"{self.scene_results}/{SPLITS}"
 
-    # Of a rig.
+    # Files of a rig.
 
     @property
     def folder(self) -> str:
@@ -124,7 +124,7 @@ class Paths:
 
     @property
     def cameras(self) -> str:
-        """The list of what surrounds each camera."""
+        """The report on the cameras: the space around each of them."""
         return f"{self.work}/cameras.json"
 
     @property
@@ -143,14 +143,14 @@ class Paths:
         """The file in which the mesh's job lists its files."""
         return f"{self.folder}/{MESH}/{MANIFEST}"
 
-    # Of a reprojection. A source is a reprojection, or the views: see `prefix_of`.
+    # Files of a reprojection. A source is a reprojection, or the views: see `prefix_of`.
 
     def reprojected(self, name: str = "{reprojection}") -> str:
         """Return the folder of a reprojection."""
         return f"{self.folder}/{name}"
 
     def lens_map(self, name: str = "{reprojection}", face: str = "") -> str:
-        """Return the lens map of a reprojection, or that of a cube map's face."""
+        """Return the lens map of a reprojection, or of one face of a cube map."""
         ending = f"_{face}" if face else ""
         return f"{self.work}/{name}/lens_map{ending}.npy"
 
@@ -166,7 +166,7 @@ class Paths:
         """Return the file in which the job of an export of a source lists its files."""
         return f"{self.folder}/{prefix}exports/{name}/{MANIFEST}"
 
-    # Of the checks and the report.
+    # Files of the checks and the report.
 
     @property
     def validation(self) -> str:
@@ -209,7 +209,7 @@ class Paths:
         """The page that shows the dataset."""
         return f"{self.folder}/report/index.html"
 
-    # Of a rig with all frames of a sequence.
+    # Files of a rig with all frames of a sequence.
 
     @property
     def package(self) -> str:

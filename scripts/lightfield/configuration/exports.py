@@ -33,7 +33,7 @@ _TO_RECTILINEAR = "reproject to rectilinear"
 class Export(Settings):
     """The options that all exporters share."""
 
-    # Whether the export includes other rigs' views that test what is trained on these.
+    # Whether the export includes other rigs' views, which test the trained models.
     is_for_training: ClassVar[bool] = False
     # Whether the export is made of all frames of a sequence.
     is_of_sequence: ClassVar[bool] = False
@@ -565,5 +565,5 @@ def settings_of(name: str) -> type[Export]:
 # The formats of scripts/export.py. instant-ngp has a program of its own.
 EXPORTS = tuple(name for name in Exports.model_fields if name != "instant_ngp")
 
-# Those of them that are made of a whole sequence.
+# The formats of exports that are made of a whole sequence.
 SEQUENCE_EXPORTS = tuple(name for name in EXPORTS if settings_of(name).is_of_sequence)

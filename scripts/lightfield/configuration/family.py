@@ -199,7 +199,7 @@ def stand_in(content: Mapping[str, Any]) -> dict[str, Any]:
 def member_content(
     content: Mapping[str, Any], member: Member, values: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the content of a member's scene YAML, from that of the family's and drawn values."""
+    """Return the content of a member's scene YAML: the family's, with the member's drawn values."""
     scene_yaml = copy.deepcopy({key: value for key, value in content.items() if key != "family"})
     if member.model is not None:
         _set(scene_yaml, "scene.model", member.model)
@@ -213,7 +213,7 @@ def member_content(
 
 
 def _has_place(content: Mapping[str, Any]) -> bool:
-    """Return whether a scene YAML says itself which of its builder's places it shows."""
+    """Return whether a scene YAML itself chooses a place of its builder."""
     scene = content.get("scene")
     parameters = scene.get("parameters") if isinstance(scene, Mapping) else None
     return isinstance(parameters, Mapping) and "place" in parameters

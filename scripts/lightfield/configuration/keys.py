@@ -24,20 +24,20 @@ from lightfield.core.paths import files_below
 from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, LightField, View
 
-# The versions of what makes views. Each is in the keys of the views that it concerns, and of no
-# others. Raise it when equal settings give other files.
+# The versions of the steps that make views. The keys of the views that a step concerns have its
+# version, and no other keys have it. Raise a version when equal settings give other files.
 VERSIONS = {
     # All rendered views.
     "render": 4,
     # Views with passes of surfaces.
     "surfaces": 2,
-    # Denoised views of which only a part is rendered.
+    # Denoised views that are rendered only in part.
     "part": 1,
     # Views of a user's .blend.
     "blend": 1,
-    # Those of them with a pass of numbers.
+    # Views of a user's .blend with a pass of numbers.
     "numbers": 1,
-    # Those of them with mattes.
+    # Views of a user's .blend with mattes.
     "mattes": 1,
     # Transparent views of a scene that may have shadow catchers.
     "catchers": 1,
@@ -47,7 +47,7 @@ VERSIONS = {
     "model": 2,
     # Views of models in softboxes, for the same reason.
     "softboxes": 1,
-    # The import of models, if it refuses others. Views keep their keys.
+    # The import of models, if it refuses other models. Views keep their keys.
     "import": 1,
 }
 
@@ -62,9 +62,9 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     - A .blend: its SHA-256, and the path and SHA-256 of each of the ``external`` files that it
       reads. None stands for a missing file. Raises `UserError` if its own SHA-256 is unknown.
     - Somebody else's views: their lightfield.json.
-    - A builder: its source code, that of the builders' library and of builders whose pieces it
-      uses, the parameters, and bpy's version.
-      The built .blend does not count: it holds memory addresses, which differ between builds.
+    - A builder: the parameters, bpy's version, and source code: its own, the builders' library, and
+      the builders whose pieces it uses. The built .blend does not count: it holds memory addresses,
+      which differ between builds.
     """
     if source.blend:
         if source.sha256 is None:
@@ -101,7 +101,7 @@ def _model_version(light: str) -> int:
 
 
 def import_version(light: str) -> int:
-    """Return what changes whenever models in a ``light`` must be imported again."""
+    """Return the versions that change whenever models in a ``light`` must be imported again."""
     return _model_version(light) + VERSIONS["import"]
 
 

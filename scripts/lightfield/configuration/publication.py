@@ -27,7 +27,7 @@ Date = Annotated[
         )
     ),
 ]
-# The folder beside those of the rigs that has a folder for each published dataset.
+# This folder stands beside the rigs' folders. It has a folder for each published dataset.
 PUBLISHED_FOLDER = "published"
 CARD = "README.md"
 CROISSANT = "croissant.json"
@@ -49,7 +49,7 @@ Text = Annotated[
 ]
 
 
-# What to do about keys that only RO-Crate and DataCite had.
+# The advice about keys that only RO-Crate and DataCite had.
 _LEFT_OUT = "no published file has it: leave it out, and tell the repository when you upload"
 
 
@@ -71,7 +71,7 @@ class Creator(Settings):
     )
 
 
-# The licence may be that of the scene.
+# Without a licence here, the scene's licence counts.
 _REQUIRED = (
     "creators",
     "url",
@@ -86,8 +86,9 @@ _REQUIRED = (
 
 
 class Publication(Settings):
-    """What only the author of a dataset knows. Publishing requires `creators`, `url`, `publisher`,
-    `date`, `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
+    """Facts about a dataset that only its author knows. Publishing requires `creators`, `url`,
+    `publisher`, `date`, `limitations`, `biases`, `personal_information`, `use_cases` and
+    `social_impact`.
     """
 
     removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(

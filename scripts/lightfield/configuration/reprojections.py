@@ -22,7 +22,7 @@ MOST_SAMPLES = 64
 """Samples along each side of a pixel."""
 
 LIGHT_GROUPS = "light_groups"
-"""Among the passes of a reprojection: those of all light groups."""
+"""In the list of a reprojection's passes, this name stands for all light groups."""
 
 OPTICS = ("camera", "cube_map", "rotation", "filter", "samples")
 """The settings that say how views are resampled, on which a lens map depends."""
@@ -45,8 +45,8 @@ class ReprojectionOptions(Settings):
 
     camera: CameraSettings | None = Field(
         None,
-        description="Lens and image of the result. Without this key, they are those of the views, "
-        "and nothing is resampled.",
+        description="Lens and image of the result. Without this key, the views keep their lens and "
+        "image, and nothing is resampled.",
     )
     cube_map: bool = Field(
         False, description="Make six views of 90° from each view, as the faces of a cube."

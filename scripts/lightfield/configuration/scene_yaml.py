@@ -1,7 +1,7 @@
 """The scene YAML as typed models, which say what each key may be. Reads and checks scene YAMLs.
 
-scripts/schema.py makes the JSON schemas in configs/schema/ from these models and from those of
-configuration.py. With the schemas, editors complete and check the files.
+scripts/schema.py makes the JSON schemas in configs/schema/ from these models and the models of
+config_file.py. With the schemas, editors complete and check the files.
 """
 
 import difflib
@@ -48,7 +48,7 @@ OWN_SCENES = Path("configs", "scenes")
 FLOW_PLACES = "needs views from two or more places"
 # Names that a rig's folder cannot have, because other folders beside it have them.
 _RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
-# The same for a reprojection's folder.
+# Names that a reprojection's folder cannot have.
 _REPROJECTION_NEIGHBOURS = {
     "exr",
     "exports",
@@ -126,7 +126,7 @@ class Credits(Settings):
 
     @property
     def data_licence(self) -> str | None:
-        """The short name of the data's licence: its own, or else that of the scene."""
+        """The short name of the data's licence: its own, or else the scene's."""
         if self.publish and self.publish.licence:
             return self.publish.licence
         is_short_name = self.licence and re.fullmatch(SPDX, self.licence)
@@ -371,7 +371,7 @@ class Scene(Credits):
                 raise ValueError(f"{key}: there is no rig {name!r}{hint}")
 
     def light_of(self, reprojection: ReprojectionEntry) -> Any:
-        """Return the strengths of a reprojection's light, or `each`. None for the light as is."""
+        """Return the strengths of a reprojection's light, or `each`. None for unchanged light."""
         light = reprojection.relight
         return self.relight[light] if isinstance(light, str) and light in self.relight else light
 
@@ -398,7 +398,7 @@ class Scene(Credits):
                 raise ValueError(f"{at}: {error}") from None
 
     def _check_split_rigs(self) -> None:
-        """Check rigs of which one trains and others test: trainers see them as one dataset."""
+        """Check the rigs of a split: trainers see them as one dataset."""
         split_rigs = {name: rig for name, rig in self.rigs.items() if rig.split in PARTS}
         if not split_rigs:
             return
@@ -411,7 +411,7 @@ class Scene(Credits):
         for name, rig in split_rigs.items():
             for key in ("camera", "frames"):
                 if getattr(rig, key) != getattr(split_rigs[training], key):
-                    raise ValueError(f"rigs.{name}.{key}: must be that of {training}, which trains")
+                    raise ValueError(f"rigs.{name}.{key}: must be as in {training}, which trains")
         for name, reprojection in self.developments.items():
             missing_rigs = split_rigs.keys() - set(reprojection.rigs or self.rigs)
             if missing_rigs and missing_rigs != split_rigs.keys():

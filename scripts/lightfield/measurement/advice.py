@@ -111,7 +111,7 @@ class Saving:
 class Figures:
     """The figures of one seed's renders.
 
-    ``error`` leaves out the worst thousandth of pixels. ``seconds`` are those of a megapixel.
+    ``error`` leaves out the worst thousandth of pixels. ``seconds`` count for a megapixel.
     """
 
     error: float
@@ -395,10 +395,10 @@ def _savings_table(content: Mapping[str, Any]) -> list[str]:
         "Each figure is a factor: the unchanged scene takes that many times as long to the same",
         f"error. ± is the standard error over {content['seeds']} seeds. The columns are whole "
         "views,",
-        "all their pixels with the worst thousandth, and what pixels show. The bias is that of all",
-        "pixels over the noise of the reference. Light is the relative change of all light. A bias",
-        "above 1 means another picture, and the change is not advised. The light tree and guiding",
-        "are exempt, because their mean is the same. — is as good as the reference.",
+        "all their pixels with the worst thousandth, and what pixels show. The bias counts all",
+        "pixels, over the noise of the reference. Light is the relative change of all light. A",
+        "bias above 1 means another picture, and the change is not advised. The light tree and",
+        "guiding are exempt, because their mean is the same. — is as good as the reference.",
         "",
         f"| change | of | advised | {columns[0]} | all pixels | bias | light "
         f"| {' | '.join(columns[1:])} |",

@@ -55,10 +55,10 @@ _CONFIRMED = 0.2
 class Candidate:
     """A method at one effort: means over some windows.
 
-    - ``samples``: those that a pixel took. ``cost`` adds the denoiser's.
+    - ``samples``: the samples that a pixel took. ``cost`` adds the denoiser's time in samples.
     - ``error``: the relative mean squared error without the worst thousandth of pixels.
       ``whole_error`` includes it.
-    - ``seconds``: those of one core, or of the GPU, for a megapixel.
+    - ``seconds``: the time that one core, or the GPU, takes for a megapixel.
     """
 
     way: str
@@ -83,7 +83,7 @@ class Bench:
     """An experiment with one seed. Its references are good enough for a target error.
 
     The references take more seeds until their own error is a small part of the ``target``.
-    ``exposure`` is that of the references. Without it, their own light decides.
+    ``exposure`` is the references' exposure. Without it, their own light decides.
     """
 
     def __init__(
@@ -342,7 +342,7 @@ def calibrate(
     """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
 
     Returns the choice with its evidence, which is the same each time. Also returns the seconds that
-    each method took, which vary. Seconds are those of one core, or of the GPU, for a megapixel.
+    each method took on one core, or on the GPU, for a megapixel. They vary.
     """
     target = render.target_error
     assert target is not None
@@ -440,8 +440,8 @@ def _errors_by_stratum(
 ) -> dict[str, dict[str, float]]:
     """Return the error of a measured method in each stratum of all windows, and the stratum's area.
 
-    ``classes`` are those of the benches' windows, one bench after the other. The area is the part
-    of the windows' pixels. The windows' errors are weighted by it, too.
+    ``classes`` has the strata of the benches' windows, one bench after the other. The area is the
+    part of the windows' pixels. The windows' errors are weighted by it, too.
     """
     references = [reference for bench in benches for reference in bench.experiment.references]
     trials = [trial for bench in benches for (trial,) in bench.experiment.renders(method)]

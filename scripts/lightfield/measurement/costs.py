@@ -1,4 +1,4 @@
-"""Adds up the cost of a dataset, and extrapolates that of the full one, for scripts/costs.py."""
+"""Adds up the cost of a dataset, and extrapolates to the full dataset, for scripts/costs.py."""
 
 import csv
 import math
@@ -43,7 +43,7 @@ _NOT_COUNTED = ("costs.json", "index.html")
 
 @dataclass
 class StageCost:
-    """The sums over the jobs of one stage. The peak memory is that of the largest job."""
+    """The sums over the jobs of one stage. The peak memory is the largest job's."""
 
     jobs: int = 0
     wall_seconds: float = 0.0
@@ -299,7 +299,7 @@ def _machine_seconds(
 class Scale:
     """The scale of the full dataset. ``pixels`` and ``effort`` are factors for a view.
 
-    The effort is that of a pixel in samples. Denoising counts as samples.
+    The effort of a pixel counts in samples. Denoising counts as samples, too.
     """
 
     views: int

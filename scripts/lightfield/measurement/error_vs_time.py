@@ -90,8 +90,8 @@ class Point:
     """The figures of one method: means over windows and seeds.
 
     - ``samples``: the mean number of samples that a pixel took.
-    - ``seconds``: those of one core, or of the GPU, for a megapixel.
-    - ``standard_error``: that of ``relative_mse`` over seeds.
+    - ``seconds``: the time that one core, or the GPU, takes for a megapixel.
+    - ``standard_error``: the standard error of ``relative_mse`` over seeds.
     - ``resolved``: whether the error is above the references' own error. Points below it are
       neither drawn nor fitted.
     - ``bias`` (squared) and ``variance``: they add up to ``relative_mse_whole``.
@@ -330,8 +330,8 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
     One of plain path tracing's points sets the equal time and the equal error. With ``part`` 0.5 it
-    is the middle one, with 1 that of most samples. The error at equal time is interpolated between
-    a method's own points, and None beyond them. The time is that of `seconds_to`.
+    is the middle point, with 1 the point of most samples. The error at equal time is interpolated
+    between a method's own points, and None beyond them. `seconds_to` gives the time.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
@@ -485,7 +485,7 @@ def _equal_table(name: str, content: Mapping[str, Any]) -> list[str]:
         f"# {name}: methods at equal time and at equal error",
         "",
         "The error is the relative mean squared error of all but the worst thousandth of pixels.",
-        "Seconds are those of a megapixel. — is outside what was measured.",
+        "Seconds count for a megapixel. — is outside the measured range.",
         "",
         f"| method | error at {duration(seconds)} | seconds at error {error:.2g} | times faster |",
         "| --- | ---: | ---: | ---: |",
@@ -526,8 +526,8 @@ def _strata_table(content: Mapping[str, Any]) -> list[str]:
     return [
         "",
         "The strata are what pixels show. The columns are a stratum's part of the views, and the",
-        "slope of a method's error over time. The equal time and the equal error are those of the",
-        "middle point of plain path tracing. Then come the seconds to that error, how many times",
+        "slope of a method's error over time. The middle point of plain path tracing sets the",
+        "equal time and the equal error. Then come the seconds to that error, how many times",
         "faster a method is there, and at the error of plain path tracing with most samples.",
         "",
         f"| {' | '.join(columns)} |",

@@ -187,8 +187,8 @@ def split_by_stratum(
 ) -> dict[str, dict[int, Reference]]:
     """Return each stratum's references, in which only its pixels count.
 
-    ``classes`` are those of the references' windows. A stratum leaves out windows with fewer than
-    `strata.FEWEST_PIXELS` of its pixels. A stratum without any window is left out.
+    ``classes`` has the strata of the references' windows. A stratum leaves out windows with fewer
+    than `strata.FEWEST_PIXELS` of its pixels. A stratum without any window is left out.
     """
     by_stratum: dict[str, dict[int, Reference]] = {}
     for stratum_number, stratum in enumerate(strata.STRATA):

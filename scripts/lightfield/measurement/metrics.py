@@ -47,7 +47,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _EPSILON = 0.01
-# The part of the pixels, those with the largest errors, that does not count.
+# This part of the pixels, with the largest errors, does not count.
 OUTLIERS = 0.001
 # The pixels along a side of SSIM's window: 3.5 standard deviations of 1.5 pixels around its middle.
 _SSIM_WINDOW = 11
@@ -128,7 +128,7 @@ def make_reference(
 def exposed_alike(
     references: Sequence[Reference], exposure: float | None = None
 ) -> list[Reference]:
-    """Return references under one ``exposure``, by default that of all their pixels together."""
+    """Return references under one ``exposure``. By default, all their pixels together set it."""
     if exposure is None:
         exposure = exposure_for(np.concatenate([r.colour[r.mask] for r in references]))
     return [replace(reference, exposure=exposure) for reference in references]
@@ -460,8 +460,8 @@ def disagreement(
 ) -> Disagreement:
     """Compare two views at ``common_pixels`` of common surfaces: flat indices (n,) into each.
 
-    Compares the nearest pixels, because interpolation would remove noise. The weights are those of
-    the first view's reference. The part of the references' own errors is subtracted.
+    Compares the nearest pixels, because interpolation would remove noise. The first view's
+    reference gives the weights. The part of the references' own errors is subtracted.
     """
     truths = [
         r.colour.reshape(-1, 3)[where] for r, where in zip(references, common_pixels, strict=True)

@@ -28,7 +28,7 @@ COLUMNS = (
     "size",
 )
 
-# The error that the calibrated time is for.
+# The calibrated time is the time to this error.
 _TARGET_ERROR = 0.01
 # A method that takes this many times as long as plain path tracing does not reach its error.
 _OUT_OF_REACH = 1e4
@@ -48,9 +48,9 @@ probe
 
 @dataclass(frozen=True)
 class Expected:
-    """The estimate of one dataset of so many frames. Seconds are those of one core or of the GPU.
+    """The estimate of one dataset of so many frames. Seconds count for one core or for the GPU.
 
-    ``parts`` are those of `cheaper_parts`.
+    ``parts`` is the result of `cheaper_parts`.
     """
 
     name: str
@@ -180,7 +180,7 @@ def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
 def cheaper_parts(
     samples: int, advice: Mapping[str, Any] | None
 ) -> tuple[float | None, float | None]:
-    """Return the times of denoised and of calibrated views, over that of plain path tracing.
+    """Return the times of denoised and of calibrated views, over the time of plain path tracing.
 
     Plain path tracing takes ``samples`` a pixel. According to ``advice``, the error is a power of
     the samples, and the seconds are a line over them, from one sample on. A part is None if the

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-# The tables of synthesised views: the columns that name a row, and those that are averaged.
+# The tables of synthesised views: the columns that name a row, and the columns that are averaged.
 COLUMNS = ("truth", "variant", "value")
 MEANS = (
     "psnr",
@@ -22,7 +22,7 @@ MEANS = (
 # their interpolation volume.
 PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}
 # The region of all pixels. The other regions are named after the light that dominates their pixels:
-# glossy is the light of metal and mirrors, transmission that of glass, volume that of fog and fire.
+# glossy is the light of metal and mirrors, transmission of glass, volume of fog and fire.
 ALL_PIXELS = "all"
 
 

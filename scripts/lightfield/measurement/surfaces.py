@@ -35,7 +35,7 @@ _OVERSAMPLING = 8
 _SHOWN = 1
 TRUE = 2
 SUFFIXES = (".ply", ".obj", ".glb", ".gltf", ".stl")
-# glTF has Y up. All other files are as the dataset: Z up.
+# glTF has Y up. All other files have Z up, as the dataset has.
 _Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -174,7 +174,7 @@ def thinned(points: Points, spacing: float) -> Points:
     shuffled = np.random.default_rng(0).permutation(points)
     tree = cKDTree(shuffled)
     stays = np.ones(len(shuffled), bool)
-    # In parts, because the neighbours of all points at once need much memory.
+    # Search in parts, because the neighbours of all points at once need much memory.
     for first in range(0, len(shuffled), 100_000):
         part = np.arange(first, min(first + 100_000, len(shuffled)))
         part = part[stays[part]]

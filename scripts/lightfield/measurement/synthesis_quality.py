@@ -247,7 +247,7 @@ def compare(
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
     """Plot quality over bytes, over the number of views, and over how many make a picture.
 
-    The rows are those of `summaries.means`. Draws only the first of several truths.
+    The rows come from `summaries.means`. Draws only the first of several truths.
     """
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:

@@ -33,7 +33,7 @@ from lightfield.planning.sampling import PLAIN, calibrated
 from lightfield.stages.measurement import CalibratedTrialStage, TrialStage
 from lightfield.validation.consistency import Camera
 
-# Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
+# Seeds of references begin here, and seeds of trials at 1. So no trial is part of its reference.
 _REFERENCE_SEED = 1000
 
 # The steps of Roberts' R2 sequence, which fills a square evenly.

@@ -26,9 +26,9 @@ from lightfield.planning import sampling
 if TYPE_CHECKING:
     from lightfield.configuration.dataset import Dataset
 
-# What was measured. Seconds are those of one core of a 2-core x86-64 machine, most of them in the
-# garden, and bytes are bpy 5.0's. Reading and reprojection: benchmarks/reprojection.py with batches
-# of 16 views of 2048². Sensors: an image of 512², while the machine also did other work. Denoising:
+# Measured values. One core of a 2-core x86-64 machine took these seconds, most of them in the
+# garden. Bytes are bpy 5.0's. Reading and reprojection: benchmarks/reprojection.py with batches of
+# 16 views of 2048². Sensors: an image of 512², while the machine also did other work. Denoising:
 # views of the garden of 256² and more on an EPYC, 18 µs against 6. In small windows it costs up to
 # twice as much. A moving camera and compression: the three scenes. A calibration: the courtyard.
 
@@ -49,7 +49,7 @@ _WINDOW_SECONDS = 0.07  # a window's render of a calibration, beside its samples
 DENOISING_SAMPLES = 3  # samples of a pixel that take as long as denoising it
 _CAMERA_MOTION_PART = 0.2  # of a view's time: 0.09 to 0.26 with 4 and 16 samples of 64²
 _SEARCH_RENDERS = 9  # renders of each window in a calibration's search
-_SEARCH_PART = 2.5  # samples of these renders together, relative to those that the target needs
+_SEARCH_PART = 2.5  # samples of these renders together, relative to the samples for the target
 # Bytes on the disk for a pixel, before compression but for PNGs.
 COMPRESSED = 0.75  # an EXR's size, relative to its size without compression
 _DEPTH_BYTES = {"float": 4, "rounded": 3, "half": 2}
@@ -61,9 +61,9 @@ PIXEL_MEMORY = 300
 DENOISED_PIXEL_MEMORY = 1000  # with OpenImageDenoise, which took 910
 _GROUP_PIXEL_MEMORY = 70  # more for each light group: 36 of Cycles and its file, 30 of arrays
 _PASSES_PIXEL_BYTES = 200  # a temporary file with all passes in 32-bit floats, and a reserve
-_GROUP_PASS_PIXEL_BYTES = 12  # more of it for each light group
+_GROUP_PASS_PIXEL_BYTES = 12  # more of that file for each light group
 
-# What is guessed until it is known.
+# Guesses, used until the true values are known.
 UNKNOWN_SCENE = 6_000_000_000  # bytes of memory of a scene without an inventory
 _GUESSED_SAMPLES = 256  # a pixel's, with a target error or the .blend's own samples
 _GUESSED_LIGHT_GROUPS = 16
@@ -237,7 +237,7 @@ def _planned_view_seconds(dataset: Dataset) -> float:
 
 @dataclass(frozen=True)
 class ProbedViews:
-    """What scripts/probe.py measured: seconds of one core or of the GPU, and bytes, of some views.
+    """The figures of scripts/probe.py: seconds of one core or of the GPU, and bytes, of some views.
 
     ``views``, ``resolution`` and ``samples`` are the dataset's.
     """

@@ -74,7 +74,7 @@ def describe(
 
 
 def _entry(settings: CorpusSettings, member: MemberRecord, look: Look) -> dict[str, Any]:
-    """Return what corpus.json says of a member."""
+    """Return a member's entry in corpus.json."""
     entry: dict[str, Any] = {"name": member.name}
     entry |= member.model_dump(include={"seed", "model"}, exclude_none=True)
     entry |= {
@@ -95,7 +95,7 @@ def _entry(settings: CorpusSettings, member: MemberRecord, look: Look) -> dict[s
 def _statistics(
     members: Sequence[MemberRecord], valid: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Return the statistics of the members, those of pictures and values over ``valid`` ones."""
+    """Return the statistics of the members. Only ``valid`` ones count for pictures and values."""
     keys = sorted({key for entry in valid for key in entry["values"]})
     depths = [entry["depth"] for entry in valid if entry.get("depth")]
     distributions = {
@@ -119,7 +119,7 @@ def _statistics(
 
 
 def distribution(values: Sequence[Any]) -> dict[str, Any]:
-    """Return how values are distributed: a histogram of numbers, or the count of each other."""
+    """Return how values are distributed: a histogram of numbers, or each other value's count."""
     if not all(_is_number(value) for value in values):
         counts = Counter(corpus_page.value_text(value) for value in values)
         return {"counts": dict(sorted(counts.items()))}
@@ -145,7 +145,7 @@ def _is_number(value: Any) -> bool:
 
 
 def write_sums(folder: Path, members: Iterable[MemberRecord], looks: Mapping[str, Look]) -> None:
-    """Write the sums over a corpus, those of its members' datasets by their own lists of sums.
+    """Write the sums over a corpus. The members' own lists give the sums of their datasets.
 
     Raises `UserError` for a dataset whose list is not as the member's record says.
     """

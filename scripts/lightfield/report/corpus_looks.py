@@ -28,11 +28,11 @@ VIEWS = 4
 # Pixels of a thumbnail's longer side.
 THUMBNAIL = 160
 _QUALITY = 75
-# The cache is written each time after so many members, because a kill may come.
+# Write the cache after each so many members, so that a kill loses little work.
 STEP = 200
 
 Array = pictures.Array
-# What the views of a member show, and the SHA-256 of its thumbnail.
+# The sums over the pixels of a member's views, and the SHA-256 of its thumbnail.
 Look = Mapping[str, Any]
 
 
@@ -79,7 +79,7 @@ def _read(cache: Path) -> dict[str, dict[str, Any]]:
 
 
 def _made_of(member: MemberRecord) -> str:
-    """Return what changes with any byte of a member's datasets, and with how they are shown."""
+    """Return a key that changes with the datasets' bytes and with the settings of their looks."""
     sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
     made_of = repr([sums, VIEWS, THUMBNAIL, _QUALITY])
     return hashlib.sha256(made_of.encode()).hexdigest()
@@ -144,7 +144,7 @@ def _measured_views(dataset: Path) -> Iterator[dict[str, Any]]:
 def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
     """Return a view's sums over its pixels, which `_look` puts together.
 
-    ``rays`` (height, width, 3) and the ``meaning`` of depth are those of `converted`.
+    ``rays`` (height, width, 3) and the ``meaning`` of depth are as in `converted`.
     """
     image = images.read_image(path)
     colour = np.where(np.isfinite(image.colour), image.colour, 0)
@@ -168,7 +168,7 @@ def _webp(image: Array) -> bytes:
     scale = min(1.0, THUMBNAIL / max(width, height))
     small = pictures.shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
     exposure = pictures.exposure_for(small[..., :3])
-    # Behind what transparent views show is a middle grey.
+    # Transparent views lie on a middle grey.
     grey = pictures.MIDDLE_GREY / 2**exposure
     colour = small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1))
     file = io.BytesIO()

@@ -33,7 +33,7 @@ TITLES = {
 
 
 def write(folder: Path, content: Mapping[str, Any]) -> None:
-    """Write the page of the family in ``folder``. ``content`` is that of its corpus.json."""
+    """Write the page of the family in ``folder``. ``content`` is its corpus.json."""
     numbers = content["statistics"]
     pictures = numbers["pictures"].items()
     keys = _filtered_keys(numbers["values"])
@@ -71,7 +71,7 @@ def _filtered_keys(values: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _row(
     folder: Path, member: Mapping[str, Any], keys: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Return what the page's program shows of a member, and filters it by."""
+    """Return the facts of a member that the page's program shows and filters by."""
     link = f"{member['name']}/"
     for rig in member.get("datasets", {}):
         if (folder / member["name"] / rig / REPORT / "index.html").is_file():

@@ -1,4 +1,4 @@
-"""Brings a corpus' members from the storage, and sends there what Snakemake does not.
+"""Brings a corpus' members from the storage, and sends the files there that Snakemake does not.
 
 Without a shared folder, members lie in the storage under their own paths.
 """

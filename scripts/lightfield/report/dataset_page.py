@@ -93,7 +93,7 @@ def write(job: ReportHtml) -> None:
 def _sensor_folder(folder: Path, lightfield: LightField) -> Path | None:
     """Return the folder of the rendered views as a sensor sees them. None if there is none.
 
-    Of several brackets, the page shows the one nearest to the exposure itself.
+    If there are several brackets, the page shows the one nearest to the exposure itself.
     """
     stops_of_folder = {}
     for path in sorted(folder.glob(f"*/{NAME}")):
@@ -193,7 +193,7 @@ def facts(
 def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     """Describe a rig: its type, its cameras along each axis, and its size.
 
-    The size of loose poses and paths is that of the box around their ``places`` (n, 3).
+    The size of loose poses and paths is the size of the box around their ``places`` (n, 3).
     """
     kind = rig.type
     if isinstance(rig, rigs.Grid):

@@ -111,7 +111,7 @@ def sample(
     """Return the light (n, 3) and depth (n,) that a view has along world ``rays`` (n, 3).
 
     ``depth`` is the stored depth with this ``meaning``. The returned depth is in lengths of the
-    rays: a point lies at position + depth · ray. Light is interpolated. Depth is that of the
+    rays: a point lies at position + depth · ray. Light is interpolated. Depth comes from the
     nearest pixel. NaN depth marks rays that the lens does not see.
     """
     height, width = colour.shape[:2]

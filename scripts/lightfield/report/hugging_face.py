@@ -82,7 +82,7 @@ def describe(published: Published) -> str:
 
 
 def _meaning(field: str) -> str:
-    """Return what a member of a sample is, by its name without the sample's key."""
+    """Describe a member of a sample by its name without the sample's key."""
     if field == "json":
         return "pose, camera and checksum of each picture"
     stem = field.rpartition(".")[0]

@@ -158,7 +158,8 @@ def _loader(path: Path, folder: Path) -> tuple[str, str]:
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
     """Write a folder as ``target``, and as further parts if that would exceed ``most`` bytes.
 
-    Further parts are named <target's stem>.2.tar and so on. Removes those of an earlier package.
+    Further parts are named <target's stem>.2.tar and so on. Removes the parts of an earlier
+    package.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True

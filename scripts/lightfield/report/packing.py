@@ -17,8 +17,9 @@ from lightfield.imaging import pictures
 
 Array = NDArray[Any]
 
-# Steps of light become linear this many stops below white, nearly as fine as those of 8-bit sRGB.
-# Logarithmic steps would end above black, and change the dark channels of saturated colours.
+# Steps of light become linear this many stops below white. There they are nearly as fine as the
+# steps of 8-bit sRGB. Logarithmic steps would end above black, and change the dark channels of
+# saturated colours.
 _TOE_STOPS = 7.0
 # 12 bits of depth: a step is 0.3 percent in a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096

@@ -37,7 +37,7 @@ def write(output: Path, template: str, **content: Any) -> None:
 
 @cache
 def environment() -> jinja2.Environment:
-    """Return what fills in `TEMPLATES`. It compiles each template once in a process."""
+    """Return the environment that fills in `TEMPLATES`. Each process compiles a template once."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,

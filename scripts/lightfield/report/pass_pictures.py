@@ -52,9 +52,9 @@ def collect(
 def light_groups(
     folder: Path, lightfield: LightField, view: View, exposure: float
 ) -> dict[str, Any] | None:
-    """Pack a view's light groups, so that a page can relight it. None if none can be read.
+    """Pack a view's light groups, so that a page can relight it. Return None if none can be read.
 
-    ``exposure`` in stops is that of the page.
+    ``exposure`` is the page's exposure in stops.
     """
     names = lightfield.light_groups
     side = _GROUP_SIDE if len(names) <= _MANY_GROUPS else _SMALLER_GROUP_SIDE
@@ -69,7 +69,7 @@ def light_groups(
         if colour.shape[:2] != (small.height, small.width):
             colour = pictures.shrunk(colour, small.width, small.height)
         scale = light_scale(colour)
-        # Without loss: the sum of many groups would show what each has lost.
+        # Store groups without loss: the sum of many groups would show the losses of each.
         picture = webp(pack_light(colour, scale))
         groups.append({"name": name, "scale": scale, "light": picture})
     if not groups:

@@ -1,4 +1,4 @@
-"""Writes what a dataset is published with: WebDataset shards, and descriptions for repositories.
+"""Writes the files for publishing a dataset: WebDataset shards, and descriptions for repositories.
 
 Equal datasets and settings give equal bytes, because the date is the author's.
 """

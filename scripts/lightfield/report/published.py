@@ -1,4 +1,4 @@
-"""A dataset as it is published: what the files say that describe it."""
+"""A published dataset: the facts in the files that describe it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +12,10 @@ from lightfield.formats.lightfield import LightField
 class Published:
     """A dataset as it is published.
 
-    ``card`` is that of its package, ``lightfield`` its first one. ``shards`` has an entry for each
-    tar of each split, ``others`` are those of the files beside them. An entry has the keys file,
-    bytes and sha256. ``fields`` are the names of a sample's members. ``views`` counts the samples.
+    ``card`` is its package's card, ``lightfield`` its first lightfield.json. ``shards`` has an
+    entry for each tar of each split. ``others`` has an entry for each file beside them. An entry
+    has the keys file, bytes and sha256. ``fields`` are the names of a sample's members. ``views``
+    counts the samples.
     """
 
     name: str

@@ -71,7 +71,7 @@ class DatasetFiles:
 def read_dataset(root: Path, folder: Path) -> DatasetFiles:
     """Read the dataset in a ``folder`` that is the package's ``root``, or lies in it.
 
-    Names and checksums are those of sha256sums.txt. Raises `UserError` without that file.
+    Names and checksums come from sha256sums.txt. Raises `UserError` without that file.
     """
     if not (folder / SUMS).is_file():
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")

@@ -69,7 +69,7 @@ class _PackedViews:
     - ``data``: for the page's program.
     - ``embedded``, ``views``: the numbers of views in the page, and of all views.
     - ``parts``: the parts of the split that the dataset has, such as train and test.
-    - ``noise``: that of the best, the median and the worst view.
+    - ``noise``: the noise of the best, the median and the worst view.
     - ``missed``: the part of depths that are inf.
     - ``sensor``: the name of the folder with the views as a sensor sees them. None without one.
     - ``row``, ``row_shown``: the row of the epipolar-plane image, and the number of its views.
@@ -100,7 +100,7 @@ def collect(
 ) -> _PackedViews:
     """Read the views that the page shows, and pack them.
 
-    ``folder`` holds the views of ``lightfield``, whose cameras are those of ``rig``. The
+    ``folder`` holds the views of ``lightfield``. ``rig`` has placed their cameras. The
     ``unreadable`` views are black. ``sensor`` holds the views as a sensor sees them, if there are
     such. Raises `UserError` for any other view that cannot be read.
     """

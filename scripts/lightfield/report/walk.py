@@ -26,9 +26,9 @@ _SIGHT = 64
 def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -> dict[str, Any]:
     """Return the data of the walk.
 
-    ``lens`` is that of the embedded views. ``places`` (n, 3) are the positions of all cameras.
-    ``distances`` (m, height, width) are what the embedded views see, in metres.
-    ``fills_holes`` is that of `lightfield.synthesis.view.Sources`. Some of the keys:
+    ``lens`` is the lens of the embedded views. ``places`` (n, 3) are the positions of all cameras.
+    ``distances`` (m, height, width) are the distances in the embedded views, in metres.
+    ``fills_holes`` is as in `lightfield.synthesis.view.Sources`. Some of the keys:
 
     - ``rays``: the pixels' octahedral rays as a picture: above across, below down. The first two
       channels are the high and the low byte.

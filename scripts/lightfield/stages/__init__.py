@@ -1,1 +1,1 @@
-"""The stages of a build: what each reads, writes, and can be told. The rooms below do the work."""
+"""The stages of a build: their inputs, outputs and settings. The rooms below do the work."""

@@ -13,7 +13,7 @@ from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writ
 
 
 class ValidationSettings(Settings):
-    """The settings of scripts/validate.py. Paths are those of the working folder."""
+    """The settings of scripts/validate.py. Paths are relative to the working folder."""
 
     reprojections: list[str] = Field(
         [], description="Names of the folders in the dataset that hold reprojections."
@@ -31,7 +31,7 @@ class ValidationSettings(Settings):
 
 
 class ValidationByHand(ByHand):
-    """What a dataset must have."""
+    """The parts that a dataset must have, from flags instead of a settings file."""
 
     records: list[str] = option(
         "records with the sizes and checksums with which images were written",
@@ -74,7 +74,7 @@ class Validate(Stage[ValidationSettings]):
 
 
 class SequenceValidationSettings(Settings):
-    """The settings of scripts/validate_sequence.py. Paths are those of the working folder."""
+    """The settings of scripts/validate_sequence.py. Paths are relative to the working folder."""
 
     frames: list[str] | None = Field(
         None,
@@ -89,7 +89,7 @@ class SequenceValidationSettings(Settings):
 
 
 class SequenceValidationByHand(ByHand):
-    """What a sequence must have."""
+    """The parts that a sequence must have, from flags instead of a settings file."""
 
     exports: list[str] | None = option(
         "export.json of each export that the sequence must have (default: any)",

@@ -116,7 +116,7 @@ class ExportInstantNgp(Stage[ExportSettings[InstantNgp]]):
 
     input_cfg: Path = reads("lightfield.json of the views")
     output: Path = writes("transforms.json to write")
-    image_dir: Path | None = reads("folder of the views (default: that of --input-cfg)", None)
+    image_dir: Path | None = reads("folder of the views (default: the folder of --input-cfg)", None)
     exr_dir: Path | None = writes(
         "folder for the copies of EXR views (default: instant_ngp beside --output)", None
     )

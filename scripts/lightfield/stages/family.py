@@ -52,7 +52,7 @@ class BuildMembers(Stage[BatchSettings]):
 class CorpusSettings(CorpusOptions):
     """The settings of scripts/corpus.py."""
 
-    family: str = Field(description="Name of the corpus, which is that of the family's scene YAML.")
+    family: str = Field(description="Name of the corpus: the name of the family's scene YAML.")
     members: list[str] | None = Field(
         None,
         description="Names of the members. Without this key, the corpus has all members that have "

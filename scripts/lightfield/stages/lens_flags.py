@@ -134,7 +134,7 @@ class LensMapFlags(_OutputLens):
         group="Output optics",
     )
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = option(
-        "size of the output, relative to that of the input", 1.0, group="Output optics"
+        "size of the output, relative to the size of the input", 1.0, group="Output optics"
     )
     output_resolution: str | None = option(
         "size of the output in pixels, instead of --scale",

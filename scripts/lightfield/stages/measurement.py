@@ -17,7 +17,7 @@ INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 
 class FullSize(Settings):
-    """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
+    """A dataset at full size. ``samples`` and ``denoise`` default to the small dataset's."""
 
     views: AtLeastOne = Field(
         description="Number of views of the rig.", json_schema_extra={"unit": "views"}

@@ -1,4 +1,4 @@
-"""The stages that publish finished datasets, and those that fetch them from a storage."""
+"""The stages that publish finished datasets, and the stages that fetch them from a storage."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The stages that make views, and what follows from views alone: flow, and the list of splits."""
+"""The stages that make views, and files from views alone: optical flow, and the list of splits."""
 
 from pathlib import Path
 from typing import Literal

@@ -1,7 +1,8 @@
-"""How far away reflections, and things behind glass, seem to be.
+"""Estimates the apparent distance of reflections and of things behind glass.
 
-A mirror's depth is that of its glass, but what it shows moves as if it were behind it. So where
-views disagree on a surface, a farther distance at which they agree is taken instead.
+A mirror's depth is the depth of its glass. But a reflection moves from view to view as if it were
+behind the glass. So where views disagree on a surface, this module takes a farther distance at
+which they agree.
 """
 
 import math
@@ -17,7 +18,7 @@ from lightfield.imaging import pictures
 
 # The inverse of the distance is tried in this many equal steps from the surface to infinity.
 STEPS = 16
-# A view is compared with this many others, those with the nearest cameras.
+# A view is compared with this many others, whose cameras are nearest.
 NEIGHBOURS = 6
 # Larger views are compared at this many pixels along the longer side.
 LARGEST = 256
@@ -25,7 +26,8 @@ LARGEST = 256
 WINDOW = 7
 # Views disagree if the roots of their colours differ by more than this.
 _DISAGREE = 0.02
-# They agree farther away if their difference is there less than this part of what it was.
+# They agree at a farther distance if their difference falls below this part of the difference on
+# the surface.
 _BETTER = 0.85
 # A window needs details to be compared: at least this standard deviation of the roots, and a
 # surface in one piece: at most this part of its pixels beside a tear.
@@ -104,7 +106,7 @@ def factors(steps: Array) -> Array:
 def farther(here: Picture, others: Sequence[Picture], lens: Lens, torn: Array) -> Array:
     """Return by how many steps (h, w) of 1 / `STEPS` inverse distances are too large.
 
-    ``torn`` (h, w) are the pixels beside a tear. ``lens`` is that of the pictures.
+    ``torn`` (h, w) are the pixels beside a tear. ``lens`` is the lens of the pictures.
     """
     steps = np.zeros(here.inverse.shape, np.uint8)
     comparison = _Comparison(here, others, lens)
@@ -126,7 +128,7 @@ def farther(here: Picture, others: Sequence[Picture], lens: Lens, torn: Array) -
         steps[is_better] = step
         least = np.where(is_better, moved, least)
     agree = disagree & (least < _BETTER * difference)
-    # Single pixels follow most of those around them.
+    # Single pixels follow the majority of the pixels around them.
     most = _mean(agree.astype(np.float32)) > 0.5
     steps = np.where(most, median_filter(steps, 5), 0).astype(np.uint8)
     return _grown(steps, comparison, on_surface) if steps.any() else steps
@@ -220,8 +222,9 @@ def _look(
     """Write the ``directions`` (3, m) in which another camera sees some ``pixels`` (m,).
 
     ``rays`` (n, 3) of all pixels are in the world, as is ``offset`` (3,) from the other camera.
-    ``turn`` (3, 3) has the other's axes as columns. ``lengths`` (m,) are those of the directions:
-    the distance from the other camera in units of that at 1 / ``inverse`` (n,).
+    ``turn`` (3, 3) has the other's axes as columns. ``lengths`` (m,) are the lengths of the
+    directions: a point's distance from the other camera, in units of its distance from this one,
+    1 / ``inverse`` (n,).
     """
     for n in range(len(pixels)):
         pixel = pixels[n]
@@ -239,8 +242,8 @@ def _find_seen(
 ) -> None:
     """Mark the ``pixels`` (m,) whose surface a picture sees at their ``places`` (m, 2) in it.
 
-    ``expected`` (m,) are the inverse distances of these surfaces, ``inverse`` (h, w) those that the
-    picture sees.
+    ``expected`` (m,) are the inverse distances of these surfaces. ``inverse`` (h, w) are the
+    inverse distances that the picture sees.
     """
     height, width = inverse.shape
     for n in range(len(pixels)):
@@ -262,7 +265,7 @@ def _add_differences(
 ) -> None:
     """Add the mean differences of ``root`` (n, 3) at ``pixels`` (m,) from ``other`` (h, w, 3).
 
-    ``places`` (m, 2) are those of the pixels in ``other``. Adds to ``total`` (n,), and 1 to
+    ``places`` (m, 2) are where ``other`` sees the pixels. Adds to ``total`` (n,), and 1 to
     ``number`` (n,), where ``is_seen`` (n,) and the place is inside the picture.
     """
     height, width = other.shape[:2]

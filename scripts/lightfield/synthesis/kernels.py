@@ -25,19 +25,21 @@ CLOSEST = np.float32(4)
 EVEN = np.float32(0.5)
 # Drawings at a pixel show one surface if their inverse distances differ by less than this part.
 SAME = np.float32(0.03)
-# A surface hides what is farther by this part. Between SAME and HIDDEN the weight falls to 0.
+# A surface hides another one that is farther by this part. Between SAME and HIDDEN the weight falls
+# to 0.
 HIDDEN = np.float32(0.1)
-# What is far behind the nearest drawing counts as if its inverse distance were this part of that.
+# A drawing far behind the nearest one counts as if its inverse distance were this part of the
+# nearest one's.
 BEHIND = np.float32(0.15)
 # A pixel's splat reaches so far from its middle, in pixels across and down.
 SPLAT = np.float32(0.75)
 # Colours blend inside a splat if the inverse distances of pixels differ by less than this part.
 SPLAT_SAME = np.float32(0.05)
-# A surface hides what is behind it if its vertices have at least this certainty.
+# A surface hides everything behind it if its vertices have at least this certainty.
 CERTAIN = np.float32(0.5)
 # Added to the roots of colours before inverting them, so that black has an inverse.
 DARK = np.float32(0.03)
-# An inverse distance this small, in 1/m, counts as that of the sky.
+# A surface with an inverse distance this small, in 1/m, counts as sky.
 FAR = np.float32(1e-4)
 # A triangle larger than this part of the picture is an artefact at a lens's rim.
 LARGEST = np.float32(0.25)
@@ -290,7 +292,7 @@ def draw(
     - ``values`` (h · w, 6): as in `_draw_triangle`.
     - ``right``, ``down`` (h, w): as `link` marks them.
     - ``wraps``: whether the picture's left edge continues its right one.
-    - ``inverse`` (H, W): that of what is drawn, −1 where nothing is drawn yet.
+    - ``inverse`` (H, W): the inverse distance of the drawn surface, −1 where nothing is drawn yet.
     - ``drawn`` (H, W, 4): R, G, B and the weight, which is certainty times worth. The weight is
       negative if the pixel hides nothing behind it.
     """
@@ -387,7 +389,7 @@ def _draw_splat(
     nearness, weight = values
     x, y, across_x, across_y, down_x, down_y = _parallelogram(corners, wraps, width)
     area = across_x * down_y - across_y * down_x
-    # Skip splats seen from behind, and those that the lens does not see.
+    # Skip splats seen from behind, and splats that the lens does not see.
     if not area > 0:
         return
     wide = SPLAT * (abs(across_x) + abs(down_x))
@@ -413,7 +415,8 @@ def _draw_splat(
             if abs(u) >= SPLAT or abs(v) >= SPLAT:
                 continue
             opacity, red, green, blue = _splat_sample(pixel, u, v, surface, shade)
-            # The samples of a pixel show what has an opacity of 1/8, 7/8, 5/8 and 3/8 or more.
+            # The four samples of a pixel show splats with an opacity of at least 1/8, 7/8, 5/8 and
+            # 3/8.
             if opacity < quarter * (half + np.float32((2 * (i % 2) + 3 * (j % 2)) % 4)):
                 continue
             inverse[i, j] = nearness
@@ -445,9 +448,9 @@ def draw_splats(
 ) -> None:
     """Draw single pixels of a view as soft splats.
 
-    ``points`` (4n, 2) and ``values`` (4n, 6) are those of the corners of n pixels, clockwise from
-    the upper left. ``pixels`` (n, 2) are their rows and columns. ``surface`` (h, w) and ``shade``
-    (h, w, 4) are as in `_splat_sample`, and the other arguments as in `draw`.
+    ``points`` (4n, 2) and ``values`` (4n, 6) belong to the corners of n pixels, clockwise from the
+    upper left. ``pixels`` (n, 2) are their rows and columns. ``surface`` (h, w) and ``shade`` (h,
+    w, 4) are as in `_splat_sample`, and the other arguments as in `draw`.
 
     Source: Zwicker et al. 2001, "Surface Splatting", with a linear kernel.
     """
@@ -501,10 +504,10 @@ def _hidden_part(nearness: Any, front: Any) -> Any:
 def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: Array) -> Any:
     """Add a sample's colour to ``light`` (3,). Return its inverse distance, −1 if none sees it.
 
-    A drawing's weight is divided by its squared distance, up to that of `BEHIND`. So near surfaces
-    count most, but no single view decides at an edge. A surface of which a view is certain hides
-    what is behind it. Colours are summed as the inverses of their roots, so that a highlight in one
-    view counts little.
+    A drawing's weight is divided by its squared distance. The distance counts up to the limit that
+    `BEHIND` sets. So near surfaces count most, but no single view decides at an edge. If a view is
+    certain of a surface, the surface hides everything behind it. Colours are summed as the inverses
+    of their roots, so that a highlight in one view counts little.
     """
     count = len(inverses)
     nearest = front = np.float32(-1)

@@ -31,7 +31,8 @@ DIRECTIONS = 12
 _STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
 TORN_WEIGHT = 0.25
-# What a mirror shows is elsewhere from another place. It counts this much if it is drawn unmoved.
+# From another place, a mirror shows a reflection elsewhere. A reflection that is drawn unmoved
+# counts this much.
 UNMOVED_WEIGHT = 0.1
 # A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
 RIM = 12
@@ -182,7 +183,8 @@ class Sources:
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
         kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
-        # Sharpening would move the mixed colours beside a tear away from those of their surface.
+        # Sharpening would move the mixed colours beside a tear away from the colours of their
+        # surface.
         sharp[torn] = root[torn]
         row, column = np.nonzero(torn)
         corners = self.lens.rays(
@@ -199,7 +201,7 @@ class Sources:
         return to_rim(self.lens)
 
     def best(self, target: Array, lens: Lens, count: int) -> list[int]:
-        """Return the ``count`` views that together best see what a ``target`` (4, 4) looks at.
+        """Return the ``count`` views that together best see the scene of a ``target`` (4, 4).
 
         Repeatedly takes the view that adds most. The gain is summed over all directions. It is the
         logarithm of what the views taken so far are worth there. So seeing all directions counts
@@ -275,7 +277,7 @@ class Sources:
     ) -> None:
         """Draw a view's surface as seen from ``target`` (4, 4).
 
-        ``least_cosine`` is that of `_least_cosine`. Writes ``inverse`` and ``drawn`` as
+        ``least_cosine`` is the value of `_least_cosine`. Writes ``inverse`` and ``drawn`` as
         `kernels.draw` does.
         """
         surface = self.surface(index)
@@ -334,7 +336,7 @@ def fill(colour: Array, inverse: Array, coverage: Array, wraps: bool) -> None:
 
 
 def farther(here: apparent.Picture, others: Sequence[apparent.Picture], lens: Lens) -> Array:
-    """Return `apparent.farther` of a view's pixels (h, w). ``lens`` is that of the whole views."""
+    """Return `apparent.farther` of a view's pixels (h, w). ``lens`` is the lens of whole views."""
     height, width = here.inverse.shape
     small = lens if (lens.width, lens.height) == (width, height) else lens.resized(width, height)
     steps = apparent.farther(here, others, small, _links(here.inverse, small)[2])
@@ -394,7 +396,7 @@ def typical(inverse: Array) -> Array:
 
 
 def _turn(world_from_camera: Array) -> Array:
-    """Return the matrix (3, 3) by which a camera's row vectors become the world's."""
+    """Return the matrix (3, 3) that turns a camera's row vectors into world vectors."""
     return np.asarray(world_from_camera[:3, :3].T, np.float32)
 
 

@@ -424,7 +424,7 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     count as neighbours.
     """
     positions = np.array([camera.position for camera in cameras])
-    # Only here, because it imports scipy's trees, which most programs do not need.
+    # Import it only here, because it imports scipy's trees, which most programs do not need.
     from lightfield.geometry.nearest import Cameras
 
     nearest = Cameras(positions)

@@ -16,7 +16,7 @@ from lightfield.validation.integrity import Fault, Integrity, file_problem
 
 
 def is_corpus(folder: Path) -> bool:
-    """Return whether a folder is that of a family with a corpus, which may lack a file."""
+    """Return whether a folder holds a family with a corpus. The corpus may lack a file."""
     names = (CORPUS, SUMS)
     return any((folder / name).exists() for name in names) and any(folder.glob(f"*/{RECORD}"))
 

@@ -1,4 +1,4 @@
-"""Checks which files a dataset has: none is missing, and none lies there that is not its own.
+"""Checks a dataset's files: none is missing, and no foreign file lies among them.
 
 A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections. Each reprojection is
 a folder with its own lightfield.json and images.
@@ -115,7 +115,7 @@ def _moves_elsewhere(view: View, tolerance: float) -> bool:
         middle = pose_between(*view.exposure, 0.5)
         return not np.abs(middle - view.world_from_camera).max() < tolerance
     except (LookupError, TypeError, ValueError):
-        return True  # These are no two matrices.
+        return True  # The values are not two matrices.
 
 
 def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[Check]]:
@@ -194,7 +194,7 @@ def of_exports(
 
 @dataclass(frozen=True)
 class ListedFiles:
-    """The files that an export's list names, relative to the dataset, and what is wrong there."""
+    """The files in an export's list, relative to the dataset, and the faults of the list."""
 
     pictures: list[Path] = field(default_factory=list)
     other_files: list[str] = field(default_factory=list)
@@ -266,7 +266,7 @@ def strays_among(
 ) -> list[str]:
     """Return the files of ``present`` that are neither ``owned`` nor of a validation or package.
 
-    Those behind a foreign link are that link: see `stray_places`.
+    Files behind a foreign link count as that link: see `stray_places`.
     """
     all_owned = {*owned, *OUTPUTS, README, CARD}
     strays = [path for path in present if path not in all_owned]
@@ -290,7 +290,7 @@ def remove_strays(
 
     Such files are views of a rig that had more cameras, former reprojections and exports, and
     files in the report's folder that no report has. Moves nothing if a lightfield.json or an export
-    cannot be read. ``export_lists`` is that of `of_exports`.
+    cannot be read. ``export_lists`` is the argument of `of_exports`.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
@@ -365,7 +365,7 @@ def checksums(
 def altered(published: Mapping[str, str], ledger_sums: Mapping[str, str]) -> dict[str, str]:
     """Return which published files changed since they were made, and how.
 
-    Both arguments hold SHA-256 by path. Those in ``ledger_sums`` are from when the files were made.
+    Both arguments hold SHA-256 by path. ``ledger_sums`` were taken when the files were made.
     Without this check, a damaged file would be published with a checksum of its damage.
     """
     return {

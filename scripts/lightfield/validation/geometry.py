@@ -217,7 +217,7 @@ def _figures(
 
 
 def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float]:
-    """Return a view's displacement in pixels and its limit: those of its median pair.
+    """Return a view's displacement in pixels and its limit, both of its median pair.
 
     A pair's limit is ``limit``, or more if resolution and precision alone lead to more.
     """

@@ -1,4 +1,4 @@
-"""Checks that all files of a dataset, and those that it was made from, are as they were written.
+"""Checks that a dataset's files, and its intermediate files, are as they were written.
 
 A file's checksum may be in three places. The first of them counts:
 
@@ -51,7 +51,7 @@ class Fault:
 
 
 def file_problem(path: Path, digest: str, source: str) -> str | None:
-    """Return what is wrong with a file that must have a SHA-256. ``source`` is what says so."""
+    """Return what is wrong with a file that must have a SHA-256. ``source`` gave the SHA-256."""
     if not os.path.lexists(path):
         return "is missing"
     problem = broken(path)
@@ -70,10 +70,10 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 
 class Integrity:
-    """Checks the files of a dataset. With the folder ``work``, also those that it was made from.
+    """Checks the files of a dataset. With the folder ``work``, also checks its intermediate files.
 
-    The folder may also be that of a sequence. Then only the exports of the whole sequence count,
-    because each frame is a dataset of its own.
+    The folder may also be a sequence's. Then only the exports of the whole sequence count, because
+    each frame is a dataset of its own.
     """
 
     def __init__(self, dataset: Path, work: Path | None = None) -> None:
@@ -85,7 +85,7 @@ class Integrity:
         depth = 3 if _FRAME.fullmatch(folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
-        # Beside the folders of the scene's rigs.
+        # These files lie beside the folders of the scene's rigs.
         self._splits = Path(os.path.relpath(folder.parents[depth - 2] / SPLITS))
 
     @property
@@ -98,7 +98,7 @@ class Integrity:
 
     @property
     def is_sequence(self) -> bool:
-        """Whether the folder is that of a sequence."""
+        """Whether the folder holds a sequence."""
         return bool(self.frames)
 
     def faults(self) -> Iterator[Fault]:
@@ -260,13 +260,13 @@ class Integrity:
         return is_of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
 
     def _is_of_frame(self, path: Path, folder: Path) -> bool:
-        """Return whether a file is of a frame, if ``folder`` is that of a sequence."""
+        """Return whether a file belongs to a frame, if ``folder`` holds a sequence."""
         if not _is_below(path, folder) or path == folder:
             return False
         return bool(_FRAME.fullmatch(path.parts[len(folder.parts)]))
 
     def _present(self) -> Iterator[Path]:
-        """Yield the dataset's files. Those of its report only with a ledger, which lists them."""
+        """Yield the dataset's files. The report's files count only if the ledger lists them."""
         pictures = chain(self.dataset.glob("*/*.exr"), self.dataset.glob("*/*.png"))
         # A folder may have taken a picture's place.
         folders = (path for path in pictures if path.is_dir())

@@ -31,7 +31,7 @@ def reason_against(lightfield: LightField) -> str | None:
 def error(folder: Path, view: str, groups: list[str], colour: NDArray[Any]) -> float | None:
     """Return the largest difference between the sum of a view's ``groups`` and its colour.
 
-    It is relative to the ``colour`` (3, height, width), in half floats. ``folder`` is that of
+    It is relative to the ``colour`` (3, height, width), in half floats. ``folder`` holds
     lightfield.json. Returns None if a group cannot be read, which another check reports. Values
     that the half range clamps do not count.
     """

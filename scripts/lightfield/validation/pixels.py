@@ -47,7 +47,7 @@ _MOST_REGIONS = 16
 
 @dataclass
 class Facts:
-    """What one image file shows by itself.
+    """The findings about one image file, without comparison with other views.
 
     - ``faults``: texts by the check to which they belong.
     - ``clamped``, ``nan``: how many rendered values were clamped, or were not a number.
@@ -91,7 +91,7 @@ class Examiner:
         self.numbers: dict[Pass, set[int]] = {}
 
     def examine(self, file: File) -> Facts:
-        """Read an image file, and return what it shows by itself."""
+        """Read an image file, and return the findings about it."""
         path = self.dataset / file.path
         facts = Facts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
@@ -252,7 +252,7 @@ class Examiner:
                 facts.fault("passes", text)
 
     def _flow_faults(self, file: File, flow: NDArray[Any], visible: Bools) -> Iterator[str]:
-        """Yield how a ``flow`` (3, h, w) differs from what follows from the depth of two views."""
+        """Yield how a ``flow`` (3, h, w) differs from the flow that two views' depth gives."""
         image_set = self.sets[file.set]
         target = image_set.numbers.get(image_set.lightfield.views[file.view].others["flow"])
         depth = self._depth(image_set, file.view)
@@ -278,7 +278,7 @@ class Examiner:
         if wrong:
             yield f"{wrong} visible points are not where their depth puts them"
             return
-        # Only where the other view has 3 × 3 pixels around.
+        # Compare only where the other view has 3 × 3 pixels around the point.
         last = np.array([other.lens.width, other.lens.height]) - 1
         compared = is_there & ((places >= 1) & (places < last)).all(axis=-1)
         column, row = np.floor(places[compared]).astype(np.int64).T

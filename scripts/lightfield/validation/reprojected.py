@@ -24,9 +24,9 @@ Ints = NDArray[np.int64]
 
 # About this many pixels of a view are compared, spread evenly.
 _PIXELS = 500
-# A colour is compared with those of the source within this many pixels: of the source in a
-# magnified image, and of the view in a reduced one. Some filters reach farther, but give little
-# weight to what is there.
+# A colour is compared with the source's colours within this many pixels. They are the source's
+# pixels in a magnified image, and the view's pixels in a reduced one. Some filters reach farther,
+# but give little weight to the colours there.
 REACH = 1.0
 # Where that is more than this many pixels of the source, colours are not compared.
 _LARGEST_REACH = 24
@@ -43,7 +43,7 @@ _ONE_SURFACE = 1.1
 # A distance is wrong if its logarithm is off by more than this. The median may be off by less.
 _OFF = 0.05
 _MEDIAN_OFF = 0.005
-# Fewer pixels than this say nothing.
+# Fewer pixels than this are not judged: a few wrong ones may be chance.
 _FEWEST = 20
 
 
@@ -139,7 +139,7 @@ def toned(light: NDArray[Any], exposure: float, white: float) -> Floats:
     """Return ``light`` (...) after an exposure in stops and a tone curve. Both grow with light.
 
     A ``white`` of 1 changes nothing. Negative light becomes 0. Source: Reinhard et al. 2002,
-    equation 4. Apart from the code that the reprojection uses.
+    equation 4. Shares no code with the reprojection.
     """
     with np.errstate(all="ignore"):
         brighter = np.maximum(light, 0) * np.exp2(exposure)
@@ -149,7 +149,7 @@ def toned(light: NDArray[Any], exposure: float, white: float) -> Floats:
 def _depth_faults(
     target: ImageSet, image: Image, source: ImageSet, original: Image, rays: _Rays
 ) -> Iterator[str]:
-    """Yield how the distances differ from those of the source, where it has a smooth surface."""
+    """Yield how the distances differ from the source's, where the source has a smooth surface."""
     around, weights = _four_around(source, original, rays)
     distance = converted(
         image.channels["Z"][rays.rows, rays.columns].astype(np.float64),

@@ -102,7 +102,8 @@ def causes(validation: Mapping[str, Any]) -> str:
 def publish(job: PublishChecksums) -> None:
     """Publish the checksums of a valid dataset.
 
-    Removes those of an invalid one, so that the next run validates it again. Raises `UserError`.
+    Removes the checksums of an invalid one, so that the next run validates it again. Raises
+    `UserError`.
     """
     validation = read_keys(job.validation, "validate.py", "valid", "dataset", "checks")
     if not validation["valid"]:

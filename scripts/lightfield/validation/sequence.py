@@ -1,4 +1,4 @@
-"""Checks the exports of a whole sequence, which lie in the rig's folder beside those of the frames.
+"""Checks the exports of a whole sequence, which lie in the rig's folder beside its frames.
 
 `validate_sequence` checks that each export has its files, with their bytes and the views' size. The
 frames themselves are datasets, which `validate` checks.
@@ -44,7 +44,7 @@ def validate_sequence(rig: Path, frames: Sequence[str], lists: Sequence[Path]) -
     - ``frames``: the folders of the frames in it.
     - ``lists``: the export.json of each export that it must have.
 
-    The result holds all faults. Its checksums are those of the exports' files.
+    The result holds all faults, and the checksums of the exports' files.
     """
     rig = absolute_path(rig)
     owned: list[str] = []

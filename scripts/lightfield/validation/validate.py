@@ -67,7 +67,8 @@ def validate(
     views, presence_checks = files.of_views(dataset, sets)
     passes, missing_passes = layout.pass_files(dataset, sets)
     extras, export_files, exports_check = files.of_exports(dataset, sets, views, export_lists)
-    # Do first what needs no images: a wrong file then stops the run before hours of reading.
+    # Check first everything that needs no images: a wrong file then stops the run before hours of
+    # reading.
     recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
@@ -95,7 +96,7 @@ _Sums = dict[str, tuple[int, str]]
 """The size in bytes and the SHA-256 of files, by their paths in the dataset."""
 
 
-# The check of the files if not every lightfield.json could be read.
+# Stands for the check of the files while a lightfield.json cannot be read.
 _UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
 
 
@@ -103,7 +104,7 @@ def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:
     """Return a check of each set that a sensor developed."""
     if not any(image_set.sensor for image_set in sets):
         return []
-    # Only here, because it imports numba.
+    # Import it only here, because it imports numba.
     from lightfield.validation import sensor_check
 
     return sensor_check.checks(dataset, sets)
@@ -140,7 +141,7 @@ def _check_images(
 ) -> tuple[dict[File, Facts], list[Check]]:
     """Read all images. Return their facts, and the checks of each set.
 
-    The check of ``presence_checks`` for a set comes before the others of that set.
+    A set's check in ``presence_checks`` comes before the set's other checks.
     """
     checks = []
     processes = min(processes, _worthwhile_processes(dataset, images))
@@ -158,7 +159,7 @@ def _check_images(
 def _read_images(
     dataset: Path, images: Sequence[File], parallel_map: _ParallelMap
 ) -> dict[File, Facts]:
-    """Read each image once, and return what it shows by itself."""
+    """Read each image once, and return the findings about it."""
     facts: dict[File, Facts] = {}
     progress = Progress(len(images), f"validate {dataset.name}", "files")
     for file, fact in parallel_map(_examine, images):
@@ -233,7 +234,7 @@ def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:
 def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
     """Yield a `map` over worker processes that hold the examiner.
 
-    A single process is this one.
+    With one process, it is this process.
     """
     if processes == 1:
         _start_worker(examiner)

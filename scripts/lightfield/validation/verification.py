@@ -36,7 +36,7 @@ def verify(job: Verify) -> None:
 
 def _verify_corpus(job: Verify, folder: Path) -> set[Path]:
     """Verify a family with a corpus. Return the paths with faults."""
-    # All of them before the first is mended.
+    # Find all faults before mending the first: mending moves files.
     faults = [*corpus_faults(folder)]
     for fault in faults:
         print(fault, flush=True)
@@ -63,7 +63,7 @@ def _verify_dataset(
 def _mend(folder: Path, is_of_member: bool, integrity: Integrity, faults: list[Fault]) -> None:
     """Set damaged files aside, so that the next run makes them again."""
     if is_of_member and faults:
-        # Without its record, the next run makes what is damaged of the member.
+        # Without the member's record, the next run makes its damaged files again.
         (folder.parent / "member.json").unlink(missing_ok=True)
     elif not is_of_member:
         for fault in faults:

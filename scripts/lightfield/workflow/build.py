@@ -51,10 +51,11 @@ def source_of(wildcards: Wildcards) -> str:
 
 @dataclass(frozen=True)
 class Build:
-    """The datasets of a run: those that it makes, and those that these may need.
+    """The datasets of a run: the chosen ones, and the datasets that the chosen ones may need.
 
-    ``chosen`` are those that it makes. ``datasets`` have all by their names, also those that may
-    test what is trained on the chosen ones. ``families`` have the chosen ones by their scene YAMLs.
+    The run makes the ``chosen`` datasets. ``datasets`` maps names to all datasets. Some of them
+    only test models that were trained on chosen ones. ``families`` maps the names of scene YAMLs to
+    the chosen families.
     """
 
     config: Configuration
@@ -125,7 +126,7 @@ class Build:
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
-        """Return the inputs of an export: the views of its dataset, and of those that test it.
+        """Return the inputs of an export: the views of its dataset, and of its test datasets.
 
         Points follow from the depth of the rendered views, for any source.
         """
@@ -146,7 +147,7 @@ class Build:
         return [path] if path else []
 
     def rig(self, wildcards: Wildcards) -> list[Dataset]:
-        """Return the dataset of a rig, or those of all frames of a sequence."""
+        """Return the dataset of a rig, or the datasets of all frames of a sequence."""
         rigs: dict[str, list[Dataset]] = {}
         for dataset in self.datasets.values():
             name = f"{dataset.scene_folder}/{dataset.rig_name}"
@@ -179,7 +180,7 @@ class Build:
         return list(dict.fromkeys(files))
 
     def validated_frames(self, wildcards: Wildcards) -> list[str]:
-        """Return what exports of a sequence are compared with: the views of all frames.
+        """Return the files with which exports of a sequence are compared: the views of all frames.
 
         Views of other rigs may test what these train. Their lightfield.json has their poses.
         """
@@ -200,7 +201,7 @@ class Build:
     def probes(self) -> list[tuple[str, int, str]]:
         """Name, number of frames, and probe of each chosen rig.
 
-        The probe of a sequence is that of its first frame.
+        A sequence has the probe of its first frame.
         """
         frames_of_rig: dict[str, list[Dataset]] = {}
         for dataset in self.chosen:
@@ -267,7 +268,7 @@ class Build:
         return learned_exports(self.dataset(wildcards))
 
     def split_lightfields(self, wildcards: Wildcards) -> list[str]:
-        """Return the light fields of those rigs of a scene that have a split."""
+        """Return the light fields of a scene's rigs that have a split."""
         return [
             dataset.paths.lightfield
             for dataset in self.datasets.values()
@@ -376,7 +377,7 @@ def full_datasets(scene: str) -> dict[str, Dataset]:
 
 
 def _views_of_source(dataset: Dataset, wildcards: Wildcards) -> list[str]:
-    """Return the records and light fields of a dataset's views, and of those of the source."""
+    """Return the records and light fields of a dataset's rendered views, and of the source's."""
     return [
         *dataset.records(RENDER),
         *dataset.records(stage_of(wildcards)),

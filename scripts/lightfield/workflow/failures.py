@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lightfield.core.errors import LESS_MEMORY
 
-# What most likely happened if a signal ended a program.
+# The likely cause when a signal ended a program.
 _SIGNALS = {
     "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGABRT": f"most likely memory ran out: {LESS_MEMORY}",
@@ -17,7 +17,7 @@ _SIGNALS = {
     "SIGTERM": "it was cancelled, or exceeded its time limit",
 }
 
-# What tar says after the cause.
+# Lines that tar prints after the cause.
 _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recoverable")
 
 
@@ -46,7 +46,7 @@ def signal_cause(number: int) -> str:
 
 
 def first_sentence(message: str) -> str:
-    """Return what an executor says about a job, without the command that it quotes below."""
+    """Return an executor's message about a job, without the command that it quotes below."""
     lines = itertools.takewhile(lambda line: not line.startswith(" "), message.splitlines())
     return " ".join(lines).strip().rstrip(":")
 

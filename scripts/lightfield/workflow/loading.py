@@ -22,7 +22,7 @@ from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
 from lightfield.workflow.shard_counts import shard_count
 
-# A rig whose split is one of these tests what is trained on another rig.
+# A rig with one of these splits tests models that were trained on another rig's views.
 _TESTED_WITH = ("validation", "test")
 
 

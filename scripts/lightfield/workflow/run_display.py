@@ -44,7 +44,7 @@ class Task:
     seconds: float | None = None
     began: float | None = None
     ended: float | None = None
-    # From its log: pieces of work that an earlier run did, those done since, all pieces, and the
+    # The counts in its log: pieces that an earlier run did, pieces done since, all pieces, and the
     # seconds for each.
     already: int = 0
     done: int = 0
