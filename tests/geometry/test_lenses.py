@@ -962,7 +962,7 @@ USE_IT = """
 import math
 from lightfield.core.flags import parsed
 from lightfield.geometry import lenses
-from lightfield.reprojection.geometry import Geometry
+from lightfield.reprojection.geometry import ReprojectionGeometry
 from lightfield.stages.lenses import ComputeLensMap
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
@@ -970,7 +970,7 @@ assert lenses.from_lightfield(lens.to_lightfield()).fov == math.radians(60)
 words = ["map.npy", "--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
 job = parsed(ComputeLensMap, None, words)
 _, source = job.read()
-geometry = Geometry.of(job.settings, source)
+geometry = ReprojectionGeometry.of(job.settings, source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 

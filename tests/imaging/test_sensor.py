@@ -15,21 +15,21 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.imaging.sensor import BLACK, WHITE, Parameters, light_of, merged, sense
+from lightfield.imaging.sensor import BLACK, WHITE, SensorParameters, light_of, merged, sense
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.reprojection.sensor import parameters_of
 from lightfield.validation.validate import validate
 
 LINEAR = ((1.0, 1.0, 1.0, 0.5),) * 3
 NO_VIGNETTING = ((0.0,) * 5,) * 3
-PLAIN = Parameters(0.0, NO_VIGNETTING, (0.0,) * 8, LINEAR, 0.0, 0.0, 16, 1)
+PLAIN = SensorParameters(0.0, NO_VIGNETTING, (0.0,) * 8, LINEAR, 0.0, 0.0, 16, 1)
 # The parts of cases that a statistical test may reject although all is right.
 RARELY = 1e-6
 
 # What PPISP's own code makes of these parameters and of the light in `ppisp_light`: the function
 # ppisp_apply_torch of tests/torch_reference.py in nv-tlabs/ppisp, version 64d4597, with
 # torch 2.15.0 on a CPU.
-PPISP = Parameters(
+PPISP = SensorParameters(
     exposure=-0.8,
     vignetting=(
         (0.02, -0.01, -0.5, -0.2, 0.1),
@@ -105,7 +105,7 @@ def test_parameters_are_written_as_ppisps_own_tensors():
     assert tensors["exposure_params"] == -0.8
     np.testing.assert_array_equal(tensors["vignetting_params"], PPISP.vignetting)
     np.testing.assert_array_equal(tensors["color_params"], PPISP.colour)
-    assert Parameters.from_json(content) == PPISP
+    assert SensorParameters.from_json(content) == PPISP
 
 
 def test_pixels_turn_back_into_the_light():
@@ -335,7 +335,7 @@ def test_a_sensors_folder_is_a_valid_part_of_its_dataset(tmp_path, develop):
     listed = {f"sensor_ev1/{view.name}{end}" for end in (".json", "_clipped.png", "_weights.exr")}
     assert listed <= result.checksums.keys()
     # A published view can be turned back by its own files alone.
-    parameters = Parameters.from_json(json.loads(view.with_suffix(".json").read_text()))
+    parameters = SensorParameters.from_json(json.loads(view.with_suffix(".json").read_text()))
     image = images.read_image(view.with_suffix(".png")).channels
     light = light_of(np.stack([image[name] for name in "RGB"], axis=-1), parameters)
     weights = images.read_image(view.with_name(f"{view.name}_weights.exr")).colour

@@ -15,7 +15,7 @@ _NOW = re.compile(r".*: (\d+) of (\d+) \w+, ([\d.e+-]+) s each")
 
 
 @dataclass(frozen=True)
-class Report:
+class ProgressLine:
     """The content of a line of `Progress`: pieces ``done`` of ``total``, and seconds for ``each``.
 
     Only the first line says how many were ``already`` done before. It has no seconds.
@@ -27,14 +27,14 @@ class Report:
     each: float | None = None
 
 
-def read(line: str) -> Report | None:
+def read(line: str) -> ProgressLine | None:
     """Return the content of a line of `Progress`. None for other lines."""
     if match := _BEGIN.fullmatch(line):
         total, already = match.groups()
-        return Report(0, int(total), int(already or 0))
+        return ProgressLine(0, int(total), int(already or 0))
     if match := _NOW.match(line):
         done, total, each = match.groups()
-        return Report(int(done), int(total), each=float(each))
+        return ProgressLine(int(done), int(total), each=float(each))
     return None
 
 

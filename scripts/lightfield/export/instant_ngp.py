@@ -59,7 +59,7 @@ def write(job: ExportInstantNgp) -> None:
         names = [view.name for view in lightfield.views if view.split == part]
         if names:
             view_names[job.output.with_stem(f"{job.output.stem}_{part}")] = names
-    writer = _Writer(job, lightfield)
+    writer = _TransformsWriter(job, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
     common["options"] = options.recorded
@@ -78,7 +78,7 @@ def write(job: ExportInstantNgp) -> None:
         store.put_list(job.output, [*writer.pictures, *list(view_names)[1:]])
 
 
-class _Writer:
+class _TransformsWriter:
     """Writes the files that a transforms.json names, view by view."""
 
     def __init__(

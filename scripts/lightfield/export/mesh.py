@@ -24,7 +24,15 @@ from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_text
 from lightfield.export import is_mesh_of_dataset, replace_folder
-from lightfield.geometry.mesh import Box, Floats, Mesh, Placed, Surface, box_around, to_world
+from lightfield.geometry.mesh import (
+    Floats,
+    Mesh,
+    OrientedBox,
+    Placed,
+    SceneSurface,
+    box_around,
+    to_world,
+)
 from lightfield.rendering.surface import surface_of
 from lightfield.stages.exports import WriteSurface
 
@@ -69,7 +77,7 @@ def write(job: WriteSurface) -> None:
     )
 
 
-def _write_files(surface: Surface, formats: Sequence[str], frame: int, folder: Path) -> None:
+def _write_files(surface: SceneSurface, formats: Sequence[str], frame: int, folder: Path) -> None:
     """Write a scene's surface at a ``frame`` into ``folder``, in ``formats`` of "glb" and "ply".
 
     Raises `UserError` if cameras can see no mesh, or if a format cannot hold so many triangles.
@@ -92,7 +100,7 @@ def _write_files(surface: Surface, formats: Sequence[str], frame: int, folder: P
 
 def _object(placed: Placed, mesh: Mesh) -> dict[str, Any]:
     """Return an object's entry in objects.json."""
-    box: Box = box_around(mesh, placed.world_from_object)
+    box: OrientedBox = box_around(mesh, placed.world_from_object)
     parts = {"center": box.center, "size": box.size, "rotation": box.rotation}
     return {
         "name": placed.name,
@@ -107,7 +115,7 @@ def _object(placed: Placed, mesh: Mesh) -> dict[str, Any]:
 # ---- GLB ------------------------------------------------------------------------------------
 
 
-def _write_glb(path: Path, surface: Surface) -> None:
+def _write_glb(path: Path, surface: SceneSurface) -> None:
     placed, meshes = _without_shear(surface)
     names = ["" for _ in meshes]
     for each in reversed(placed):
@@ -130,7 +138,7 @@ def _write_glb(path: Path, surface: Surface) -> None:
             file.write(mesh.triangles.astype("<u4").tobytes())
 
 
-def _without_shear(surface: Surface) -> tuple[list[Placed], list[Mesh]]:
+def _without_shear(surface: SceneSurface) -> tuple[list[Placed], list[Mesh]]:
     """Return placed meshes whose matrices glTF allows: a rotation, a scale and a translation.
 
     A mesh that its matrix shears becomes a mesh of its own in the world.
@@ -234,7 +242,7 @@ def _indices(triangles: NDArray[np.int32], view: int) -> dict[str, Any]:
 # ---- PLY ------------------------------------------------------------------------------------
 
 
-def _write_ply(path: Path, surface: Surface) -> None:
+def _write_ply(path: Path, surface: SceneSurface) -> None:
     """Write all triangles in the world. Instances are written one by one."""
     vertex_counts = [len(surface.meshes[placed.mesh].vertices) for placed in surface.placed]
     face_count = sum(len(surface.meshes[placed.mesh].triangles) for placed in surface.placed)

@@ -202,7 +202,7 @@ class SourceDataset:
     def _rays(self) -> Floats:
         return self.lens.pixel_rays()
 
-    def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "Surface"]]:
+    def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "ViewSurface"]]:
         """Yield each view with the surface that it sees: that of its rendered view."""
         if self.rendered.depth is None:
             raise UserError(
@@ -216,11 +216,11 @@ class SourceDataset:
             rendered = by_name.get(name) or by_name[name.rpartition("_")[0]]
             path = self._path(rendered.name, "exr", ".exr")
             distance = depth_of(path, self.rendered, rays, "distance")
-            yield view, Surface(self.rendered.lens, rendered, rays, distance)
+            yield view, ViewSurface(self.rendered.lens, rendered, rays, distance)
 
 
 @dataclass(frozen=True)
-class Surface:
+class ViewSurface:
     """The first surface around a camera: ``distance`` (h, w) in metres along ``rays`` (h, w, 3)."""
 
     lens: Lens

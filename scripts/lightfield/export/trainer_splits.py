@@ -11,7 +11,7 @@ from lightfield.formats.lightfield import LightField, View
 EVERY = 8
 
 
-class Splits(NamedTuple):
+class TrainerSplits(NamedTuple):
     """The views of each part. Without views for validation, ``validation`` has the test views."""
 
     train: Sequence[View]
@@ -19,7 +19,7 @@ class Splits(NamedTuple):
     test: Sequence[View]
 
 
-def splits(lightfield: LightField) -> Splits:
+def splits(lightfield: LightField) -> TrainerSplits:
     """Return the views of each part of the rig's split. Without a split, every eighth view tests.
 
     Raises `UserError` if no view trains, or no view tests.
@@ -36,4 +36,4 @@ def splits(lightfield: LightField) -> Splits:
     if not (train and test):
         missing = "test" if train else "train"
         raise UserError(f"{lightfield.path}: frames: no view is left to {missing}")
-    return Splits(train, validation or test, test)
+    return TrainerSplits(train, validation or test, test)

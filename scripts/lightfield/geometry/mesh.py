@@ -27,7 +27,7 @@ class Placed:
 
     - ``name``: its name. An instance's is that of the id passes' names.json.
     - ``original``: the name of the object that it shows.
-    - ``mesh``: an index of `Surface.meshes`.
+    - ``mesh``: an index of `SceneSurface.meshes`.
     - ``world_from_object`` (4, 4): from the mesh's coordinates to the world, in metres with Z up.
     - ``numbers``: its values in the id passes "object" and "instance". Empty without such passes.
     """
@@ -40,7 +40,7 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class Surface:
+class SceneSurface:
     """What cameras can see of a scene at a frame, as meshes.
 
     ``left_out`` says why an object that cameras can see has no mesh, by the object's name.
@@ -63,7 +63,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Box:
+class OrientedBox:
     """A box: the ``center`` (3,) in metres, the full ``size`` (3,), and its axes in the world.
 
     The columns of ``rotation`` (3, 3) are the axes, a right-handed frame.
@@ -81,7 +81,7 @@ def to_world(mesh: Mesh, world_from_object: Floats) -> Floats:
     )
 
 
-def box_around(mesh: Mesh, world_from_object: Floats) -> Box:
+def box_around(mesh: Mesh, world_from_object: Floats) -> OrientedBox:
     """Return the tightest box around a mesh in the world, along the axes of its object.
 
     If ``world_from_object`` (4, 4) shears, the axes are those of the nearest rotation, by polar
@@ -95,4 +95,4 @@ def box_around(mesh: Mesh, world_from_object: Floats) -> Box:
     along_axes = to_world(mesh, world_from_object) @ rotation
     low = along_axes.min(axis=0)
     high = along_axes.max(axis=0)
-    return Box(rotation @ ((low + high) / 2), high - low, rotation)
+    return OrientedBox(rotation @ ((low + high) / 2), high - low, rotation)

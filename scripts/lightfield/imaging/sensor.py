@@ -58,7 +58,7 @@ BLACK = 128
 
 
 @dataclass(frozen=True)
-class Parameters:
+class SensorParameters:
     """The parameters of one view's sensor.
 
     - ``exposure``: in stops.
@@ -123,7 +123,7 @@ class Parameters:
         }
 
     @classmethod
-    def from_json(cls, content: Any) -> "Parameters":
+    def from_json(cls, content: Any) -> "SensorParameters":
         """Return the parameters of a file's content. Raises `UserError` for another content."""
         try:
             response = content["response"]
@@ -162,7 +162,7 @@ class Sensed:
     weights: NDArray[np.float32] | None
 
 
-def sense(light: NDArray[Any], parameters: Parameters, with_weights: bool = True) -> Sensed:
+def sense(light: NDArray[Any], parameters: SensorParameters, with_weights: bool = True) -> Sensed:
     """Develop scene-linear ``light`` (h, w, 3). NaN counts as 0."""
     height, width = light.shape[:2]
     dtype = np.uint8 if parameters.stored_largest == 255 else np.uint16
@@ -190,7 +190,7 @@ def _strips(height: int) -> Iterator[slice]:
         yield slice(first, min(first + _ROWS, height))
 
 
-def vignetting(parameters: Parameters, width: int, height: int, rows: slice) -> Floats:
+def vignetting(parameters: SensorParameters, width: int, height: int, rows: slice) -> Floats:
     """Return the part of the light (rows, width, 3) that vignetting leaves in some rows."""
     longer = max(width, height)
     x = (np.arange(width) + 0.5 - width / 2) / longer
@@ -205,7 +205,7 @@ def vignetting(parameters: Parameters, width: int, height: int, rows: slice) -> 
     return np.stack(falloffs, axis=-1)
 
 
-def noisy(clean: Floats, parameters: Parameters, random: np.random.Generator) -> Floats:
+def noisy(clean: Floats, parameters: SensorParameters, random: np.random.Generator) -> Floats:
     """Return the raw signal with noise, clipped to [0, 1]. Without noise, return ``clean``.
 
     The noise is Poissonian and Gaussian, so that its variance is a · y + b before clipping.
@@ -238,7 +238,7 @@ def homography(colour: Sequence[float]) -> Floats:
     return np.asarray(matrix / matrix[2, 2])
 
 
-def _recolour(raw: Floats, parameters: Parameters) -> Floats:
+def _recolour(raw: Floats, parameters: SensorParameters) -> Floats:
     """Apply PPISP's colour to a raw signal (…, 3), and keep its intensity R + G + B."""
     intensity = raw.sum(axis=-1)
     moved = _with_intensity(raw, intensity) @ parameters.homography.T
@@ -246,7 +246,7 @@ def _recolour(raw: Floats, parameters: Parameters) -> Floats:
     return _without_intensity(moved)
 
 
-def _colour_undone(colour: Floats, parameters: Parameters) -> Floats:
+def _colour_undone(colour: Floats, parameters: SensorParameters) -> Floats:
     """Return the raw signal that `_recolour` turns into ``colour``."""
     moved = _with_intensity(colour, colour.sum(axis=-1))
     back = moved @ np.linalg.inv(parameters.homography).T
@@ -267,7 +267,7 @@ def _without_intensity(moved: Floats) -> Floats:
     return np.stack([moved[..., 0], moved[..., 1], blue], axis=-1)
 
 
-def _respond(colour: Floats, parameters: Parameters) -> Floats:
+def _respond(colour: Floats, parameters: SensorParameters) -> Floats:
     """Return the response (…, 3) to linear colour, which is clipped to [0, 1].
 
     Source: apply_crf_ppisp in ppisp_math.cuh.
@@ -284,7 +284,7 @@ def _respond(colour: Floats, parameters: Parameters) -> Floats:
     return out
 
 
-def _response_undone(encoded: Floats, parameters: Parameters) -> Floats:
+def _response_undone(encoded: Floats, parameters: SensorParameters) -> Floats:
     """Return the linear colour (…, 3) to which `_respond` gives ``encoded``, 0 to 1."""
     if parameters.response is None:
         return decode_srgb(encoded)
@@ -304,7 +304,7 @@ def _middle(toe: float, shoulder: float, center: float) -> float:
     return shoulder * center / (toe + center * (shoulder - toe))
 
 
-def _weights(clean: Floats, falloff: Floats, parameters: Parameters) -> Floats:
+def _weights(clean: Floats, falloff: Floats, parameters: SensorParameters) -> Floats:
     """Return 1 / variance of the light that a code gives. 0 where noise could saturate it.
 
     The variance is that of noise and rounding. It follows from the signal without noise, so that
@@ -331,7 +331,7 @@ def _weights(clean: Floats, falloff: Floats, parameters: Parameters) -> Floats:
     return weights
 
 
-def light_of(pixels: NDArray[Any], parameters: Parameters) -> Floats:
+def light_of(pixels: NDArray[Any], parameters: SensorParameters) -> Floats:
     """Return the scene-linear light (h, w, 3) that a sensor's ``pixels`` (h, w, 3) show.
 
     It differs from the light that was developed by noise, by rounding, and where it was clipped.

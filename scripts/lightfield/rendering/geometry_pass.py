@@ -37,7 +37,7 @@ _MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
 
 
 @dataclass(frozen=True)
-class Geometry:
+class ViewGeometry:
     """What a view's pixels see at their centres. All of it belongs to the same surface.
 
     - ``depth`` (height, width): float32 in metres, inf for a miss. Z-depth for a perspective
@@ -66,7 +66,7 @@ class Geometry:
     render_seconds: float
     synchronization_seconds: float
 
-    def without(self, where: Array) -> "Geometry":
+    def without(self, where: Array) -> "ViewGeometry":
         """Return a copy with a miss at each of the pixels ``where`` (height, width)."""
         return replace(
             self,
@@ -88,7 +88,7 @@ def cleared(pixels: Array, where: Array) -> Array:
 
 def render_geometry(
     world_from_camera: Array, motion: bool = False, apart: bool = False, alpha: bool = False
-) -> Geometry:
+) -> ViewGeometry:
     """Render the geometry that a camera at ``world_from_camera``, (4, 4) camera-to-world, sees.
 
     ``motion`` adds the motion, ``apart`` the instances, ``alpha`` the alpha. Cycles must be set up
@@ -111,7 +111,7 @@ def render_geometry(
     )
     objects = ids.numbers("object")[object_indices[..., 0].astype(np.uint16)]
     materials = ids.numbers("material")[material_indices[..., 0].astype(np.uint16)]
-    return Geometry(
+    return ViewGeometry(
         np.where(hit, depth, np.float32(np.inf))[..., 0],
         normal,
         objects,

@@ -20,7 +20,7 @@ from lightfield.core.names import UP
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import blend_file, model_files, model_light
-from lightfield.rendering.model_references import Reference, printable, refuse_outside
+from lightfield.rendering.model_references import FileReference, printable, refuse_outside
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
@@ -233,7 +233,7 @@ def _remove_cameras_and_lamps() -> None:
         bpy.data.objects.remove(obj)
 
 
-def _read_files(path: Path, references: Sequence[Reference]) -> list[Path]:
+def _read_files(path: Path, references: Sequence[FileReference]) -> list[Path]:
     """Return all files that a model was read from, also missing ones, in order."""
     files = {path, *(reference.path for reference in references)}
     for image in _images():
@@ -242,14 +242,14 @@ def _read_files(path: Path, references: Sequence[Reference]) -> list[Path]:
     return sorted({Path(os.path.relpath(file)) for file in files})
 
 
-def _textures(path: Path, references: Sequence[Reference]) -> Iterator[Reference]:
+def _textures(path: Path, references: Sequence[FileReference]) -> Iterator[FileReference]:
     """Yield the textures that the importer has found: names of an OBJ's materials among them."""
     libraries = [each.path for each in references if each.path.suffix.lower() == ".mtl"]
     for image in _images():
         for file in () if image.packed_files else _image_files(image):
             name = os.fsencode(file.name)
             named_by = (each for each in libraries if each.is_file() and name in each.read_bytes())
-            yield Reference(next(named_by, path), os.path.relpath(file), file)
+            yield FileReference(next(named_by, path), os.path.relpath(file), file)
 
 
 def _images() -> list[Any]:

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.rendering import usd_files
-from lightfield.rendering.model_references import Reference, Survey
+from lightfield.rendering.model_references import FileReference, Survey
 
 
 def check(path: Path) -> None:
@@ -141,7 +141,7 @@ def _hidden_node(path: Path) -> str:
     return ""
 
 
-def _of_gltf(path: Path) -> Iterator[Reference]:
+def _of_gltf(path: Path) -> Iterator[FileReference]:
     """Yield the buffers and images that a glTF file has outside of itself."""
     document = _gltf_document(path)
     try:
@@ -153,7 +153,7 @@ def _of_gltf(path: Path) -> Iterator[Reference]:
         # Blender takes other data addresses for paths.
         if not (address.startswith("data:") and ";base64," in address):
             name = unquote(address.replace("\\", "/"))
-            yield Reference(path, address, Path(os.path.normpath(path.parent / name)))
+            yield FileReference(path, address, Path(os.path.normpath(path.parent / name)))
 
 
 def compressions(path: Path) -> list[str]:
@@ -163,7 +163,7 @@ def compressions(path: Path) -> list[str]:
     return [name for name in names if "_compression" in str(name)]
 
 
-def _of_obj(path: Path) -> Iterator[Reference]:
+def _of_obj(path: Path) -> Iterator[FileReference]:
     """Yield the libraries of materials of an OBJ file."""
     for line in _obj_lines(path):
         words = line.split(None, 1)
@@ -172,11 +172,11 @@ def _of_obj(path: Path) -> Iterator[Reference]:
             if len(name) > 2 and name[0] == name[-1] == '"':
                 name = name[1:-1]
             # Blender puts the folder before an absolute path, too.
-            yield Reference(path, name, Path(os.path.normpath(f"{path.parent}/{name}")))
+            yield FileReference(path, name, Path(os.path.normpath(f"{path.parent}/{name}")))
     # Blender also reads a library with the name of the OBJ.
     library = path.with_suffix(".mtl")
     if library.is_file():
-        yield Reference(path, library.name, library)
+        yield FileReference(path, library.name, library)
 
 
 def _obj_lines(path: Path) -> Iterator[bytes]:

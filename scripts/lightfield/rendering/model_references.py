@@ -8,7 +8,7 @@ from typing import NamedTuple
 from lightfield.core.errors import UserError
 
 
-class Reference(NamedTuple):
+class FileReference(NamedTuple):
     """A file that a model names: where it is named, its name as it stands there, and its path."""
 
     named_by: Path
@@ -19,11 +19,13 @@ class Reference(NamedTuple):
 class Survey(NamedTuple):
     """What a model consists of: the files that it names, and the parts that Blender leaves out."""
 
-    references: list[Reference]
+    references: list[FileReference]
     left_out: list[str]
 
 
-def refuse_outside(model: Path, references: Iterable[Reference], shared_folder: str | None) -> None:
+def refuse_outside(
+    model: Path, references: Iterable[FileReference], shared_folder: str | None
+) -> None:
     """Raise `UserError` if a model names a file that is not in its folder, nor in the shared one.
 
     Subfolders count. Links are followed, so a link in the folder may lead outside. If the model is

@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 _EXTRAS = ("use_border", "use_compositing", "use_freestyle", "use_multiview", "use_sequencer")
 
 
-class _Reader(bpy.types.RenderEngine):  # type: ignore[misc]
+class _GraphReader(bpy.types.RenderEngine):  # type: ignore[misc]
     """A render engine that passes the dependency graph to a function, and makes no picture."""
 
     bl_idname = "PLENOFORGE_READER"
@@ -27,10 +27,10 @@ class _Reader(bpy.types.RenderEngine):  # type: ignore[misc]
     read: ClassVar[Callable[[Any], None]]
 
     def render(self, depsgraph: Any) -> None:
-        _Reader.read(depsgraph)
+        _GraphReader.read(depsgraph)
 
 
-bpy.utils.register_class(_Reader)
+bpy.utils.register_class(_GraphReader)
 
 
 def in_render(read: Callable[[Any], Result]) -> Result:
@@ -39,11 +39,11 @@ def in_render(read: Callable[[Any], Result]) -> Result:
     The result must not refer to the graph, which ends with the render.
     """
     results: list[Result] = []
-    _Reader.read = lambda depsgraph: results.append(read(depsgraph))
+    _GraphReader.read = lambda depsgraph: results.append(read(depsgraph))
     render = bpy.context.scene.render
     with ExitStack() as stack:
         stack.enter_context(_some_camera())
-        stack.enter_context(changed(render, "engine", _Reader.bl_idname))
+        stack.enter_context(changed(render, "engine", _GraphReader.bl_idname))
         for name in _EXTRAS:
             stack.enter_context(changed(render, name, False))
         with quiet():

@@ -43,7 +43,7 @@ from lightfield.workflow.records import ShardRecord
 
 if TYPE_CHECKING:
     from lightfield.rendering.colour_pass import Colour
-    from lightfield.rendering.geometry_pass import Geometry
+    from lightfield.rendering.geometry_pass import ViewGeometry
 
 Array = np.ndarray[Any, Any]
 
@@ -217,7 +217,7 @@ class _Rendered:
     """
 
     colour: "Colour"
-    geometry: "Geometry | None"
+    geometry: "ViewGeometry | None"
     geometry_seconds: float
     unshown_pixels: int | None
 
@@ -345,7 +345,7 @@ def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.A
 
 
 def pass_channels(
-    view_pass: Pass, geometry: "Geometry | None", colour: "Colour", lens: Lens
+    view_pass: Pass, geometry: "ViewGeometry | None", colour: "Colour", lens: Lens
 ) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
     """Return the channels and attributes of the EXR of one of a view's passes.
 

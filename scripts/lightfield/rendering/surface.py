@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.formats.inventory import read_inventory
-from lightfield.geometry.mesh import Mesh, Placed, Surface
+from lightfield.geometry.mesh import Mesh, Placed, SceneSurface
 from lightfield.rendering import blend_file, frames, ids, instances, pruning, volumes
 from lightfield.rendering.ids import has_no_surface
 from lightfield.rendering.render_graph import in_render
@@ -33,7 +33,7 @@ _HAIR = "has hair, which Cycles draws without a mesh"
 _ONLY_VOLUME = "has materials that are only volumes"
 
 
-def surface_of(job: WriteSurface) -> tuple[Surface, int]:
+def surface_of(job: WriteSurface) -> tuple[SceneSurface, int]:
     """Open the .blend of a job. Return the surface that cameras can see, and its frame."""
     settings = job.settings
     path = job.inventory
@@ -50,15 +50,15 @@ def surface_of(job: WriteSurface) -> tuple[Surface, int]:
     return visible_surface(settings.numbered), bpy.context.scene.frame_current
 
 
-def visible_surface(numbered: bool) -> Surface:
+def visible_surface(numbered: bool) -> SceneSurface:
     """Return what cameras can see of the open scene at its frame.
 
     ``numbered`` says whether the objects have the indices of the id passes: see `ids.assign`.
     """
-    return in_render(lambda depsgraph: _Reader(numbered).read(depsgraph))
+    return in_render(lambda depsgraph: _MeshReader(numbered).read(depsgraph))
 
 
-class _Reader:
+class _MeshReader:
     """Collects the meshes of a dependency graph."""
 
     def __init__(self, numbered: bool) -> None:
@@ -71,7 +71,7 @@ class _Reader:
         # The index of each mesh that was read, None if cameras see nothing of it.
         self.index_of: dict[tuple[Any, tuple[bool, ...]], int | None] = {}
 
-    def read(self, depsgraph: Any) -> Surface:
+    def read(self, depsgraph: Any) -> SceneSurface:
         for entry in depsgraph.object_instances:
             obj = entry.object
             if has_no_surface(obj) or not _is_visible(entry):
@@ -118,7 +118,7 @@ class _Reader:
             self.left_out[str(obj.original.name_full)] = _ONLY_VOLUME
         return self.index_of[key]
 
-    def _in_order(self) -> Surface:
+    def _in_order(self) -> SceneSurface:
         """Return the surface with objects in the order of their names, and meshes in theirs."""
         for original, places in self.parts_of_itself.items():
             if len(places) == 1:
@@ -127,7 +127,7 @@ class _Reader:
         placed = sorted(self.placed, key=lambda each: each.name)
         order = list(dict.fromkeys(each.mesh for each in placed))
         new_index = {old: new for new, old in enumerate(order)}
-        return Surface(
+        return SceneSurface(
             [self.meshes[index] for index in order],
             [replace(each, mesh=new_index[each.mesh]) for each in placed],
             dict(sorted(self.left_out.items())),

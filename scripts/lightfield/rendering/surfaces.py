@@ -63,7 +63,7 @@ def set_up(layer: Any, passes: Collection[Pass]) -> None:
             continue
         bsdf = _single_bsdf(output)
         if bsdf is None:
-            _Writer(tree).write(INEXACT, "Value", 1.0)
+            _NodeWriter(tree).write(INEXACT, "Value", 1.0)
         else:
             _write_inputs(bsdf, of_surfaces)
 
@@ -108,7 +108,7 @@ def _single_bsdf(output: Any) -> Any | None:
 
 def _write_inputs(bsdf: Any, passes: Collection[str]) -> None:
     """Write the inputs of a BSDF into the AOVs of ``passes``."""
-    writer = _Writer(bsdf.id_data)
+    writer = _NodeWriter(bsdf.id_data)
     opaque: Any = 1.0
     alpha = _input(bsdf, "Alpha")
     if not isinstance(alpha, float) or alpha < _OPAQUE:
@@ -148,7 +148,7 @@ def _input(bsdf: Any, name: str) -> Any:
     return float(value) if isinstance(value, float) else tuple(value)[:3]
 
 
-class _Writer:
+class _NodeWriter:
     """Adds nodes to a material's or group's node tree. A value is a number or an output socket."""
 
     def __init__(self, tree: Any) -> None:

@@ -14,13 +14,13 @@ import numpy as np
 from lightfield.formats.passes import PARTS_OF_LIGHT, Pass
 from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering.colour_pass import Colour
-from lightfield.rendering.geometry_pass import Geometry, cleared
+from lightfield.rendering.geometry_pass import ViewGeometry, cleared
 from lightfield.rendering.view import Array
 
 
 def left_out(
-    colour: Colour, geometry: Geometry | None, view_passes: Iterable[Pass]
-) -> tuple[Colour, Geometry | None, int]:
+    colour: Colour, geometry: ViewGeometry | None, view_passes: Iterable[Pass]
+) -> tuple[Colour, ViewGeometry | None, int]:
     """Return a view without the surfaces that it does not show, and how many pixels had one.
 
     ``geometry`` has its alpha. Passes of light keep their light.

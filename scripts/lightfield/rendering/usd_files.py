@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.rendering.model_references import Reference, Survey
+from lightfield.rendering.model_references import FileReference, Survey
 
 # The suffixes of files that Blender reads for a USD. Others, such as sounds, affect no pixel.
 _LAYERS = (".usd", ".usda", ".usdc", ".usdz")
@@ -50,7 +50,7 @@ def survey(path: Path) -> Survey:
     Raises `UserError` if the file is broken.
     """
     usd = openusd()
-    references: list[Reference] = []
+    references: list[FileReference] = []
 
     def note(layer: Any, dependency: Any) -> Any:
         # These are the tiles of a texture and the files of value clips.
@@ -76,12 +76,12 @@ def survey(path: Path) -> Survey:
     noted = {reference.path for reference in references}
     for file in {_file(each.realPath) for each in [*layers, *stage.GetUsedLayers()]}:
         if file and Path(file) not in noted:
-            references.append(Reference(path.absolute(), file, Path(file)))
+            references.append(FileReference(path.absolute(), file, Path(file)))
     others = {each for each in references if each.path != path.absolute()}
     return Survey([_from(path.parent, each) for each in sorted(others)], left_out)
 
 
-def _reference(layer: Any, name: str) -> Reference | None:
+def _reference(layer: Any, name: str) -> FileReference | None:
     """Return the reference of a layer to a file that Blender reads. None for anything else.
 
     A name may be an address on a server, which is no file. <UDIM> stands for the tiles of a
@@ -96,7 +96,7 @@ def _reference(layer: Any, name: str) -> Reference | None:
     anchored = usd.Sdf.ComputeAssetPathRelativeToLayer(layer, name)
     # Without ./ before it, a name is also looked for in the working folder.
     path = named_by.parent / _file(str(usd.Ar.GetResolver().Resolve(anchored)) or anchored)
-    return Reference(named_by, name, path)
+    return FileReference(named_by, name, path)
 
 
 def _file(address: str) -> str:
@@ -105,13 +105,13 @@ def _file(address: str) -> str:
     return str(outer)
 
 
-def _from(folder: Path, reference: Reference) -> Reference:
+def _from(folder: Path, reference: FileReference) -> FileReference:
     """Return a reference with paths that begin with the model's folder, as the user names it."""
     named_by, path = (
         Path(os.path.normpath(folder / os.path.relpath(each, folder)))
         for each in (reference.named_by, reference.path)
     )
-    return Reference(named_by, reference.name, path)
+    return FileReference(named_by, reference.name, path)
 
 
 def _composition_errors(path: Path, stage: Any) -> list[str]:

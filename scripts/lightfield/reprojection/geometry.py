@@ -25,7 +25,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Geometry:
+class ReprojectionGeometry:
     """The lens of the views, the images to make of each, and how they are sampled."""
 
     source: Lens
@@ -34,7 +34,7 @@ class Geometry:
     samples: int
 
     @classmethod
-    def of(cls, settings: Reprojection, source: Lens) -> "Geometry":
+    def of(cls, settings: Reprojection, source: Lens) -> "ReprojectionGeometry":
         """Return the geometry of views through the lens ``source``."""
         return cls(source, _targets(settings, source), settings.filter, settings.samples)
 

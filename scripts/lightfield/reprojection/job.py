@@ -21,9 +21,9 @@ from lightfield.formats.sensors import sensor_files
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
-from lightfield.imaging.sensor import Parameters
+from lightfield.imaging.sensor import SensorParameters
 from lightfield.reprojection import lens_map
-from lightfield.reprojection.geometry import Geometry, Target
+from lightfield.reprojection.geometry import ReprojectionGeometry, Target
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.sensor import parameters_of
 from lightfield.stages.lenses import Reproject
@@ -54,7 +54,7 @@ class Light:
     group: str | None = None
 
 
-class Job:
+class ReprojectionJob:
     """The settings that all views of a run share. Errors name the wrong flag or key."""
 
     def __init__(self, stage: Reproject) -> None:
@@ -64,7 +64,7 @@ class Job:
             raise UserError("--settings: formats: must be a list of exr, png, or both")
         self.settings = settings
         self.lightfield, self.source = stage.read()
-        self.geometry = Geometry.of(settings, self.source)
+        self.geometry = ReprojectionGeometry.of(settings, self.source)
         self.targets = self.geometry.targets
         if stage.no_configs and stage.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
@@ -156,7 +156,7 @@ class Job:
         """The positions of the views in lightfield.json, by their names."""
         return {view.name: number for number, view in enumerate(self.lightfield.views)}
 
-    def sensor_parameters(self, view: SourceView, target: Target) -> Parameters | None:
+    def sensor_parameters(self, view: SourceView, target: Target) -> SensorParameters | None:
         """Return the parameters of the sensor for a view's image. None without a sensor."""
         if self.settings.sensor is None:
             return None

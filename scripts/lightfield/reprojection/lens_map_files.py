@@ -3,7 +3,7 @@
 from lightfield.core.files import write_text
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.reprojection import lens_map
-from lightfield.reprojection.geometry import Geometry
+from lightfield.reprojection.geometry import ReprojectionGeometry
 from lightfield.stages.lenses import ComputeLensMap
 
 _UNSEEN = "The source does not see this face.\n"
@@ -12,7 +12,7 @@ _UNSEEN = "The source does not see this face.\n"
 def write(job: ComputeLensMap) -> None:
     """Compute and write the lens maps. A face that the source does not see gets a line of text."""
     _, source = job.read()
-    geometry = Geometry.of(job.settings, source)
+    geometry = ReprojectionGeometry.of(job.settings, source)
     maps = {target.suffix: geometry.compute(target) for target in geometry.targets}
     lens_map.report(list(maps.values()))
     # The workflow cannot tell which faces are seen, so it expects a file for each.

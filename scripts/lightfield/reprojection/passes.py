@@ -15,13 +15,13 @@ from lightfield.imaging.halves import widen
 from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image, write_exr
 from lightfield.reprojection import kernels
 from lightfield.reprojection.colour import resample_colour
-from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.job import ReprojectionJob, SourceView
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.pixels import SourcePixels
 
 
 def write_passes(
-    job: Job,
+    job: ReprojectionJob,
     view: SourceView,
     paths: Mapping[Pass, Path],
     lens_map: LensMap,
@@ -52,7 +52,7 @@ def write_passes(
         job.record.add(path, key)
 
 
-def _read(job: Job, view_pass: Pass, view: SourceView) -> Image:
+def _read(job: ReprojectionJob, view_pass: Pass, view: SourceView) -> Image:
     return read_image(view_pass.path(job.lightfield.folder, view.name), view_pass.channels)
 
 
@@ -72,7 +72,7 @@ class _Balance:
     @classmethod
     def of(
         cls,
-        job: Job,
+        job: ReprojectionJob,
         groups: Sequence[Pass],
         view: SourceView,
         lens_map: LensMap,

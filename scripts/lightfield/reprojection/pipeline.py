@@ -16,7 +16,7 @@ from lightfield.geometry.depth import LARGEST_STEP
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Target
-from lightfield.reprojection.job import Job, Light, SourceView
+from lightfield.reprojection.job import Light, ReprojectionJob, SourceView
 from lightfield.reprojection.passes import write_passes
 from lightfield.reprojection.pixels import SourcePixels, write
 from lightfield.stages.lenses import Reproject
@@ -24,7 +24,7 @@ from lightfield.stages.lenses import Reproject
 
 def run(stage: Reproject) -> None:
     """Reproject the chosen views. Raises `UserError` with the number of views that failed."""
-    job = Job(stage)
+    job = ReprojectionJob(stage)
     views = [] if stage.dry_run else job.views()
     _check_apart(job, views)
     if stage.output_cfg:
@@ -63,7 +63,7 @@ def run(stage: Reproject) -> None:
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
 
-def _check_apart(job: Job, views: list[SourceView]) -> None:
+def _check_apart(job: ReprojectionJob, views: list[SourceView]) -> None:
     """Raise `UserError` if an output would replace an input, even through another path."""
     if job.stage.output_cfg and job.stage.input_cfg:
         keep_apart("--output-cfg", job.stage.output_cfg, job.stage.input_cfg)
@@ -79,7 +79,7 @@ def _check_apart(job: Job, views: list[SourceView]) -> None:
                     )
 
 
-def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
+def _results(job: ReprojectionJob, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
     """Yield each view with its files, or with the error that stopped it."""
     with ThreadPoolExecutor(max(1, job.stage.parallel)) as pool:
         futures = {pool.submit(_reproject_view, job, view): view for view in views}
@@ -90,7 +90,7 @@ def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, An
             yield futures[future], error or future.result()
 
 
-def _reproject_view(job: Job, view: SourceView) -> list[Path]:
+def _reproject_view(job: ReprojectionJob, view: SourceView) -> list[Path]:
     """Make a view's missing or outdated files. Return all of its files."""
     stage = job.stage
     paths_of_view: list[Path] = []
@@ -116,7 +116,7 @@ def _reproject_view(job: Job, view: SourceView) -> list[Path]:
     return paths_of_view
 
 
-def _check(job: Job, view: SourceView) -> None:
+def _check(job: ReprojectionJob, view: SourceView) -> None:
     """Raise `UserError` for a source whose bytes differ from its record."""
     for path in job.sources(view):
         expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")

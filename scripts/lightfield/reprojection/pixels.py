@@ -25,12 +25,12 @@ from lightfield.imaging.images import (
     write_png,
 )
 from lightfield.imaging.primaries import PRIMARIES, are_rec_709, from_rec_709, to_rec_709
-from lightfield.imaging.sensor import Parameters, Sensed, sense
+from lightfield.imaging.sensor import Sensed, SensorParameters, sense
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.geometry import Target
-from lightfield.reprojection.job import Job, Light, SourceView
+from lightfield.reprojection.job import Light, ReprojectionJob, SourceView
 from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
@@ -59,7 +59,7 @@ class SourcePixels:
     """The part of a view's pixels that its targets need, linear and in float32."""
 
     def __init__(
-        self, job: Job, view: SourceView, windows: list[tuple[int, int, int, int]]
+        self, job: ReprojectionJob, view: SourceView, windows: list[tuple[int, int, int, int]]
     ) -> None:
         low = np.min(windows, axis=0)
         high = np.max(windows, axis=0)
@@ -91,7 +91,7 @@ class SourcePixels:
         # Pixels without a source stay so.
         self.colour[..., :3] = np.where(np.isnan(self.colour[..., :3]), np.nan, total)
 
-    def _read(self, job: Job, path: Path) -> _Face:
+    def _read(self, job: ReprojectionJob, path: Path) -> _Face:
         lens = job.source.face if isinstance(job.source, CubeMap) else job.source
         header = read_header(path)
         _check_size(path, header, lens)
@@ -160,7 +160,7 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
 
 
 def write(
-    job: Job,
+    job: ReprojectionJob,
     view: SourceView,
     target: Target,
     light: Light,
@@ -223,12 +223,12 @@ class _Image:
 
 
 def _developed(
-    job: Job,
+    job: ReprojectionJob,
     target: Target,
     lens_map: LensMap,
     source: SourcePixels,
     outputs: Mapping[str, Path],
-    parameters: Parameters | None,
+    parameters: SensorParameters | None,
 ) -> _Image:
     """Resample a view, and develop its colour for those ``outputs`` that hold colour.
 
@@ -274,7 +274,7 @@ def _developed(
     return _Image(half, pixels, covered, depth, empty, transparent)
 
 
-def _sensed(light: Array, empty: Array, parameters: Parameters, with_weights: bool) -> Sensed:
+def _sensed(light: Array, empty: Array, parameters: SensorParameters, with_weights: bool) -> Sensed:
     """Return light as a sensor sees it. Pixels without a source are 0."""
     sensed = sense(light, parameters, with_weights)
     for pixels in (sensed.pixels, sensed.clipped, sensed.weights):
@@ -284,7 +284,7 @@ def _sensed(light: Array, empty: Array, parameters: Parameters, with_weights: bo
 
 
 def _write_of_sensor(
-    kind: str, path: Path, sensed: Sensed, parameters: Parameters, key: str
+    kind: str, path: Path, sensed: Sensed, parameters: SensorParameters, key: str
 ) -> None:
     """Write a file that lies beside the PNG of a sensor."""
     match kind:
@@ -333,7 +333,7 @@ def _write_depth(path: Path, image: _Image, scale: float, key: str) -> int:
 
 
 def _resampled(
-    job: Job, lens_map: LensMap, source: SourcePixels, as_z: bool
+    job: ReprojectionJob, lens_map: LensMap, source: SourcePixels, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
     """Return the target's colour, in strips, and its depth in the source's precision."""
     colour, depth = source.window(lens_map)

@@ -15,12 +15,12 @@ from lightfield.formats.sensors import (
     SensorSettings,
     Varied,
 )
-from lightfield.imaging.sensor import Parameters
+from lightfield.imaging.sensor import SensorParameters
 
 
 def parameters_of(
     settings: SensorSettings, index: int, name: str, face: str = "", frame: int = 0
-) -> Parameters:
+) -> SensorParameters:
     """Return the parameters of the view ``name``, number ``index`` of its lightfield.json.
 
     They depend on nothing else, so they are the same in any shard and order. ``face`` is the suffix
@@ -41,7 +41,7 @@ def parameters_of(
         colour = settings.colour
     noise = settings.noise
     vignetting = settings.vignetting.channels if settings.vignetting else ((0.0,) * 5,) * CHANNELS
-    return Parameters(
+    return SensorParameters(
         exposure=exposure + (settings.bracket or 0.0),
         vignetting=vignetting,
         colour=tuple(colour),

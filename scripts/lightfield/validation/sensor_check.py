@@ -7,7 +7,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.formats.layout import ImageSet, rendered, source_view
 from lightfield.formats.sensors import parameter_file
-from lightfield.imaging.sensor import Parameters
+from lightfield.imaging.sensor import SensorParameters
 from lightfield.reprojection.sensor import parameters_of
 from lightfield.validation.result import Check
 
@@ -32,7 +32,7 @@ def _fault(path: Path, source: ImageSet | None, image_set: ImageSet, view: str) 
     if not path.is_file():
         return "is missing"
     try:
-        parameters = Parameters.from_json(read_json(path))
+        parameters = SensorParameters.from_json(read_json(path))
     except UserError as error:
         return str(error).removeprefix(f"{path}: ")
     number = source_view(source, view)

@@ -5,11 +5,11 @@ from typing import Literal
 
 import numpy as np
 
-from lightfield.geometry.rigs.grid import Box, Cell, axis, grid, quads
+from lightfield.geometry.rigs.grid import BoxGrid, Cell, axis, grid, quads
 from lightfield.geometry.rigs.rig import UnitPoses, stack
 
 
-class Cuboid(Box):
+class Cuboid(BoxGrid):
     type: Literal["cuboid"]
 
     @staticmethod

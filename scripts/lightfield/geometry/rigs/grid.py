@@ -72,7 +72,7 @@ class Grid(Rig):
         return tuple(counts)
 
 
-class Box(Grid):
+class BoxGrid(Grid):
     shape = "CUBOID"
     fewest = (2, 2, 2)
 
