@@ -1201,7 +1201,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
 def test_only_an_earlier_export_is_replaced(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     (folder / "export.json").unlink()
-    with pytest.raises(UserError, match=r"perspective: holds poses.csv, which is of no export"):
+    with pytest.raises(UserError, match=r"perspective: holds poses.csv, which no export wrote"):
         exported(dataset, "poses_csv", "perspective", tmp_path)
     assert (folder / "poses.csv").is_file()
 
@@ -1209,7 +1209,7 @@ def test_only_an_earlier_export_is_replaced(dataset, tmp_path):
 def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
     (folder / "thesis.txt").write_text("years of work")
-    with pytest.raises(UserError, match=r"perspective: holds thesis.txt, which is of no export"):
+    with pytest.raises(UserError, match=r"perspective: holds thesis.txt, which no export wrote"):
         exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
     assert (folder / "thesis.txt").is_file()
     (folder / "thesis.txt").unlink()
@@ -1325,5 +1325,5 @@ def test_the_first_point_in_each_voxel_is_kept(size):
 
 def test_views_of_another_lens_do_not_test(dataset):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
-    with pytest.raises(UserError, match="camera: is not the same as that of"):
+    with pytest.raises(UserError, match="camera: must be the same as in"):
         _ = source.lightfield

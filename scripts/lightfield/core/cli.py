@@ -1,4 +1,4 @@
-"""What programs in scripts/ share: how they end, and --views."""
+"""Functions that programs in scripts/ share: how they exit, and the flag --views."""
 
 import atexit
 import gc
@@ -12,8 +12,8 @@ from lightfield.core.disk_space import REMEDIES, write_problem
 from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import read_problem
 
-# Imports make many objects that are never garbage. To go through them takes a tenth of the time of
-# --help. So Python rarely looks for garbage from here on, and not once more before it ends.
+# Imports make many objects that are never garbage. Searching them takes a tenth of the time of
+# --help. So Python rarely collects garbage from here on, and never at its exit.
 gc.set_threshold(100_000)
 atexit.register(gc.freeze)
 

@@ -45,7 +45,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     Numba's own cache first loads all types and functions that numba can compile. That takes longer
     than anything else, and only compiling needs them. It also mixes up the kernels of two processes
-    that save them at the same time: its index then names the machine code of other arguments.
+    that save them at the same time. Its index then names the machine code of other arguments.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -73,7 +73,7 @@ def kernel(function: _F) -> _F:
     a kernel calls in the kernel's file.
     """
     dispatcher = numba.njit(**_OPTIONS)(function)
-    # What the option `cache` does, with numba's own cache.
+    # Numba's option `cache` does the same with numba's own cache.
     dispatcher._cache = _Cache(function)
     return cast(_F, dispatcher)
 

@@ -39,7 +39,7 @@ REMEDIES = {
 
 @dataclass(frozen=True)
 class Need:
-    """What a run writes below a folder: ``size`` bytes, in as many ``files``."""
+    """The space that a run needs below a folder: ``size`` bytes, in ``files`` files."""
 
     folder: Path
     size: float

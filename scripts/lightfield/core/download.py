@@ -104,7 +104,7 @@ def _receive(answer: Any, part: Path, received: int) -> str | None:
 
 
 def _first_byte(answer: Any) -> int | None:
-    """Return the position in the file of a partial answer's first byte. None if it is not said."""
+    """Return the position in the file of a partial answer's first byte. None if it is missing."""
     match = re.match(r"bytes (\d+)-", answer.headers.get("Content-Range") or "")
     return int(match[1]) if match else None
 

@@ -242,7 +242,7 @@ def locked(path: Path) -> Iterator[None]:
 
 @contextmanager
 def locked_folder(folder: Path | str) -> Iterator[None]:
-    """Hold the lock of a folder. Some network file systems cannot lock folders: then do not."""
+    """Hold the lock of a folder. Do nothing on network file systems that cannot lock folders."""
     lock = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):

@@ -1,10 +1,10 @@
-"""The program of a stage: its flags follow from the fields of the stage and of its settings.
+"""Makes the program of a stage. Its flags follow from the fields of the stage and its settings.
 
 A field may have these keys in its ``json_schema_extra``: ``short``, a list of short flags;
 ``flag``, in place of the field's name; ``metavar``; ``positional``; ``commas``, for a list in one
 word; and ``may_be_empty``: the flag without a value means an empty list, or None. A flag of a list
 may be given again, for more values. A list of tuples takes one tuple each time. ``group`` is a
-title in --help. Of all flags with the same ``one_of``, only one may be given.
+title in --help. A command line may have only one of the flags with the same ``one_of``.
 """
 
 import argparse
@@ -70,7 +70,7 @@ def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.Argu
 
 
 class _Groups:
-    """The groups of a parser's flags, by their titles. ``default`` has those without."""
+    """A parser's groups of flags, by their titles. ``default`` has the flags without a title."""
 
     def __init__(self, parser: argparse.ArgumentParser) -> None:
         self.parser = parser
@@ -92,7 +92,7 @@ class _Groups:
 
 
 def _settings(stage: type[Stage[Any]], own: dict[str, Any], flags: dict[str, Any]) -> Any:
-    """Return a job's settings: those of the file, or those that ``flags`` give."""
+    """Return a job's settings, from its settings file or from ``flags``."""
     model = stage.settings_model(**own)
     if "settings" in own:
         for name in flags:

@@ -30,7 +30,7 @@ class Gpu:
 
 
 def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
-    """Return the GPUs that this process sees: those that its environment allows, or all."""
+    """Return the GPUs that this process sees: all, or only the GPUs that its environment allows."""
     gpus = []
     for variable, all_ids in ((CUDA, _nvidia), (HIP, _amd)):
         allowed = environment.get(variable)

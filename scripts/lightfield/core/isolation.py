@@ -1,8 +1,8 @@
 """Isolates programs from the user's environment, so that it changes no byte of their output.
 
 Some variables act when Python starts, and some when a library is loaded. Blender reads colours,
-start-up scripts and add-ons from the user's home. So a program that finds any of that first starts
-itself anew in an environment without it. It keeps its process and its arguments.
+start-up scripts and add-ons from the user's home. So a program that finds any of these restarts
+itself in a clean environment. It keeps its process and its arguments.
 """
 
 import os
@@ -41,7 +41,7 @@ _REMOVED = (
     "LD_PRELOAD",
     "LD_AUDIT",
 )
-# Variables with these prefixes that only change printing, and the places of compiled files.
+# Exceptions: these variables change only what is printed, or where compiled files lie.
 _HARMLESS = {
     "PYTHONDONTWRITEBYTECODE",
     "PYTHONIOENCODING",
@@ -97,7 +97,7 @@ def _harmless_folders(library_path: str) -> str:
     """Remove the folders that hold a library which a Python package brings itself.
 
     The loader would prefer the folder's library to the package's. On a cluster this may be another
-    version of TBB or of the denoiser. The remaining folders may be needed by Python or a GPU.
+    version of TBB or of the denoiser. Python or a GPU may need the remaining folders.
     """
     if not library_path:
         return ""

@@ -1,8 +1,9 @@
 """Describes a machine. Processors of machines with equal descriptions write the same bytes.
 
-Cycles and Embree use other kernels on processors without AVX2. The denoiser uses others on those
-with AVX-512. Embree builds on approximate reciprocals, which differ between makers of processors.
-C libraries round sines and powers differently. All of this changes last digits.
+Cycles and Embree use other kernels on processors without AVX2. The denoiser uses others on
+processors with AVX-512. Embree builds on approximate reciprocals, which differ between makers of
+processors. C libraries round sines and powers differently. All of this changes the last digits of
+results.
 """
 
 import platform

@@ -1,4 +1,4 @@
-"""Returns how much memory processes may use on this machine, and how much this one has used."""
+"""Measures how much memory processes may use on this machine, and how much this one has used."""
 
 import resource
 import sys

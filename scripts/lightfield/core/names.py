@@ -14,12 +14,12 @@ SPLITS = "splits.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 
-# What the programs' flags --inventory are for.
+# The help of all flags --inventory.
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 # The formats of model files that scripts/import_model.py reads.
 MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")
-# Those of them that do not say which axis points up, with the usual axis.
+# The usual up axis of formats whose files do not say which axis points up.
 UP = {".obj": "y", ".ply": "z", ".stl": "z"}
 SOFTBOXES = "softboxes"
 # The lights of a model: lamps, or an environment that ships with bpy.

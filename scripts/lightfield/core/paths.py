@@ -23,7 +23,7 @@ def files_below(folder: Path, *, strict: bool = True) -> Iterator[Path]:
 
 
 def _files_below(folder: Path, real_folders: list[Path], strict: bool) -> Iterator[Path]:
-    """Yield the files below a folder. ``real_folders`` are it and those above it, without links."""
+    """Yield the files below a folder. ``real_folders`` are it and its parents, without links."""
     try:
         with os.scandir(folder) as listing:
             entries = sorted(listing, key=lambda entry: entry.name)
@@ -67,7 +67,7 @@ def link_above(folder: Path, name: str) -> str | None:
 def stray_places(
     folder: Path, strays: Iterable[str], own_files: Iterable[str], own_folders: Iterable[str] = ()
 ) -> list[str]:
-    """Return the ``strays`` in a folder, each behind a foreign link as that link.
+    """Return the ``strays`` in a folder. A foreign link stands for all strays behind it.
 
     A link is foreign if none of ``own_files`` lies behind it, and if it is none of ``own_folders``.
     """

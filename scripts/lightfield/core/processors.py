@@ -1,4 +1,4 @@
-"""How many of the machine's processors this process uses."""
+"""Counts the processors that this process may use, and limits the threads of libraries."""
 
 import os
 from collections.abc import Iterator
@@ -31,7 +31,8 @@ def only(count: int) -> Iterator[None]:
     try:
         yield
     finally:
-        # Afterwards all threads, also those that were started, may use all processors.
+        # Afterwards all threads may use all processors, including the threads that were just
+        # started.
         for thread in Path("/proc/self/task").iterdir():
             # The thread may have ended in the meantime.
             with suppress(ProcessLookupError):

@@ -65,7 +65,7 @@ class Settings(BaseModel):
         return cls(**{key: value for key, value in values.items() if value is not None})
 
     def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
-        """Return the content of a settings file: all keys with a value, or those in ``keys``."""
+        """Return the content of a settings file: all keys with a value, or the keys in ``keys``."""
         return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 

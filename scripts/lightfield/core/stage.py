@@ -10,8 +10,9 @@ of a run, such as the number of threads. Its settings decide what it writes, and
 
         output: Path = writes(".blend to write")
 
-From the class follow the program with its flags (`lightfield.core.flags`), the page of the
-reference, the settings file that a rule hands it, and the same stage of a family's member.
+The class determines the program with its flags (`lightfield.core.flags`) and its page of the
+reference. It also determines the settings file that a rule writes, and the stage of a family's
+member.
 """
 
 import importlib
@@ -26,7 +27,7 @@ from lightfield.core.settings import Settings
 
 
 class NoSettings(Settings):
-    """The settings of a stage whose files say everything."""
+    """The settings of a stage whose results depend on its files alone."""
 
 
 StageSettings = TypeVar("StageSettings", bound=Settings)
@@ -46,16 +47,17 @@ class ByHand(BaseModel):
 
 
 class Stage(BaseModel, Generic[StageSettings]):
-    """A job of a stage: `run` does it."""
+    """A job of a stage: its files, settings and options. `run` does the work."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, allow_inf_nan=False)
 
     # The name of the program in scripts/.
     name: ClassVar[str]
-    # Does the work: "module:function". It takes the stage. Imported only then, because a program's
-    # --help need not wait for it.
+    # The function that does the work, as "module:function". It takes the stage. `run` imports it,
+    # so that --help does not wait for the import.
     function: ClassVar[str]
-    # Part of the keys of what the stage writes. A higher number makes everybody's results again.
+    # Part of the keys of what the stage writes. Raise it if equal settings give other results:
+    # everybody's jobs then run again.
     version: ClassVar[int]
     # The model whose fields are flags in place of a settings file.
     by_hand: ClassVar[type[Settings] | type[ByHand] | None] = None
@@ -74,7 +76,7 @@ class Stage(BaseModel, Generic[StageSettings]):
 
 
 class PlainStage(Stage[NoSettings]):
-    """A stage without settings: its files and options say everything."""
+    """A stage without settings: its results depend on its files alone."""
 
     settings: NoSettings = NoSettings()
 
@@ -93,7 +95,7 @@ def writes(text: str, default: Any = ..., **flag: Any) -> Any:
 
 
 def option(text: str, default: Any = ..., **flag: Any) -> Any:
-    """Return a field for what does not change what a stage writes, as `reads` does."""
+    """Return a field for an option that does not change what a stage writes, as `reads` does."""
     return _field("option", text, default, flag)
 
 

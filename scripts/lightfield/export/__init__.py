@@ -53,7 +53,7 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
 
 
 def source_of(name: str, settings: ExportSettings[Any], dataset: Path) -> Source:
-    """Return what an export of a ``dataset``'s folder reads. For a sequence, it is the rig's."""
+    """Return the views for an export of the folder ``dataset``. For a sequence, it is the rig's."""
     options = settings.options
     development = {
         key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
@@ -117,7 +117,7 @@ def _check_replaceable(folder: Path) -> None:
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
         if name not in exported and not path.is_dir():
-            raise UserError(f"{folder}: holds {name}, which is of no export; give another folder")
+            raise UserError(f"{folder}: holds {name}, which no export wrote; give another folder")
 
 
 def transforms(folder: Path) -> list[Path]:

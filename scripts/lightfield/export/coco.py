@@ -1,8 +1,8 @@
 """Writes the boxes of objects in each view as COCO's list of instances.
 
 ``instances.json`` has an image for each view, and a category for each object of the scene. Each
-object or instance that a view shows has an annotation. Boxes are exact: those of the pixels in the
-passes ``object`` and ``instance``. What hides an object is not in its box.
+object or instance that a view shows has an annotation. A box encloses exactly the pixels that show
+the object in the passes ``object`` and ``instance``. Hidden parts of the object do not count.
 Source: "Data format" of the COCO dataset.
 """
 

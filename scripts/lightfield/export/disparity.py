@@ -43,8 +43,8 @@ def levels(
 ) -> NDArray[np.uint16]:
     """Return normalised disparity in integers of ``bits`` bits, 0 where depth is unknown.
 
-    It is (1 / depth − 1 / far) / (1 / near − 1 / far), 0 to 1, of the ``limits`` near and far. What
-    is known has the level ``lowest`` at least.
+    It is (1 / depth − 1 / far) / (1 / near − 1 / far), 0 to 1, of the ``limits`` near and far.
+    Known depths have at least the level ``lowest``.
     """
     near, far = limits
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,8 +1,8 @@
 """Writes a sequence as D-NeRF's scenes: RGBA pictures with a time, and a list for each part.
 
-``transforms_train.json``, ``_val`` and ``_test`` are those of NeRF's synthetic scenes. Each frame
-has ``time``, from 0 for the first frame of the animation to 1 for the last. All views of a frame of
-the animation come before those of the next, because D-NeRF wants a list to begin at time 0.
+``transforms_train.json``, ``_val`` and ``_test`` have the keys of NeRF's synthetic scenes. Each
+frame has ``time``, from 0 for the first frame of the animation to 1 for the last. All views of one
+frame come before all views of the next, because D-NeRF wants a list to begin at time 0.
 ``fused.ply`` has points of the first frame, from which 4DGaussians starts. Sources: D-NeRF's
 load_blender.py, and dataset_readers.py of 4DGaussians.
 """
@@ -36,7 +36,7 @@ def export(source: SourceSequence, settings: Dnerf, folder: Path) -> None:
     for frame, time in zip(source.frames, source.times, strict=True):
         parts = splits(frame.lightfield)
         entries: dict[str, dict[str, Any]] = {}
-        # Without views for validation, those that test validate, too.
+        # Without validation views, the test views validate, too.
         by_list = {"train": parts.train, "test": parts.test, "val": parts.validation}
         for part, views in by_list.items():
             for view in views:

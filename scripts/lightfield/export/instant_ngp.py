@@ -117,7 +117,7 @@ class _TransformsWriter:
             keep_apart("--depth-dir", self.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
-        """Return scale and offset: those of the settings, or fitted to depth, or to the rig."""
+        """Return scale and offset from the settings, or fit them to depth, or to the rig."""
         if self.trained_by:
             training = read_json(self.trained_by)
             try:

@@ -36,7 +36,8 @@ from lightfield.imaging import images
 POINT_CLOUD = "points.ply"
 MOST = np.iinfo(np.uint16).max
 
-# From Blender's camera (y up, looks along −z) to that of normals (y down, looks along z).
+# From the axes of Blender's camera (y up, looks along −z) to the axes of normals (y down, looks
+# along z).
 _FLIP = np.array([1.0, -1.0, -1.0])
 
 

@@ -24,7 +24,7 @@ _STEP = 4
 
 
 def depths(lens: Rectilinear, view: View, surface: ViewSurface) -> Floats:
-    """Return the Z of those points of a surface that are in a view's frame."""
+    """Return the Z of the points of a surface that are in a view's frame."""
     points = surface.points(_STEP)[0]
     local = (points - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
     inside = pixel_indices(lens, local)[2]
@@ -48,7 +48,7 @@ def _row(lens: Rectilinear, view: View, seen_depths: Floats) -> Floats:
     """Return a camera's 17 numbers. ``seen_depths`` (n,) are the Z that it sees."""
     right, up, back, position = view.world_from_camera[:3].T
     size = np.array([lens.height, lens.width, cameras.focal_pixels(lens)[0]])
-    # A camera that sees nothing has any bounds.
+    # A camera that sees nothing may have any bounds.
     bounds = [0.1, 100.0]
     if len(seen_depths):
         bounds = np.percentile(seen_depths, [_OUTLIERS, 100 - _OUTLIERS]).tolist()

@@ -40,7 +40,7 @@ GLB = "scene.glb"
 PLY = "scene.ply"
 _OBJECTS = "objects.json"
 
-# Numbers in objects.json end at this many digits after the point, which is a nanometre.
+# Numbers in objects.json have this many digits after the point: the last is a nanometre.
 _DIGITS = 9
 # Axes whose cosine is smaller are perpendicular.
 _PERPENDICULAR = 1e-6

@@ -2,8 +2,8 @@
 
 - ``sequence.json``: the cameras.
 - ``<name>_texture_<W>x<H>_yuv420p10le.yuv``: colour, for each camera.
-- ``<name>_depth_<W>x<H>_yuv420p16le.yuv``: normalised disparity, for each camera. It is that of Z
-  for perspective views, and of distance for panoramas. Level 0 means none.
+- ``<name>_depth_<W>x<H>_yuv420p16le.yuv``: normalised disparity, for each camera. It is computed
+  from Z for perspective views, and from distance for panoramas. Level 0 means none.
 
 Axes are OMAF's: x forward, y left, z up. A rotation is yaw, pitch and roll in degrees. Source:
 TMIV's sequence configurations.

@@ -16,7 +16,7 @@ exposed a second after the one before, in microseconds.
 - A moving camera's takes half a second. The camera has poses at its start, middle and end, whose
   times are ``exposure_us`` of the frame. NCore's readers use the pose at the frame's start time for
   all rows. So the frame is the exposure's middle.
-- With a rolling shutter, the frame lasts from the time of the first row to that of the last.
+- With a rolling shutter, the frame lasts from the first row's time to the last row's time.
 
 Source: NCore's data/v4/components.py, data/types.py and sensors/camera.py, and gsplat's
 datasets/ncore.py.

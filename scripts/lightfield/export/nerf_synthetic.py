@@ -28,7 +28,7 @@ def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None
     angle = 2 * math.atan(lens.width / 2 / cameras.focal_pixels(lens)[0])
     parts = splits(source.lightfield)
     progress = Progress(len(source.lightfield.views), "nerf_synthetic", "views")
-    # Write the pictures of test before val: without views of its own, val lists those of test.
+    # Write the test pictures before val: without validation views, val lists the test pictures.
     lists = {"train": parts.train, "test": parts.test, "val": parts.validation}
     frames: dict[str, Any] = {}
     for part, part_views in lists.items():

@@ -5,7 +5,7 @@
 - ``images/``: the views.
 - ``masks/``: 0 means ignored. Either all frames have a mask, or none.
 - ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
-  for all others, whose rays have unit length in nerfstudio. 0 for none, and beyond 65.535 m: the
+  for all others, whose rays have unit length in nerfstudio. 0 for none, and beyond 65.535 m. The
   unit is an option of nerfstudio's parser, which no file can set.
 - ``points.ply``: a point cloud.
 

@@ -12,7 +12,7 @@ from lightfield.core.progress import Progress
 from lightfield.export.source import Floats, SourceDataset, ViewSurface, pixel_indices
 from lightfield.formats.lightfield import View
 
-# This many candidates are lifted for each point. An even selection of them is kept.
+# Lift this many candidates for each point, and keep an even selection of them.
 _CANDIDATES = 8
 # Integers up to this size are exact as floats.
 _LARGEST_INTEGER = 2**53
@@ -82,7 +82,7 @@ def _points_of(source: SourceDataset, view: View, surface: ViewSurface, step: in
 
 
 def observations(source: SourceDataset, points: Points) -> list[Observations]:
-    """Return the points that each view sees: those in its frame that no surface hides."""
+    """Return the points that each view sees: points in its frame that no surface hides."""
     seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):

@@ -39,9 +39,9 @@ class SourceSequence:
     ) -> "SourceSequence":
         """Return the sequence in the ``folders`` of a rig's folder, such as f00001.
 
-        ``beside`` are the folders of the rigs whose views test these. The other values are those of
-        `SourceDataset`. Raises `UserError` for a sequence with fewer than two frames, and if a
-        frame has another lens or other views than the first.
+        ``beside`` are the folders of the rigs whose views test these. The other arguments are
+        fields of `SourceDataset`. Raises `UserError` for a sequence with fewer than two frames, and
+        if a frame has another lens or other views than the first.
         """
         if len(folders) < 2:
             raise UserError(f"{rig}: has {len(folders)} frames; a sequence must have at least two")
@@ -103,9 +103,9 @@ class SourceSequence:
                 )
 
     def numbered(self) -> "SourceSequence":
-        """Return the sequence with views named cam00, cam01 and so on, of which cam00 tests.
+        """Return the sequence with views named cam00, cam01 and so on. cam00 is the test view.
 
-        cam00 is the first test view of the rig's split, and the others are those that train.
+        cam00 is the first test view of the rig's split, and the others are its training views.
         Without a split, cam00 is the first view by name.
         """
         views: list[View] = sorted(self.lightfield.views, key=lambda view: view.name)

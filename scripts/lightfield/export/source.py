@@ -24,17 +24,17 @@ from lightfield.imaging import images
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Two distances belong to the same surface if they differ by less than this part. One is that of a
-# pixel's centre, the other that of a point anywhere in the pixel.
+# Two distances belong to the same surface if they differ by less than this part. One belongs to a
+# pixel's centre, the other to a point anywhere in the pixel.
 SAME_SURFACE = 0.01
 
 
 @dataclass(frozen=True)
 class SourceDataset:
-    """The views of a dataset: the rendered ones (``name`` ""), or those of a reprojection.
+    """The rendered views of a dataset (``name`` ""), or the views of one of its reprojections.
 
-    - ``beside``: the datasets of other rigs, by the rigs' names. Their views are test views for
-      these. Their names begin with the rig's name: spiral_view_0000f.
+    - ``beside``: the datasets of other rigs, by the rigs' names. Their views become test views,
+      whose names begin with the rig's name: spiral_view_0000f.
     - ``renamed``: if there are any, only these views in this order: new names and the views'.
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
@@ -69,9 +69,7 @@ class SourceDataset:
         for rig, folder in self.beside.items():
             other = LightField.read(folder / name / NAME)
             if other.lens != lightfield.lens:
-                raise UserError(
-                    f"{other.path}: camera: is not the same as that of {lightfield.path}"
-                )
+                raise UserError(f"{other.path}: camera: must be the same as in {lightfield.path}")
             views += [replace(view, name=f"{rig}_{view.name}") for view in other.views]
         return lightfield.changed(views=views)
 
@@ -203,7 +201,7 @@ class SourceDataset:
         return self.lens.pixel_rays()
 
     def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "ViewSurface"]]:
-        """Yield each view with the surface that it sees: that of its rendered view."""
+        """Yield each view with the surface that it sees, from the depth of its rendered view."""
         if self.rendered.depth is None:
             raise UserError(
                 f"{self.rendered.path}: depth: is null; points need it (render.depth in the YAML)"
@@ -231,8 +229,8 @@ class ViewSurface:
     def points(self, step: int) -> tuple[Floats, Floats]:
         """Return the world points (n, 3) at every ``step``-th pixel, and their normals (n, 3).
 
-        A normal is that of the plane through the point and its neighbours to the right and below.
-        It points to the camera. NaN at the rim, and where a neighbour is on another surface.
+        A normal is perpendicular to the plane through the point and its neighbours to the right and
+        below. It points to the camera. NaN at the rim, and where a neighbour is on another surface.
         """
         first = step // 2
         part = np.s_[first::step, first::step]
@@ -300,8 +298,8 @@ class DepthMaps:
 def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
     """Return a view's depth (h, w) in metres, as "z" or "distance". NaN where there is no ray.
 
-    ``rays`` (h, w, 3) are those of the pixels. Raises `UserError` for a view of another size, and
-    if neither its header nor lightfield.json says what channel Z means.
+    ``rays`` (h, w, 3) are the pixels' rays. Raises `UserError` for a view of another size, and if
+    neither its header nor lightfield.json says what channel Z means.
     """
     image = images.read_image(path, ["Z"])
     check_size(path, lightfield, image.channels["Z"])

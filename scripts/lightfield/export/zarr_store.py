@@ -125,7 +125,7 @@ def _cbor(value: Any) -> bytes:
     if isinstance(value, dict):
         pairs = (_cbor(key) + _cbor(entry) for key, entry in value.items())
         return _cbor_head(_MAP, len(value)) + b"".join(pairs)
-    raise TypeError(f"CBOR: {type(value).__name__} is not of JSON")
+    raise TypeError(f"CBOR: {type(value).__name__} is not a type of JSON")
 
 
 def _cbor_head(kind: int, number: int) -> bytes:

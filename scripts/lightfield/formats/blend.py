@@ -1,4 +1,4 @@
-"""The settings that a dataset takes from a user's .blend, and notes on what it takes and ignores.
+"""The settings that a dataset takes from a user's .blend, and notes on taken and ignored ones.
 
 The scene's inventory describes the .blend. Its key ``blend`` has what `lightfield.rendering`'s
 ``blend_facts`` read. Its key ``missing`` has the files that the .blend lacks.
@@ -97,7 +97,7 @@ def followed_camera(blend: Settings, choice: str | None) -> str | None:
     ``choice`` is the key of the scene YAML. Return None if no view depends on the choice.
     """
     followers = blend["followers"]
-    # What names the file's camera follows that one, unless something is done.
+    # Objects that name the file's camera follow it, unless the choice is "view".
     needs_choice = followers["active"] or (choice == "view" and followers["by_name"])
     return choice or "file" if needs_choice else None
 

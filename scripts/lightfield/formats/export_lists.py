@@ -40,7 +40,7 @@ def _pictures_of_transforms(path: Path) -> list[str]:
         raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
-# The exports with a folder of their own. Those of a sequence are in the rig's folder.
+# The exports with a folder of their own. Exports of a sequence are in the rig's folder.
 IN_FOLDERS = Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=files_of)
 MANIFESTS = [
     # instant-ngp's files lie beside the views.

@@ -24,7 +24,7 @@ class _ExternalFile(TypedDict, total=False):
 
 
 class _Inventory(TypedDict, total=False):
-    """The keys that programs read. Each program names the keys that it needs."""
+    """The keys that programs read. Each program says which keys it needs."""
 
     __pydantic_config__ = ConfigDict(strict=True)  # type: ignore[misc]
 

@@ -42,7 +42,7 @@ class Manifest:
     - ``lists``: a glob pattern for the export's lists, which lie beside a lightfield.json.
     - ``pictures``: reads a list, and returns the paths of its images, relative to the list. They
       have the size of the views. Raises `UserError` for a file that is no such list.
-    - ``beside``: names with ``{view}`` of images that may lie beside the views and beside those
+    - ``beside``: names with ``{view}`` of images that may lie beside the views and beside these
       pictures. They have the same size.
     - ``files``: returns the SHA-256 of every file of the export, if its list has them.
     """
@@ -57,7 +57,7 @@ class Manifest:
 class ImageSet:
     """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
 
-    ``source`` are the dataset's own views, from which those of a reprojection were made.
+    ``source`` are the dataset's own views, from which a reprojection was made.
     """
 
     name: str
@@ -133,7 +133,7 @@ def source_view(source: ImageSet | None, name: str) -> int | None:
 
 
 def view_files(dataset: Path, image_set: ImageSet, number: int) -> tuple[list[File], list[str]]:
-    """Return the files of a set's views that exist, and the paths of those that are missing.
+    """Return the existing files of a set's views, and the paths of the missing files.
 
     ``number`` is the set's place among the sets. A reprojection is EXR, PNG or both: if one view
     has a format, all views must have it.
@@ -152,7 +152,7 @@ def view_files(dataset: Path, image_set: ImageSet, number: int) -> tuple[list[Fi
 
 
 def _formats(image_set: ImageSet, present: Set[str]) -> list[str]:
-    """Return the suffixes of a set's views: those that any view has. EXR if no view is there."""
+    """Return the suffixes that any of a set's views has. EXR if no view is there."""
     allowed = (".exr", ".png") if image_set.name else (".exr",)
     formats = []
     for suffix in allowed:
@@ -167,7 +167,7 @@ def file_names(folder: Path) -> set[str]:
 
 
 def pass_files(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[str]]:
-    """Return the existing files of passes and flow, and the paths of those that are missing."""
+    """Return the existing files of passes and flow, and the paths of the missing files."""
     files = expected_pass_files(sets)
     present = [file for file in files if (dataset / file.path).is_file()]
     missing = {file.path for file in files} - {file.path for file in present}

@@ -73,8 +73,8 @@ def resolved(setting: _Setting, emitters: Sequence[str]) -> dict[str, list[str]]
         groups[REST] = others
     if len(groups) > _MOST_GROUPS:
         raise UserError(
-            f"{_KEY}: makes {len(groups)} groups, and Cycles has {_MOST_GROUPS} at most; name "
-            "groups of several emitters"
+            f"{_KEY}: makes {len(groups)} groups, and Cycles can have {_MOST_GROUPS}; put several "
+            "emitters into one group"
         )
     return groups
 

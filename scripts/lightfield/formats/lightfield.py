@@ -6,12 +6,12 @@ SILVR's tools wrote have these alone, and are read, too. Ours are:
 - ``depth``: what channel Z of the views means.
 - ``frame``: the frame of the scene that was rendered.
 - ``scene`` and ``render``: what was rendered, and how.
-- ``machine``: what of the machine changes last digits.
-- ``passes``: the passes that a reprojection has, of those in ``render``.
+- ``machine``: the properties of the machine that change last digits.
+- ``passes``: which of the passes in ``render`` a reprojection has.
 - ``split`` of a frame: what the view is for.
 - ``flow`` of a frame: the view to which its flow leads.
 - ``exposure`` of a frame: the camera-to-world matrices at the ``start`` and the ``end`` of the
-  exposure of a moving camera. ``world_matrix`` is that in its middle.
+  exposure of a moving camera. ``world_matrix`` is the matrix in its middle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,13 +44,14 @@ NAME = "lightfield.json"
 OMNIDIRECTIONAL = "omnidirectional_stereo"
 # The poses of a moving camera, of a frame.
 EXPOSURE = "exposure"
-# What of the machine changes bytes, where the file was made. Each view names its own machine.
+# The properties of the machine that made the file, as far as they change bytes. Each view names its
+# own machine.
 MACHINE = "machine"
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A view, which SILVR calls a frame. Here frames are those of an animated scene.
+    """A view, which SILVR calls a frame. Here, a frame is a frame of an animated scene.
 
     ``world_from_camera`` (4, 4) is in metres. The camera looks along −Z, and +Y is up.
     ``position`` (3,) in metres and ``rotation`` (3,) give the same pose. The rotation is Blender's:
@@ -275,24 +276,24 @@ class LightField:
 
     @cached_property
     def render(self) -> RenderBlock:
-        """How it was rendered. Raises `UserError` if this is missing or wrong."""
+        """How the views were rendered. Raises `UserError` if this is missing or wrong."""
         return RenderBlock.read(self._key("render"), f"{self.path}: render")
 
     @property
     def known_render(self) -> RenderBlock:
-        """How it was rendered, as far as the file says. SILVR's files say nothing."""
+        """How the views were rendered, as far as the file says. SILVR's files say nothing."""
         return self.render if "render" in self.content else RenderBlock()
 
     @property
     def passes(self) -> list[Pass]:
-        """What the views have beside colour and depth. A reprojection may have fewer passes."""
+        """The views' passes beside colour and depth. A reprojection may have fewer passes."""
         if "passes" in self.content:
             return [passes.by_name(name) for name in self.content["passes"]]
         return self.known_render.selected_passes
 
     @property
     def light_groups(self) -> list[str]:
-        """The names of the light groups that the views have a pass of each."""
+        """The names of the light groups. The views have a pass of each."""
         passes_of_groups = [each for each in self.passes if passes.is_group(each)]
         return [each.name.removeprefix(passes.GROUP_PREFIX) for each in passes_of_groups]
 
@@ -309,7 +310,7 @@ class LightField:
 
     @property
     def transparent(self) -> bool:
-        """Whether the views' channel A is how much of a pixel the scene covers."""
+        """Whether the views have a channel A: the part of each pixel that the scene covers."""
         return bool(self.known_render.transparent)
 
     def require_rig(self, rig: "rigs.Rig") -> None:

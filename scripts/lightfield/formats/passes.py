@@ -13,11 +13,11 @@ from typing import Literal
 
 from lightfield.formats import light_groups
 
-# The names of the passes of light groups begin so, here and in Cycles.
+# The prefix of the light groups' passes, here and in Cycles.
 GROUP_PREFIX = "Combined_"
 
-# The names of passes that materials write begin so in Cycles. In INEXACT a surface writes 1 if it
-# is not one opaque Principled BSDF.
+# The prefix of the passes that materials write, in Cycles. In INEXACT a surface writes 1 if it is
+# not one opaque Principled BSDF.
 AOV_PREFIX = "plenoforge_"
 INEXACT = f"{AOV_PREFIX}inexact"
 
@@ -38,7 +38,7 @@ class Pass:
 
     Its values are the sum of the Cycles passes ``cycles``. If it has them, this sum is multiplied
     by the Cycles pass ``factor``, and the Cycles pass ``without`` is subtracted. Values are 0 where
-    the Cycles pass ``unless`` is not. A matte has them side by side. Light, values and mattes are
+    the Cycles pass ``unless`` is not. A matte holds them side by side. Light, values and mattes are
     means over all samples. Other passes describe the surface at the pixel's centre, as depth does.
     """
 
@@ -224,12 +224,12 @@ def group_pass(group: str) -> str:
 
 
 def is_group(view_pass: Pass) -> bool:
-    """Return whether a pass is that of a light group."""
+    """Return whether a pass holds the light of a light group."""
     return view_pass.name.startswith(GROUP_PREFIX)
 
 
 def in_order(names: list[str], *others: str) -> list[str]:
-    """Return names of passes in the table's order, and those of ``others`` after them.
+    """Return ``names`` in the table's order. The names that are in ``others`` come last.
 
     Raises ValueError for wrong or repeated names.
     """

@@ -14,7 +14,7 @@ from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.rigs import Poses
 
-# What an import uses of a lightfield.json, beside the poses.
+# The keys of a lightfield.json that an import uses, beside the poses.
 _USED_KEYS = {"camera", "lf_type", "resolution", "sensor_size", "depth"}
 _USED_KEYS_OF_RENDER = {"transparent", "depth"}
 _USED_KEYS_OF_FRAMES = {"split"}

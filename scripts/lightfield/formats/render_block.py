@@ -1,7 +1,7 @@
 """The block `render` of lightfield.json and of settings files: how Cycles renders the views.
 
-The block of a scene YAML, `lightfield.configuration.render_settings.Render`, has the same keys, but
-for those that a preset or a .blend adds.
+The block of a scene YAML, `lightfield.configuration.render_settings.Render`, has the same keys,
+except the keys that a preset or a .blend adds.
 """
 
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ _Emitters = Annotated[list[str], AfterValidator(unique_names)]
 
 
 class TargetError(Settings):
-    """The error that the views must reach, and how it may be reached."""
+    """The error that the views must reach, and the methods that may reach it."""
 
     value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
         description="Relative mean squared error to reach."
@@ -45,7 +45,8 @@ class TargetError(Settings):
 class CameraMotion(Settings):
     """How each camera moves at constant speed while its shutter is open.
 
-    The view's pose is that in the middle of the exposure. Depth and passes are of that moment.
+    The view's pose is the camera's pose in the middle of the exposure. Depth and passes show the
+    same moment.
     """
 
     travel: Vector = Field(
@@ -178,8 +179,8 @@ class RenderOptions(Settings):
     light_groups: Literal["each"] | _Emitters | dict[str, _Emitters] | None = Field(
         None,
         description="Light sources (lamps, glowing objects, the world) whose light is written as "
-        "passes of their own. each: all of them. A list: those with these names. A mapping: groups "
-        "of them. All others form the group rest.",
+        "passes of their own. each: all of them. A list: the sources with these names. A mapping: "
+        "groups of them. All others form the group rest.",
     )
 
 
@@ -216,12 +217,12 @@ class RenderBlock(RenderOptions):
 
         Raises `UserError`, one line that begins with ``place``, for a wrong value.
         """
-        known = {
+        known_settings = {
             key: value
             for key, value in content.items()
             if key in cls.model_fields and value is not None
         }
-        return checked(_ADAPTER, known, place)
+        return checked(_ADAPTER, known_settings, place)
 
     def to_json(self) -> dict[str, Any]:
         """Return the keys that were given, in their order."""

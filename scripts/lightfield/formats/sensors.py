@@ -155,7 +155,7 @@ class SensorOptions(Settings):
     )
     response: Response | None = Field(
         None,
-        description="Response curve, the same in all views. Without this key, it is that of sRGB.",
+        description="Response curve, the same in all views. Without this key, it is sRGB's.",
     )
     bits: int = Field(
         8,
@@ -197,7 +197,7 @@ class Sensor(SensorOptions):
         [VIEWS],
         min_length=1,
         description=f"Names of reprojections to which the sensor is applied. `{VIEWS}` stands for "
-        "the rendered views. Its folder is sensor, and that of perspective is perspective_sensor.",
+        "the rendered views. They get the folder sensor, and perspective gets perspective_sensor.",
     )
     rigs: list[str] | None = Field(
         None,

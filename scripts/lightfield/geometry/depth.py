@@ -26,7 +26,7 @@ def conventional_depth(lens: Lens) -> str:
 def converted(depth: Array, rays: Array, stored: str | None, wanted: str) -> Array:
     """Return ``depth`` (...) in metres, which is ``stored`` as "z" or "distance", as ``wanted``.
 
-    The unit ``rays`` (..., 3) convert it, if that is another. ``stored`` is None if there is no
+    The unit ``rays`` (..., 3) convert it, if the two differ. ``stored`` is None if there is no
     depth to convert: all of it is inf or NaN.
     """
     if stored in (wanted, None):
@@ -60,7 +60,7 @@ def distance_from_z(z: Array, rays: Array) -> Array:
 def in_16_bits(steps: Array) -> tuple[NDArray[np.uint16], int]:
     """Return depth (h, w) in ``steps`` as whole numbers of 16 bits, where 0 means none.
 
-    Also returns how many depths were lost: those that are too near or too far for a number.
+    Also returns how many depths were lost, because they are too near or too far for a number.
     """
     rounded = np.round(steps)
     has_depth = np.isfinite(steps) & (steps > 0)

@@ -31,7 +31,7 @@ def neighbours(world_from_cameras: Array) -> list[int]:
 
     places, ahead = world_from_cameras[:, :3, 3], world_from_cameras[:, :3, 2]
     cameras = Cameras(places)
-    chosen = []
+    numbers = []
     for view, look in enumerate(ahead):
         candidates = cameras.nearest_apart(view, ONE_PLACE, _AS_NEAR)
         away = np.linalg.norm(places[candidates] - places[view], axis=1)
@@ -39,8 +39,8 @@ def neighbours(world_from_cameras: Array) -> list[int]:
         if np.isinf(away.min()):
             raise UserError("flow: all views are from one place; must be two or more")
         near = candidates[away <= away.min() * (1 + _AS_NEAR)]
-        chosen.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
-    return chosen
+        numbers.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
+    return numbers
 
 
 def flow(

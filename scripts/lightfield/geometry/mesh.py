@@ -25,7 +25,7 @@ class Mesh:
 class Placed:
     """An object or an instance that shows a mesh.
 
-    - ``name``: its name. An instance's is that of the id passes' names.json.
+    - ``name``: its name. An instance has the name that names.json of the id passes gives it.
     - ``original``: the name of the object that it shows.
     - ``mesh``: an index of `SceneSurface.meshes`.
     - ``world_from_object`` (4, 4): from the mesh's coordinates to the world, in metres with Z up.
@@ -41,7 +41,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class SceneSurface:
-    """What cameras can see of a scene at a frame, as meshes.
+    """The surface of a scene that cameras can see at a frame, as meshes.
 
     ``left_out`` says why an object that cameras can see has no mesh, by the object's name.
     """
@@ -84,7 +84,7 @@ def to_world(mesh: Mesh, world_from_object: Floats) -> Floats:
 def box_around(mesh: Mesh, world_from_object: Floats) -> OrientedBox:
     """Return the tightest box around a mesh in the world, along the axes of its object.
 
-    If ``world_from_object`` (4, 4) shears, the axes are those of the nearest rotation, by polar
+    If ``world_from_object`` (4, 4) shears, the axes come from the nearest rotation, by polar
     decomposition.
     """
     left, _, right = np.linalg.svd(world_from_object[:3, :3])

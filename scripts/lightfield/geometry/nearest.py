@@ -28,8 +28,8 @@ class Cameras:
     def nearest(self, camera: int, count: int, tie: float) -> NDArray[np.int64]:
         """Return the ``count`` nearest other cameras in ascending order, and all that tie.
 
-        A camera ties if it is at most ``tie`` metres farther. Of many cameras at one place only the
-        first ``count`` are returned.
+        A camera ties if it is at most ``tie`` metres farther. If many cameras are at one place, it
+        returns only the first ``count`` of them.
         """
         count = min(count, len(self._positions) - 1)
         reach = self._distances(camera, min(count + 1, self._tree.n))[-1] + tie
@@ -37,16 +37,16 @@ class Cameras:
         neighbours: NDArray[np.int64] = cameras[cameras != camera]
         return neighbours
 
-    def nearest_apart(self, camera: int, apart: float, tie: float) -> NDArray[np.int64]:
+    def nearest_apart(self, camera: int, least_distance: float, tie: float) -> NDArray[np.int64]:
         """Return, in ascending order, all cameras as near as the nearest one elsewhere.
 
-        "Elsewhere" means at least ``apart`` metres away. ``tie`` is a part of the distance: cameras
-        that are farther by at most this count as equally far.
+        "Elsewhere" means at least ``least_distance`` metres away. ``tie`` is a part of the
+        distance: cameras that are farther by at most this count as equally far.
         """
         count = 2
         while True:
             distances = self._distances(camera, min(count, self._tree.n))
-            elsewhere = distances[distances > apart * (1 + ROUNDING)]
+            elsewhere = distances[distances > least_distance * (1 + ROUNDING)]
             if len(elsewhere) or count >= self._tree.n:
                 break
             count *= 2

@@ -7,7 +7,7 @@ from lightfield.geometry.rigs.hemisphere import GOLDEN_ANGLE
 from lightfield.geometry.rigs.orbit import on_sphere
 from lightfield.geometry.rotations import euler_to_matrix
 
-# So many directions are tested, spread evenly.
+# The number of directions to test, which are spread evenly.
 DIRECTIONS = 200
 # The cameras must see at least this part of the directions.
 _SEEN_PART = 0.75

@@ -8,7 +8,7 @@ from lightfield.core.errors import UserError
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Files and Blender round numbers. So far may an element of a matrix be from that of a rotation.
+# Files and Blender round numbers. An element of a matrix may differ by this much from a rotation's.
 TOLERANCE = 1e-4
 
 

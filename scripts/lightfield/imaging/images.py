@@ -39,12 +39,12 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 # transparent views of scenes with shadow catchers have it.
 UNSHOWN_ATTRIBUTE = "plenoforge:unshown"
 
-# What covers a smaller part of a pixel counts as absent.
+# A surface that covers a smaller part of a pixel counts as absent.
 LEAST_ALPHA = 1e-3
 
 HALF_MAX = 65504.0
 
-# Of a picture, in pixels.
+# The largest width or height of a picture, in pixels.
 _LARGEST_SIDE = 65536
 
 # OpenEXR's codecs that keep every bit of halves and floats.
@@ -68,7 +68,7 @@ _EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 class Image:
     """An image in memory: ``channels`` maps names to (height, width) arrays of the file's dtype.
 
-    ``chromaticities`` are those of an EXR's header. None for a file without them.
+    ``chromaticities`` come from an EXR's header. None for a file without them.
     """
 
     channels: dict[str, np.ndarray[Any, Any]]
@@ -161,7 +161,7 @@ class Header:
         return self.window.height
 
 
-# Of 100. Most values are off by a level at most.
+# The quality of a JPEG, of 100. Most values are off by one level at most.
 _JPEG_QUALITY = 98
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")

@@ -13,7 +13,7 @@ Array = np.ndarray[Any, Any]
 MIDDLE_GREY = 0.18
 # The brightest value that still shows as less than white, in multiples of middle grey's exposure.
 WHITE = 5.0
-# More views than this are thinned evenly, so that each can still be recognised.
+# If there are more views, thin them evenly, so that people can still recognise each.
 MOST_VIEWS = 120
 
 

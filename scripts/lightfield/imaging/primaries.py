@@ -38,7 +38,7 @@ def xyz_matrix(chromaticities: Chromaticities) -> Floats:
 
 
 def conversion(source: Chromaticities, target: Chromaticities) -> Floats:
-    """Return the matrix (3, 3) from linear colours of one space to those of another.
+    """Return the matrix (3, 3) that converts linear colours from one space to another.
 
     White stays white: the adaptation between the white points is Bradford's.
     """

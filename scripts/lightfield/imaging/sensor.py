@@ -69,8 +69,8 @@ class SensorParameters:
       uses them. None is the sRGB encoding.
     - ``gain``, ``floor``: a and b of the noise's variance a · y + b. The raw signal y is 1 where it
       saturates.
-    - ``bits``: of a code.
-    - ``seed``: of the noise. 0 to 2⁶⁴ − 1.
+    - ``bits``: the number of bits of a code.
+    - ``seed``: the seed of the noise, from 0 to 2⁶⁴ − 1.
     """
 
     exposure: float
@@ -154,7 +154,7 @@ class Sensed:
 
     ``pixels`` (h, w, 3) are the codes, scaled to uint8, or to uint16 for more than 8 bits.
     ``clipped`` (h, w, 3) uint8 is `WHITE` or `BLACK` where a channel is clipped, else 0.
-    ``weights`` (h, w, 3) float32 are those of `merged`. None if nobody asked for them.
+    ``weights`` (h, w, 3) float32 are the weights for `merged`. None if nobody asked for them.
     """
 
     pixels: NDArray[np.uint8 | np.uint16]
@@ -307,7 +307,7 @@ def _middle(toe: float, shoulder: float, center: float) -> float:
 def _weights(clean: Floats, falloff: Floats, parameters: SensorParameters) -> Floats:
     """Return 1 / variance of the light that a code gives. 0 where noise could saturate it.
 
-    The variance is that of noise and rounding. It follows from the signal without noise, so that
+    The variance comes from noise and rounding. It follows from the signal without noise, so that
     weights are independent of the noise that they average. It leaves out that colour mixes the
     channels' variances.
     """
@@ -348,7 +348,7 @@ def light_of(pixels: NDArray[Any], parameters: SensorParameters) -> Floats:
 def merged(lights: Sequence[Floats], weights: Sequence[NDArray[Any]]) -> Floats:
     """Return the mean of the brackets' light (h, w, 3), weighted. NaN where no bracket has weight.
 
-    ``lights`` are those of `light_of`.
+    ``lights`` are results of `light_of`.
     """
     total = np.zeros_like(lights[0])
     sum_of_weights = np.zeros_like(lights[0])

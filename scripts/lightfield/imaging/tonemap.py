@@ -13,9 +13,9 @@ def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
     """Return linear ``color`` brightened by ``exposure`` stops, then compressed by Reinhard.
 
     v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, from 1e-9 to 1e9. The value m becomes 1, and
-    m = 1 changes nothing. Any other m makes values below 0, of colours outside Rec. 709, 0. NaN
-    stays NaN. Source: Reinhard et al. 2002, equation 4, applied to each
-    channel as in SILVR's tool.
+    m = 1 changes nothing. With any other m, values below 0, which are colours outside Rec. 709,
+    become 0. NaN stays NaN. Source: Reinhard et al. 2002, equation 4, applied to each channel as in
+    SILVR's tool.
     """
     if exposure == 0 and reinhard == 1:
         return color

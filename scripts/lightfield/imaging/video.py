@@ -13,7 +13,7 @@ from lightfield.imaging.pictures import Array
 _EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
 # The matrix from R, G, B. Programs that ignore what the file says, as OpenCV does, expect BT.601's.
 _MATRIX = "scale=out_color_matrix=smpte170m:out_range=limited,format=yuv420p"
-# What the file says. Without it, players take the matrix of a large picture for that of BT.709.
+# The tags that name the matrix in the file. Without them, players use BT.709's for a large picture.
 _TAGS = "setparams=colorspace=smpte170m:range=limited:color_primaries=bt709:color_trc=iec61966-2-1"
 
 

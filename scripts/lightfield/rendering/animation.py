@@ -112,7 +112,7 @@ def mute(block: Any, prefixes: tuple[str, ...]) -> None:
 
 
 def driver_targets(block: Any) -> Iterator[Any]:
-    """Yield what the drivers of a data-block read."""
+    """Yield the targets that the drivers of a data-block read."""
     data = getattr(block, "animation_data", None)
     for curve in data.drivers if data else ():
         for variable in curve.driver.variables:

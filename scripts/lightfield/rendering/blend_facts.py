@@ -67,7 +67,7 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
 
 
 def _exposure(scene: Any) -> dict[str, Any]:
-    """Return what decides when the shutter is open: on which frames, and how long."""
+    """Return the settings that decide on which frames, when, and how long the shutter is open."""
     render = scene.render
     heights = {point.location.y for point in render.motion_blur_shutter_curve.curves[0].points}
     return {

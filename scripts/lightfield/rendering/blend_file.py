@@ -59,14 +59,14 @@ def _check_blend(path: Path) -> None:
 
 def open_scene(
     path: Path,
-    chosen: Mapping[str, Any] = MappingProxyType({}),
+    scene_block: Mapping[str, Any] = MappingProxyType({}),
     inventory: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
-    ``chosen`` is a scene YAML's ``scene`` block. Its ``scene_name`` and ``view_layers`` choose the
-    scene and its view layers. A view store, if there is one, provides the external files in
-    ``inventory``.
+    ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
+    choose the scene and its view layers. A view store, if there is one, provides the external files
+    in ``inventory``.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
@@ -90,7 +90,7 @@ def open_scene(
                 f"{bpy.app.version[0]}.{bpy.app.version[1]}"
             )
     try:
-        return _choose(chosen.get("scene_name"), chosen.get("view_layers"))
+        return _choose(scene_block.get("scene_name"), scene_block.get("view_layers"))
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 
@@ -161,7 +161,7 @@ def _join(layers: Sequence[Any]) -> None:
 
     if len(layers) > 1:
         visit([layer.layer_collection for layer in layers])
-    # Outer collections first, because a collection changes those inside it.
+    # Outer collections first, because a collection changes the collections inside it.
     for part, exclude, holdout, indirect in settings:
         if part.exclude != exclude:
             part.exclude = exclude

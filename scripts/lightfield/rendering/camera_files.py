@@ -1,4 +1,4 @@
-"""Writes what a scene's geometry says of cameras: free places for them, and their clearance."""
+"""Writes free places for cameras in a scene's geometry, and the clearance of each camera."""
 
 import sys
 from pathlib import Path

@@ -61,7 +61,7 @@ def _shown(depsgraph: Any) -> set[str]:
 
 
 class Surroundings(NamedTuple):
-    """What is around cameras.
+    """The surroundings of cameras.
 
     - ``distances`` (n,): of each camera to the nearest surface in metres, inf beyond the reach.
     - ``box`` (2, 3): around all rendered meshes.
@@ -72,7 +72,7 @@ class Surroundings(NamedTuple):
 
 
 def surroundings(positions: Floats, reach: float = REACH) -> Surroundings:
-    """Measure what is around each camera, as far as ``reach``."""
+    """Measure the surroundings of each camera, as far as ``reach``."""
     nearest = np.full(len(positions), np.inf)
     lowest = np.full(3, np.inf)
     highest = np.full(3, -np.inf)
@@ -142,8 +142,8 @@ def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
     yield (
         f"{len(meshes)} of {len(enclosures)} cameras are inside an open mesh: "
         f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}: they see the backs of its faces, "
-        "and it cannot be told whether it is a room or an obstacle; turn its normals inwards if "
-        "it is a room, or move the rig"
+        "which may be a room or an obstacle; if it is a room, turn its normals inwards, and if "
+        "not, move the rig"
     )
 
 
@@ -186,7 +186,7 @@ def free_places(rig: Random) -> Floats:
 def enclosures(positions: Floats, box: Floats | None = None) -> list[Enclosure | None]:
     """Return the object, or room, around each camera, or None.
 
-    ``box`` is that of `surroundings`. It saves the rays of cameras outside.
+    ``box`` comes from `surroundings`. Cameras outside the box need no rays.
 
     An object encloses a camera if most rays from the camera meet the object's back first. For an
     open mesh a third of the rays suffices, if few others meet its fronts: leaves show both. The

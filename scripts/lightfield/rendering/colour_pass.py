@@ -50,7 +50,7 @@ def render_colour(
 ) -> Colour:
     """Render the view of a camera at ``world_from_camera``, (4, 4) camera-to-world.
 
-    Returns those of the ``passes`` that belong to colour. Cycles must be set up for them.
+    Also returns the ``passes`` that belong to colour. Cycles must be set up for them.
     """
     counts_samples = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
@@ -98,7 +98,7 @@ def render_colour(
 def _render_matte(world_from_camera: Array, seed: int, mattes: Iterable[Pass]) -> Rendered:
     """Render ``mattes`` in which objects of equal names have their full names.
 
-    The camera's rays are those of the colour, and nothing else is followed.
+    The camera's rays are the same as for the colour. Cycles follows no other rays.
     """
     needed = {name: "rgba" for matte in mattes for name in matte.needed}
     cycles = bpy.context.scene.cycles

@@ -45,8 +45,8 @@ SAMPLING = {
     "guiding": "use_guiding",
 }
 
-# The names of passes that a scene has only once they are added to it begin so: those of light
-# groups, and what materials write.
+# Prefixes of the passes that a scene lacks until they are added: the passes of light groups, and
+# the passes that materials write.
 _ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
 
 # The passes of Cycles that make up a view's geometry, and their channels.
@@ -191,7 +191,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
     layer.pass_cryptomatte_depth = 6
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
-    # Remove the artist's own passes, and those of light groups.
+    # Remove the artist's own passes and light groups.
     for group in (layer.aovs, layer.lightgroups):
         for entry in list(group):
             group.remove(entry)
@@ -314,7 +314,7 @@ def _use_device(scene: Any, device: str) -> None:
 
 
 def machine(denoise: bool) -> str:
-    """Describe what of this machine affects the pixels' bytes, with the GPU, if Cycles uses one."""
+    """Describe the processor, and the GPU if Cycles uses one, which affect the pixels' bytes."""
     processor = describe(denoise)
     if bpy.context.scene.cycles.device == "CPU":
         return processor
@@ -376,7 +376,7 @@ def _set_eyes(scene: Any, distance: float) -> None:
 
 
 def choose_eye(name: str) -> None:
-    """Make the next render that of the eye in the view's ``name``, if the rig has eyes."""
+    """Let the next render show what the eye in the view's ``name`` sees, if the rig has eyes."""
     render = bpy.context.scene.render
     for eye in EYES if render.use_multiview else ():
         render.views[eye].use = name.endswith(f"_{eye}")

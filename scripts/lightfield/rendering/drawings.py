@@ -41,8 +41,8 @@ def warnings(camera_type: str) -> Iterator[str]:
         )
     else:
         yield (
-            f"Grease Pencil is in the colour alone: {names}: no depth and no pass has it; make the "
-            "drawing a mesh to have it there"
+            f"Grease Pencil is only in the colour: {names}: no depth and no pass has it; make the "
+            "drawing a mesh if they need it"
         )
 
 

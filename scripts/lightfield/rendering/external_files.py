@@ -57,8 +57,8 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     """Return the scene's files that are missing or cannot be read.
 
     Each entry has the ``kind`` and ``name`` of the data-block that reads the file. It also has the
-    ``path`` from the .blend's folder, and the ``problem``. Of images, only those in ``images``
-    (read by shading) and those of modifiers count.
+    ``path`` from the .blend's folder, and the ``problem``. An image counts only if it is in
+    ``images`` (read by shading), or if a modifier reads it.
     """
     home = Path(bpy.data.filepath).parent
     users = bpy.data.user_map()
@@ -120,7 +120,7 @@ def _blocks_and_paths() -> Iterator[tuple[Any, str]]:
                 # Blender lists this folder for all particles, even if their cache is in the .blend.
                 if not (isinstance(block, bpy.types.Object) and _is_cache_folder(block, path)):
                     yield block, path
-    # Blender lists paths inside nodes, but not those in the inputs of a modifier.
+    # Blender lists paths inside nodes, but no paths in the inputs of a modifier.
     for obj in bpy.data.objects:
         for modifier in _node_modifiers(obj):
             tree = modifier.node_group
@@ -212,7 +212,7 @@ def _tile(path: str, number: int) -> Path:
 
 
 def _problem(block: Any, path: Path) -> str | None:
-    """Return what is wrong with a file, or None. Blender itself would only print it."""
+    """Return the problem of a file, or None. Blender itself would only print it."""
     if not path.exists():
         return "missing"
     readable = True

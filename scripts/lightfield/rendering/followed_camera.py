@@ -22,7 +22,7 @@ _TRACKS = ("FOLLOW_TRACK", "OBJECT_SOLVER")
 
 
 def followers(choice: str) -> dict[str, list[str]]:
-    """Return the names of what follows the file's camera: by its name, or as the ``active`` one.
+    """Return the names of the file's camera's followers: by its name, or as the ``active`` one.
 
     They are objects, lamps, materials and worlds. ``choice`` is the scene YAML's key
     ``followed_camera``. The scene must be at its frame, and is changed. Raises `UserError` if
@@ -56,7 +56,7 @@ def followers(choice: str) -> dict[str, list[str]]:
 
 
 def freeze(camera: Any) -> None:
-    """Let all that takes the active camera take ``camera``, in every view."""
+    """Make everything that follows the active camera follow ``camera``, in every view."""
     for tree in bpy.data.node_groups:
         for node in [node for node in tree.nodes if node.bl_idname == _ACTIVE_CAMERA]:
             replacement = tree.nodes.new("GeometryNodeInputObject")
@@ -84,7 +84,7 @@ def freeze(camera: Any) -> None:
 
 
 def follow_views(file_camera: Any, view_camera: Any) -> None:
-    """Let all that names the file's camera follow the camera of each view."""
+    """Make everything that names the file's camera follow each view's own camera."""
     if file_camera.type == "CAMERA":
         file_camera.data.user_remap(view_camera.data)
     file_camera.user_remap(view_camera)

@@ -2,7 +2,7 @@
 
 This is one render with one sample. Cycles takes a pixel's first sample from the middle of the pixel
 filter. With the narrowest filter that is the pixel's centre. Glass counts as a surface. Parts that
-transparency cuts out do not, as in the colour. Neither do fog, smoke and other volumes.
+transparency cuts out do not count, as in the colour. Neither do fog, smoke and other volumes.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,7 +38,7 @@ _MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
 
 @dataclass(frozen=True)
 class ViewGeometry:
-    """What a view's pixels see at their centres. All of it belongs to the same surface.
+    """The surface that each pixel of a view sees at its centre.
 
     - ``depth`` (height, width): float32 in metres, inf for a miss. Z-depth for a perspective
       camera, distance for any other.
@@ -87,18 +87,20 @@ def cleared(pixels: Array, where: Array) -> Array:
 
 
 def render_geometry(
-    world_from_camera: Array, motion: bool = False, apart: bool = False, alpha: bool = False
+    world_from_camera: Array,
+    motion: bool = False,
+    instance_numbers: bool = False,
+    alpha: bool = False,
 ) -> ViewGeometry:
     """Render the geometry that a camera at ``world_from_camera``, (4, 4) camera-to-world, sees.
 
-    ``motion`` adds the motion, ``apart`` the instances, ``alpha`` the alpha. Cycles must be set up
-    for them.
+    ``motion``, ``instance_numbers`` and ``alpha`` add these fields. Cycles must be set up for them.
     """
     geometry_passes = dict(GEOMETRY_PASSES)
     if motion:
         geometry_passes |= _MOTION
     with _geometry_settings(geometry_passes):
-        cycles_passes = geometry_passes | (instances.CYCLES_PASSES if apart else {})
+        cycles_passes = geometry_passes | (instances.CYCLES_PASSES if instance_numbers else {})
         if alpha:
             cycles_passes = cycles_passes | {"Combined": "RGBA"}
         rendered = render_view(world_from_camera, 0, cycles_passes)
@@ -116,7 +118,7 @@ def render_geometry(
         normal,
         objects,
         materials,
-        instances.decoded(rendered.passes, objects.astype(int)) if apart else None,
+        instances.decoded(rendered.passes, objects.astype(int)) if instance_numbers else None,
         np.where(hit, rendered.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
         rendered.passes["Combined"][..., 3] if alpha else None,
         rendered.render_seconds,

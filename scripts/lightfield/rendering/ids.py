@@ -1,8 +1,8 @@
 """Numbers the objects and materials for their passes: the same in every view.
 
-A number is the place in the sorted list of full names, from 1. So it depends on the .blend alone.
-Cycles gives all instances of an object the object's number. `lightfield.rendering.instances` tells
-them apart.
+The number of an object is its place in the sorted list of full names, from 1. So it depends on the
+.blend alone. Cycles gives all instances of an object the object's number.
+`lightfield.rendering.instances` tells them apart.
 
 Cycles' passes hold Blender's pass index. Shaders and drivers can read it, too. So each block gets
 an index that no other block has, and what reads an index computes the file's own from it.
@@ -101,8 +101,8 @@ def _redirect_paths() -> None:
 def _restore_indices(tree: Any, steps: dict[str, list[tuple[int, int]]]) -> None:
     """Let a material's nodes compute the file's own indices from the assigned ones.
 
-    Groups that read an index are copied, because other materials and lamps may use them.
-    ``steps`` are those of `_restored` for each kind.
+    It copies groups that read an index, because other materials and lamps may use them. ``steps``
+    holds the argument of `_restored` for each kind.
     """
     for node in list(tree.nodes):
         if getattr(node, "node_tree", None) and _reads_index(node.node_tree):

@@ -1,4 +1,4 @@
-"""Numbers the instances of objects: those of collections, particles and geometry nodes, too.
+"""Numbers the instances that collections, particles and geometry nodes make of objects.
 
 Blender gives each instance a random number. It depends only on the names and the places in lists
 that lead to the instance. So it is the same in every view, frame, process and machine. Cycles
@@ -129,9 +129,9 @@ def name_and_numbers(entry: Any) -> tuple[str, int, int]:
 def decoded(passes: dict[str, Array], objects: Array) -> Array:
     """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
 
-    ``passes`` are those of `CYCLES_PASSES`. ``objects`` (height, width) are the objects' numbers.
-    Surfaces without a material, and those beyond the last layer, write no number. They get the
-    object's number, if the object itself is shown.
+    ``passes`` holds the `CYCLES_PASSES` by name. ``objects`` (height, width) are the objects'
+    numbers. Surfaces without a material, and surfaces beyond the last layer, write no number. They
+    get the object's number, if the object itself is shown.
     """
     instances = shown()
     layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)

@@ -51,7 +51,7 @@ def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
     """
     scene = bpy.context.scene
     hidden = pruning.removable_objects()
-    # The objects of another scene may move those of this one.
+    # Objects of other scenes may move the objects of this scene.
     changing = {
         "animated": sorted({str(owner.name_full) for owner, _ in animation.animated()}),
         "simulated": animation.simulated(),

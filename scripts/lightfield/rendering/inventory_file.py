@@ -54,14 +54,14 @@ def write_of_datasets(
     ``written`` is their scene YAML. The measurement of memory starts a process of its own. Without
     it, the inventory does not say how much the scene takes.
     """
-    chosen = written.scene.model_dump() if written else {}
-    layers = blend_file.open_scene(path, chosen)
+    scene_block = written.scene.model_dump() if written else {}
+    layers = blend_file.open_scene(path, scene_block)
     saved_frame = frames.current()
     chosen_frames = rendered_frames(datasets)
     shown_frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
     shown_frames = shown_frames or [saved_frame]
     contents: dict[str, Any] = {}
-    if chosen.get("blend"):
+    if scene_block.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
         try:
             contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
@@ -71,7 +71,7 @@ def write_of_datasets(
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
     contents |= inventory(shown_frames)
-    if contents["missing"] and not chosen.get("allow_missing"):
+    if contents["missing"] and not scene_block.get("allow_missing"):
         raise UserError(_refusal(path, contents["missing"]))
     if not light.may_be_lit():
         raise UserError(
@@ -87,21 +87,21 @@ def write_of_datasets(
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
-    if chosen.get("blend"):
+    if scene_block.get("blend"):
         frames.go_to(shown_frames[0])
         try:
-            followers = followed_camera.followers(chosen.get("followed_camera") or FILE)
+            followers = followed_camera.followers(scene_block.get("followed_camera") or FILE)
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         contents["blend"]["followers"] = followers
     # Close the scene, because the measurement opens it again.
     blend_file.new_scene()
     if measures_memory:
-        contents["memory_bytes"] = scene_memory.measure(path, contents, chosen)
+        contents["memory_bytes"] = scene_memory.measure(path, contents, scene_block)
     write_json(output, contents)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    if chosen.get("blend"):
+    if scene_block.get("blend"):
         _print_notes(path, contents, datasets, output)
     print(
         f"{contents['objects']} objects, {contents['triangles']} triangles, with instances "

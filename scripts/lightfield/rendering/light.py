@@ -39,7 +39,7 @@ def may_be_lit() -> bool:
 
 
 def emitters() -> list[str]:
-    """Return the names of what may emit light in the open scene, sorted, with the world first.
+    """Return the names of all that may emit light in the open scene, sorted, with the world first.
 
     These are the full names of lamps and of objects with a glowing material, and `WORLD`.
     """

@@ -13,13 +13,13 @@ from lightfield.rendering import shadow_catchers
 def set_up(layer: Any, groups: Mapping[str, Sequence[str]]) -> None:
     """Render the light of each of the ``groups`` into a pass of its own.
 
-    An object's group is also that of its instances, its glowing volume, and all its materials.
-    Raises `UserError` for a scene whose groups would not add up to the colour.
+    An object's group contains its instances, its glowing volume, and all its materials. Raises
+    `UserError` for a scene whose groups would not add up to the colour.
     """
     if catchers := shadow_catchers.names():
         raise UserError(
             f"render.light_groups: {catchers[0]} is a shadow catcher, whose shadow is in no "
-            "light group; turn that off, or leave light_groups out"
+            "light group; make it an ordinary object, or leave light_groups out"
         )
     group_of = {emitter: group for group, emitters in groups.items() for emitter in emitters}
     for group in groups:

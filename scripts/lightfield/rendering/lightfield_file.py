@@ -32,8 +32,8 @@ def from_settings(
 ) -> LightField:
     """Return the light field that the settings describe.
 
-    The files are those of scripts/inventory.py, import_model.py and free_places.py, as far as the
-    scene has them. Raises `UserError` if one is missing.
+    The job names the files that scripts/inventory.py, import_model.py and free_places.py wrote, as
+    far as the scene has them. Raises `UserError` if one is missing.
     """
     capture = settings.capture
     if inventory:

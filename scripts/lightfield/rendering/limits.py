@@ -24,8 +24,8 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
     """Yield a line for each problem of the open scene that the views will show.
 
     Cycles has problems far from the origin, behind many transparent layers, and with some lights
-    behind glass. ``positions`` (n, 3) are those of the cameras. ``distances`` (n,) are those to
-    their nearest surfaces, inf beyond `REACH`. The viewport must show what is rendered: see
+    behind glass. The cameras are at ``positions`` (n, 3). Their nearest surfaces are ``distances``
+    (n,) away, inf beyond `REACH`. The viewport must show what is rendered: see
     `show_what_is_rendered`.
     """
     # Cycles computes in float32, in world space.
@@ -36,8 +36,8 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
         far = np.abs(positions[worst]).max()
         yield (
             f"cameras are up to {far:.3g} m from the origin, where Cycles' numbers are "
-            f"{100 * steps[worst]:.2g} cm apart: shapes and depths are as coarse; move the scene "
-            "and the rig to the origin"
+            f"{100 * steps[worst]:.2g} cm apart, and so are shapes and depths; move the scene and "
+            "the rig to the origin"
         )
     limit = bpy.context.scene.cycles.transparent_max_bounces
     step = max(1, len(positions) // MOST_CAMERAS)

@@ -26,7 +26,7 @@ from lightfield.rendering.quiet import quiet
 from lightfield.rendering.render_graph import in_render
 from lightfield.stages.scene import ImportModel, ImportSettings
 
-# Of each importer, what is not its default. Cameras and lamps are removed in any case.
+# The options of each importer that differ from its defaults. Cameras and lamps are removed anyway.
 _OPTIONS: dict[str, dict[str, Any]] = {
     # Without this, an armature brings a mesh for the shape of its bones.
     "gltf": {"disable_bone_shape": True},
@@ -34,7 +34,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         "import_cameras": False,
         "import_lights": False,
         "create_world_material": False,
-        # A point instancer is imported all the same.
+        # Blender imports point instancers all the same.
         "import_curves": False,
         "import_points": False,
     },
@@ -45,7 +45,7 @@ _AXES = {
     "z": {"forward_axis": "Y", "up_axis": "Z"},
 }
 
-# A largest side beyond these is a mistake, and not to be had in Blender's 32 bits.
+# If a model's largest side is beyond these, it is a mistake, and Blender's 32 bits cannot hold it.
 _SIDES = (1e-9, 1e12)
 
 # The largest side of a scaled model may differ from 1 by this, because Blender computes in 32 bits.
@@ -76,8 +76,8 @@ def make_scene(
 ) -> dict[str, Any]:
     """Make a scene of a model in the open file. Return the record of the import.
 
-    ``folder`` is where the .blend will be. ``sources`` is a JSON to write as soon as the files that
-    the model names are known, also if the model is refused, as when one is missing.
+    ``folder`` is where the .blend will be. ``sources`` is a JSON with the files that the model
+    names. It is written even if the model is then refused, for example because a file is missing.
 
     The record has the ``fingerprint``, the files that the model was read from as
     ``external_files``, the parts that are ``left_out``, and its ``box`` in metres.
@@ -115,8 +115,8 @@ def make_scene(
         box = _box(path)
         if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
             raise UserError(
-                f"{path}: Blender does not scale all of it in one; export it without constraints, "
-                "near its origin, or use unit: metres"
+                f"{path}: Blender does not scale all its parts alike; export it without "
+                "constraints, near its origin, or use unit: metres"
             )
     elif np.abs(box).max() > FARTHEST:
         raise UserError(
@@ -277,7 +277,7 @@ def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
 
 
 def _missing(files: Sequence[Path]) -> list[str]:
-    """Return the names of those files that do not exist."""
+    """Return the names of the files that do not exist."""
     # Path.is_file() raises for a path that is too long.
     return [printable(file) for file in files if not os.path.isfile(file)]  # noqa: PTH113
 
@@ -434,7 +434,7 @@ def _scale_to_box(path: Path, box: Box) -> None:
         )
     model = bpy.data.objects.new("model", None)
     bpy.context.scene.collection.objects.link(model)
-    # What an instancer places is scaled with the instancer.
+    # Objects that an instancer places scale with the instancer.
     instanced = objects_of_used_collections(bpy.data.user_map())
     for obj in bpy.data.objects:
         if obj.parent is None and obj != model and obj not in instanced:

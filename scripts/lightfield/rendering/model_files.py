@@ -98,10 +98,10 @@ def _least_ply_bytes(path: Path) -> int:
 
 
 def survey(path: Path) -> Survey:
-    """Return what a model file consists of. The files may be missing. The model is none of them.
+    """Return the files that a model names, and its parts that Blender leaves out.
 
-    The textures of an OBJ, which its libraries of materials name, are not listed. Raises
-    `UserError` if the model file is broken.
+    The files may be missing. The list contains neither the model itself, nor the textures that an
+    OBJ's libraries of materials name. Raises `UserError` if the model file is broken.
     """
     match path.suffix.lower():
         case ".gltf" | ".glb":
@@ -142,7 +142,7 @@ def _hidden_node(path: Path) -> str:
 
 
 def _of_gltf(path: Path) -> Iterator[FileReference]:
-    """Yield the buffers and images that a glTF file has outside of itself."""
+    """Yield the external buffers and images of a glTF file."""
     document = _gltf_document(path)
     try:
         entries: list[Any] = [*document.get("buffers", ()), *document.get("images", ())]

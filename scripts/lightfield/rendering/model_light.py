@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lightfield.core.names import SOFTBOXES
 from lightfield.rendering.inventory import contributing, rendered_materials
 
-# Of each lamp: its direction from the model as azimuth (0 is +X) and elevation in degrees, and the
-# irradiance that it gives the model in W/m². The model's front is towards −Y.
+# Each lamp has a direction from the model, as azimuth (0 is +X) and elevation in degrees, and an
+# irradiance at the model in W/m². The model's front is towards −Y.
 _LAMPS = {"key": (-60, 45, 1.5), "fill": (-150, 20, 0.4), "rim": (80, 55, 0.7)}
 # The distance and the size of a lamp in radii of the model.
 _DISTANCE = 8

@@ -17,7 +17,7 @@ class FileReference(NamedTuple):
 
 
 class Survey(NamedTuple):
-    """What a model consists of: the files that it names, and the parts that Blender leaves out."""
+    """The files that a model names, and its parts that Blender leaves out."""
 
     references: list[FileReference]
     left_out: list[str]

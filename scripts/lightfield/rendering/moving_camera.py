@@ -51,7 +51,7 @@ def place_camera(world_from_camera: Array) -> None:
     render = scene.render
     # Blender remaps frames before it reads keys.
     shutter = render.motion_blur_shutter * render.frame_map_old / render.frame_map_new
-    # The keys have the same frames for each view, so they replace those of the view before.
+    # The keys have the same frames for each view, so they replace the previous view's keys.
     for time in (-0.5, 0.0, 0.5):
         pose = mathutils.Matrix(pose_at(middle, motion.travel, motion.turn, time).tolist())
         rotation = pose.to_quaternion()

@@ -1,8 +1,8 @@
 """Estimates the cost of a dataset's views from probes: a few small views with all their samples.
 
 The time of a sample hardly depends on the resolution. So the time of a full view follows from the
-number of pixels. So does the size of its file, as an upper estimate: smaller views have more detail
-in a pixel, and compress worse.
+number of pixels. The size of its file follows likewise, as an upper estimate: smaller views have
+more detail in a pixel, and compress worse.
 """
 
 from pathlib import Path

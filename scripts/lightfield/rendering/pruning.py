@@ -1,4 +1,4 @@
-"""Leaves out of a render what no pixel depends on.
+"""Leaves out of a render whatever changes no pixel.
 
 Leaving something out must not change a byte of any view. So the render key does not name it. It
 must save measurable time: docs/explanation/pruning.md has the time that each of these saves. Fewer
@@ -78,7 +78,7 @@ def removable_objects() -> list[str]:
 def objects_of_used_collections(users: Mapping[Any, Any]) -> set[Any]:
     """Return the objects of all collections that an instancer, a modifier or the like uses.
 
-    ``users`` are those of each data-block, from ``bpy.data.user_map()``.
+    ``users`` holds the users of each data-block, from ``bpy.data.user_map()``.
     """
     objects: set[Any] = set()
     for collection in bpy.data.collections:
@@ -88,7 +88,7 @@ def objects_of_used_collections(users: Mapping[Any, Any]) -> set[Any]:
 
 
 def _is_used(users: Collection[Any], removable: Collection[Any]) -> bool:
-    """Return whether any of an object's users needs it, and is not removable itself."""
+    """Return whether any user of an object needs it, and is not removable itself."""
     return any(not isinstance(user, _HOLDS_ONLY) and user not in removable for user in users)
 
 

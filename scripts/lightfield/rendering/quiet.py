@@ -1,4 +1,4 @@
-"""Silences Blender, which prints to standard output what concerns no user."""
+"""Silences Blender, whose messages on standard output concern no user."""
 
 import os
 import sys

@@ -21,14 +21,14 @@ PROGRAM = Path(__file__).resolve().parents[2] / "render_shard.py"
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 
 
-def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]) -> int:
+def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str, Any]) -> int:
     """Return the peak memory in bytes of a process that renders one small panorama of a scene.
 
-    The panorama shows the fullest frame of the ``inventory``. ``chosen`` is a scene YAML's
+    The panorama shows the fullest frame of the ``inventory``. ``scene_block`` is a scene YAML's
     ``scene`` block, or empty. Raises `UserError` if the scene does not fit into the machine's
     memory, or cannot be rendered.
     """
-    scene = {key: chosen[key] for key in ("scene_name", "view_layers") if chosen.get(key)}
+    scene = {key: scene_block[key] for key in ("scene_name", "view_layers") if scene_block.get(key)}
     with temporary_folder() as folder:
         content = {
             **Equirectangular(width=32, height=16).to_lightfield(),
@@ -38,7 +38,7 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
             "render": {**RENDER, "depth_precision": "float"},
         }
         LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
-        # The .blend's files are in their places: fetch nothing from a view store.
+        # The .blend's files are in their places, so there is nothing to fetch from a view store.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
         command: list[Any] = [
             "--blend",

@@ -1,10 +1,10 @@
 """Renders a shard: some views of a dataset, in one process.
 
-Each view is written as soon as it is rendered. The checksums of its files are logged beside the
-shard's record. A view has one file, and one for each pass. It is finished if its files have the
-bytes that were logged for the view's current render key. Finished views are kept: a killed shard
-renders only the missing views. The journal gets one JSON line for each rendered view: when it was
-finished, and how long it took.
+It writes each view as soon as the view is rendered. It logs the checksums of the view's files
+beside the shard's record. A view has one file, and one for each pass. A view is finished if its
+files have the bytes that the log has for the view's current render key. Finished views are kept: a
+killed shard renders only the missing views. The journal gets one JSON line for each rendered view:
+when it was finished, and how long it took.
 """
 
 import signal
@@ -49,9 +49,9 @@ Array = np.ndarray[Any, Any]
 
 
 def render(job: RenderShard) -> None:
-    """Render those of the chosen views that are missing.
+    """Render the chosen views that are missing.
 
-    Passes go into folders beside that of the views. So do the names of the objects, materials and
+    Passes go into folders beside the views' folder. So do the names of the objects, materials and
     instances that passes number. A view that takes too long ends the process by SIGALRM.
 
     Raises `UserError` if the scene cannot be opened, if the device is missing, or if a file cannot
@@ -148,8 +148,8 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     if needed > available():
         raise UserError(
             f"{blend}: a view of {lens.width} × {lens.height} pixels takes {units.size(needed)} "
-            f"of memory, and this machine has {units.size(available())}; render it on one that "
-            "has more, or smaller, or make the scene lighter"
+            f"of memory, and this machine has {units.size(available())}; render it on a "
+            "machine with more memory, lower the resolution, or make the scene lighter"
         )
 
 
@@ -244,7 +244,7 @@ def _visible_places(lightfield: LightField) -> Array | None:
 def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _Rendered:
     """Render the geometry of a view, if depth or a pass needs it, and then its colour.
 
-    ``visible`` are the places of `_visible_places`.
+    ``visible`` are the places from `_visible_places`.
     """
     from lightfield.rendering import shadow_catchers, unshown, visible_part
     from lightfield.rendering.colour_pass import render_colour
@@ -383,7 +383,7 @@ def pass_channels(
 def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:
     """Turn Cycles' depth (height, width) in metres into channel Z of a view's EXR.
 
-    ``rays`` are those of `depth_rays`.
+    ``rays`` come from `depth_rays`.
     """
     z = cycles_depth
     if rays is not None:

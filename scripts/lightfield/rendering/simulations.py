@@ -136,7 +136,7 @@ def _extents(depsgraph: Any, name: str) -> list[Any]:
 
 
 def _rendered_objects(depsgraph: Any) -> set[str]:
-    """Return the full names of the objects that a render shows, and of those that place them."""
+    """Return the full names of the objects that a render shows, and of all that place them."""
     return {
         str(obj.original.name_full)
         for entry in depsgraph.object_instances

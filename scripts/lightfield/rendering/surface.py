@@ -171,7 +171,7 @@ def _is_volume(material: Any) -> bool:
 
 
 def _triangulated(data: Any, is_volume: tuple[bool, ...]) -> Mesh:
-    """Return a mesh as triangles, without the faces of those materials that are volumes."""
+    """Return a mesh as triangles, without the faces of materials that are volumes."""
     vertices = np.empty(3 * len(data.vertices), np.float32)
     data.vertices.foreach_get("co", vertices)
     data.calc_loop_triangles()

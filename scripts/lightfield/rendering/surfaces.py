@@ -40,9 +40,9 @@ _OPAQUE = 0.999
 
 
 def set_up(layer: Any, passes: Collection[Pass]) -> None:
-    """Make every material of the scene write those of the ``passes`` that are of surfaces.
+    """Make every material of the scene write the surface passes among the ``passes``.
 
-    Raises `UserError` for shadow catchers: Cycles adds what they write twice.
+    Raises `UserError` for shadow catchers: Cycles adds their values twice.
     """
     of_surfaces = {each.name: each for each in passes if each.unless}
     if not of_surfaces:
@@ -50,7 +50,7 @@ def set_up(layer: Any, passes: Collection[Pass]) -> None:
     if catchers := shadow_catchers.names():
         raise UserError(
             f"render.passes: {catchers[0]} is a shadow catcher, whose values are wrong in "
-            f"{', '.join(of_surfaces)}; turn that off, or leave these passes out"
+            f"{', '.join(of_surfaces)}; make it an ordinary object, or leave these passes out"
         )
     for view_pass in of_surfaces.values():
         for name in view_pass.cycles:

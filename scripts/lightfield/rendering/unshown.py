@@ -35,14 +35,14 @@ def left_out(
         return colour, None, 0
     assert geometry.alpha is not None
     # A pixel may show something else beside its centre. The one sample at the centre tells, but may
-    # find no shadow in a half-shadow. Beside a pixel that shows nothing there is hardly any.
+    # find no shadow in a half-shadow. Half-shadows are rare beside a pixel that shows nothing.
     unshown = shows_nothing | (_widened(shows_nothing) & (geometry.alpha < LEAST_ALPHA))
     count = int((np.isfinite(geometry.depth) & unshown).sum())
     return colour, geometry.without(unshown), count
 
 
 def _widened(pixels: Array) -> Array:
-    """Return the pixels (height, width), and those around that the pixel filter mixes with them."""
+    """Return the pixels (height, width), and all that the pixel filter mixes with them."""
     reach = math.floor(bpy.context.scene.cycles.filter_width / 2) + 1
     windows = np.lib.stride_tricks.sliding_window_view(
         np.pad(pixels, reach), (2 * reach + 1, 2 * reach + 1)

@@ -26,7 +26,7 @@ _VOLUMES = (".vdb",)
 # The types of geometry that Blender imports.
 _IMPORTED = {"Mesh", "Cube", "Sphere", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1"}
 _IMPORTED |= {"Plane", "Volume"}
-# Those that a model never shows, as they are no surfaces.
+# The types of geometry that a model never shows, because they are no surfaces.
 _NO_SURFACES = {"BasisCurves", "NurbsCurves", "HermiteCurves", "Points"}
 
 
@@ -100,7 +100,7 @@ def _reference(layer: Any, name: str) -> FileReference | None:
 
 
 def _file(address: str) -> str:
-    """Return the file of an address. What lies in an archive has the archive's name before it."""
+    """Return the file of an address. A file in an archive has the archive's name before it."""
     outer, _ = openusd().Ar.SplitPackageRelativePathOuter(address)
     return str(outer)
 
@@ -115,14 +115,14 @@ def _from(folder: Path, reference: FileReference) -> FileReference:
 
 
 def _composition_errors(path: Path, stage: Any) -> list[str]:
-    """Return what of a stage is not composed: missing and unknown files, servers, and cycles."""
+    """Return why a stage is incomplete: missing and unknown files, servers, and cycles."""
     messages = set()
     for error in stage.GetCompositionErrors():
         prim = stage.GetPrimAtPath(error.rootSite.path)
         if prim and not prim.IsActive():
             continue
         message = str(error).replace(f"{path.absolute().parent}/", "")
-        # The session's layer, and what layers are opened with, concern no user.
+        # Remove the name of the session's layer, and the arguments with which layers were opened.
         message = re.sub(r",@anon:[^@]*@|:SDF_FORMAT_ARGS:[^@]*", "", message)
         # OpenUSD takes an address for a path, and shortens it.
         message = re.sub(r"@(\w+):/(?=\w)", r"@\1://", message)
@@ -134,7 +134,7 @@ def _surfaces_left_out(stage: Any) -> list[str]:
     """Return the visible surfaces of a stage that Blender does not import, or not as they are."""
     usd = openusd()
     problems = []
-    # What is instanced is not among the prims of the stage itself.
+    # The stage's own prims do not include the prims of instances.
     roots = [stage.GetPseudoRoot(), *stage.GetPrototypes()]
     for prim in itertools.chain.from_iterable(map(usd.Usd.PrimRange, roots)):
         type_name = prim.GetTypeName()

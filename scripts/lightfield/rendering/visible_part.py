@@ -1,7 +1,7 @@
 """Finds the part of a transparent view that can show a model, so that Cycles renders only this.
 
 All other pixels are empty. Cycles would take all samples of each of them, and denoise them, too.
-Without denoising, the pixels are the same as those of a render of the whole view.
+Without denoising, the pixels are the same as in a render of the whole view.
 """
 
 import math
@@ -17,9 +17,9 @@ from lightfield.rendering import motion_blur, volumes
 from lightfield.rendering.cycles import set_window
 from lightfield.rendering.render_graph import in_render
 
-# Of a larger mesh, the corners of its box stand for its vertices.
+# If a mesh has more vertices, the corners of its box stand for them.
 MOST_VERTICES = 100_000
-# Cycles shows nothing of these, unless cameras see a lamp.
+# Cycles does not show these types. It shows a lamp only if cameras can see it.
 _UNSEEN = {"ARMATURE", "CAMERA", "EMPTY", "LATTICE", "LIGHT", "LIGHT_PROBE", "SPEAKER"}
 
 Array = NDArray[Any]
@@ -57,7 +57,7 @@ def places() -> NDArray[np.float64] | None:
 
 
 def _places(depsgraph: Any) -> NDArray[np.float64] | None:
-    """Return what `places` does, of a render's dependency graph."""
+    """Return the result of `places`, from a render's dependency graph."""
     groups = [np.empty((0, 3))]
     for instance in depsgraph.object_instances:
         obj = instance.object
@@ -80,10 +80,10 @@ def _places(depsgraph: Any) -> NDArray[np.float64] | None:
 def choose(
     visible: NDArray[np.float64] | None, world_from_camera: Array, lens: Lens
 ) -> Part | None:
-    """Make the next renders those of the part that shows something.
+    """Limit the next renders to the part that shows something.
 
-    ``world_from_camera`` (4, 4) is their pose, and ``visible`` are `places`. Return the part.
-    Return None for the whole view.
+    ``world_from_camera`` (4, 4) is the renders' pose, and ``visible`` are the `places`. Return the
+    part. Return None for the whole view.
     """
     if visible is None:
         return None

@@ -165,10 +165,10 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
 
     ``source_is_z`` and ``target_is_z`` say whether an image holds Z-depth or distance. On a smooth
     surface, 1 / distance is interpolated, because it is nearly linear on a plane. The result stays
-    within the range of the four pixels around. Elsewhere the pixel is taken that the ray falls in.
-    Beyond the rim of the image circle the nearest of the four pixels is taken. So no depth lies
-    between two surfaces. Returns (H, W), half or float. A miss (inf) stays inf, and NaN marks a
-    pixel without a source.
+    within the range of the four pixels around. Elsewhere, the pixel that the ray falls in gives the
+    depth. Beyond the rim of the image circle, it is the nearest of the four pixels. So no depth
+    lies between two surfaces. Returns (H, W), half or float. A miss (inf) stays inf, and NaN marks
+    a pixel without a source.
     """
     if lens_map.strip is not None:
         # Repeat the edge: depth on the next face would be along another axis.

@@ -1,4 +1,4 @@
-"""A run of scripts/reproject.py: its files, its views, and their keys."""
+"""The work of one run of scripts/reproject.py: its files, its views, and their keys."""
 
 import hashlib
 import itertools
@@ -75,7 +75,7 @@ class ReprojectionJob:
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
         self.record = ShardRecord(stage.record, stage.output_dir)
-        # For each 16-bit depth map, how many depths no step of it holds.
+        # For each 16-bit depth map, the number of depths that no step of it can hold.
         self.lost_depths: list[int] = []
         # The SHA-256 of each image, by its path in the dataset.
         self.source_sums: dict[str, str] = {}
@@ -86,15 +86,15 @@ class ReprojectionJob:
     def _chosen_passes(self) -> list[Pass]:
         """Return the passes to reproject. Raises `UserError` for a pass that the views lack."""
         available = [each.name for each in self.lightfield.passes if each.kind != "motion"]
-        chosen: list[str] = []
+        names: list[str] = []
         for name in self.settings.passes:
             groups = self.lightfield.light_groups if name == LIGHT_GROUPS else []
-            chosen += map(passes.group_pass, groups) if groups else [name]
-        for name in chosen:
+            names += map(passes.group_pass, groups) if groups else [name]
+        for name in names:
             if name not in available:
                 allowed = ", ".join(available) or "no passes to reproject"
                 raise UserError(f"passes: is {name}; {self.stage.input_cfg} has {allowed}")
-        return [passes.by_name(name) for name in chosen]
+        return [passes.by_name(name) for name in names]
 
     def _chosen_lights(self) -> list[Light]:
         """Return the lights of the images. Raises `UserError` for a group that the views lack."""
@@ -212,7 +212,7 @@ class ReprojectionJob:
         return [*images.values(), *self.pass_outputs(view, target).values()]
 
     def sources(self, view: SourceView) -> list[Path]:
-        """Return the files that a view is made of: its images, and those of its passes."""
+        """Return the files from which a view is made: its images, and the files of its passes."""
         folder = self.lightfield.folder
         read = [each.path(folder, view.name) for each in self.passes]
         for light in self.lights:

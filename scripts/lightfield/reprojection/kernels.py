@@ -3,7 +3,7 @@
 Sources are (h, w, 4) float32. A pixel that is not finite is left out, and the other weights are
 scaled up. If no pixel remains, the result is NaN. ``valid`` (h, w) is NaN where the source has no
 ray. ``coordinates`` (H, W, 2) are the (x, y) of each sample in the source. ``flags`` (H, W) are
-`NOTHING`, `INSIDE` or `CAREFUL`. ``topology`` is that of a lens map.
+`NOTHING`, `INSIDE` or `CAREFUL`. ``topology`` is a lens map's topology.
 """
 
 import math
@@ -313,7 +313,7 @@ def covering(weights: Weights) -> Callable[..., None]:
 
 @kernel
 def block_mean(fine: Array, samples: int, out: Array) -> None:
-    """Average blocks of ``samples`` × ``samples`` pixels, without those that are NaN."""
+    """Average blocks of ``samples`` × ``samples`` pixels, without pixels that are NaN."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a0 = a1 = a2 = a3 = np.float32(0)

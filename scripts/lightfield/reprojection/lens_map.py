@@ -243,7 +243,7 @@ class _SourcePart:
 
 
 def _source_part(source: Lens, areas: list[Any], fold: Fold, reach: int) -> _SourcePart:
-    """Return the part of the source that a filter reads. ``areas`` are those of the fold's part.
+    """Return the part of the source that a filter reads. ``areas`` are `bounds` of the fold's part.
 
     For a cube map it is the whole strip, with borders as wide as the filter reaches.
     """
@@ -489,7 +489,7 @@ def _margin(reach: int) -> int:
 
 
 def _on_strip(pixels: Array, source: CubeMap, border: int) -> Array:
-    """Convert coordinates in the strip of faces to those in the strip with borders."""
+    """Convert coordinates from the strip of faces to the strip with borders."""
     face = np.floor(pixels[..., 0] / source.height)
     shift = np.stack([(2 * face + 1) * border, np.full_like(face, border)], axis=-1)
     return np.asarray(pixels + shift)
@@ -523,7 +523,7 @@ def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
 def _window(areas: list[Any], fold: Fold, source: Lens) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
-    ``areas`` are those of the fold's part. A source that wraps around needs all its columns.
+    ``areas`` are the `bounds` of the fold's part. A source that wraps around needs all its columns.
     """
     limits = np.array([area[:4] for area in areas])
     low = limits[:, :2].min(axis=0)

@@ -58,11 +58,11 @@ def _read(job: ReprojectionJob, view_pass: Pass, view: SourceView) -> Image:
 
 @dataclass(frozen=True)
 class _Balance:
-    """What makes resampled light groups add up to the resampled colour.
+    """The correction that makes resampled light groups add up to the resampled colour.
 
-    Rounding, and filters that keep light from becoming negative, change their sum. ``missing``
-    (H, W, 3) is what the sum of ``count`` groups lacks. Each group takes its part of it, in
-    proportion to its light, of which ``size`` (H, W, 3) is the sum. Only one group is in memory.
+    Rounding, and filters that keep light from becoming negative, change their sum. ``missing`` (H,
+    W, 3) is what the sum of ``count`` groups lacks. Each group takes its part of it, in proportion
+    to its light. ``size`` (H, W, 3) is the sum of the groups' light. Only one group is in memory.
     """
 
     missing: Array

@@ -230,9 +230,9 @@ def _developed(
     outputs: Mapping[str, Path],
     parameters: SensorParameters | None,
 ) -> _Image:
-    """Resample a view, and develop its colour for those ``outputs`` that hold colour.
+    """Resample a view, and develop its colour for the ``outputs`` that hold colour.
 
-    ``parameters`` are those of the sensor, if there is one.
+    ``parameters`` describe the sensor, if there is one.
     """
     settings = job.settings
     transparent = job.lightfield.transparent

@@ -1,9 +1,9 @@
 """The base classes of lenses: pixels to rays and back, and how lenses are read and written.
 
-The camera looks along −Z with +Y up and +X right. Pixel coordinates run right (x) and down (y)
-from the image's top left corner. Pixel centres are at (i + 0.5). θ is a ray's angle from the
-optical axis, and r is the distance from the principal point. Conventions are those of Blender's
-Cycles, measured on its Position pass with bpy 5.0.1:
+The camera looks along −Z with +Y up and +X right. Pixel coordinates run right (x) and down (y) from
+the image's top left corner. Pixel centres are at (i + 0.5). θ is a ray's angle from the optical
+axis, and r is the distance from the principal point. Conventions follow Blender's Cycles, measured
+on its Position pass with bpy 5.0.1:
 
 - equidistant: on a non-square image the image circle is an ellipse that touches all four edges.
   The sensor plays no part. The same holds for all lenses that only a field of view describes.
@@ -118,7 +118,7 @@ class Lens(ABC):
       camera. The first is written, all are read;
     - ``in_cycles``: whether Cycles renders it. Reprojection makes views of the others;
     - ``Settings``: its keys in a scene YAML, or None if a scene YAML cannot have it;
-    - ``form``: the numbers of its flag, in mm and radians. Those in brackets are optional.
+    - ``form``: the numbers of its flag, in mm and radians. Numbers in brackets are optional.
     """
 
     name: ClassVar[str]

@@ -20,7 +20,7 @@ CUBE_FACE_ANGLES = {
 }
 """Faces in order: the XYZ Euler angles that turn the cube map's camera to each.
 
-Names and directions are those of a cuboid rig's sides:
+A cuboid rig's sides have the same names and directions:
 
 - f looks along −Z, b along +Z, l along −X and r along +X; these have +Y up;
 - u looks along +Y and has +Z up;

@@ -1,8 +1,8 @@
 """Camera rigs: how many views a rig has, and the name and pose of each. Each type has a file.
 
-Order, names and orientations are those of the SILVR datasets and of the Blender addon that
-rendered them (https://github.com/IDLabMedia/blender-lightfield-addon, ``lightfield_*.py``).
-Nothing here needs Blender.
+Order, names and orientations agree with the SILVR datasets, and with the Blender addon that
+rendered them (https://github.com/IDLabMedia/blender-lightfield-addon, ``lightfield_*.py``). Nothing
+here needs Blender.
 """
 
 from collections.abc import Mapping

@@ -64,7 +64,7 @@ class BlendCamera(Rig):
     def unit_poses(self) -> UnitPoses:
         """Return the views. Raises `UserError` before the inventory has been set."""
         if self.file is None:
-            raise UserError("blend_camera: the camera's place is unknown until the .blend was read")
+            raise UserError("blend_camera: the camera's place is unknown until the .blend is read")
         blend = read_keys(self.file, "inventory.py", "blend")["blend"]
         with reading(self.file, "inventory"):
             frames = [blend["frame"] if frame is None else frame for frame in self.path]

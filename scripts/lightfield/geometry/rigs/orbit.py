@@ -45,7 +45,7 @@ class Orbit(CountedRig):
 
     def unit_poses(self) -> UnitPoses:
         places = self.directions() / 2
-        # In proportion to the longest side, so that a sphere's are exactly those of the unit box.
+        # Divide by the longest side, so that a sphere's places are exactly as in the unit box.
         longest = max(self.sides.tolist())
         from_middle = places * (self.sides / (longest or 1.0))
         at_middle = ~from_middle.any(axis=-1)

@@ -47,7 +47,7 @@ from lightfield.geometry.rotations import (
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 _QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 _LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
-# The axes of a camera in ours, by the camera_convention of a transforms.json.
+# The axes of a camera in our axes, by the camera_convention of a transforms.json.
 _CAMERA_AXES = {"opengl": np.eye(4), "opencv": np.diag([1.0, -1.0, -1.0, 1.0])}
 # In bytes. It is enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
@@ -169,7 +169,8 @@ def _check_poses(
     """Raise `UserError` for a wrong pose of a file.
 
     ``where`` names each pose. ``world_from_cameras`` (n, 4, 4) and ``positions`` (n, 3) are in
-    metres, and ``rotations`` (n, 3) are XYZ Euler angles in radians. What a pose lacks is NaN.
+    metres, and ``rotations`` (n, 3) are XYZ Euler angles in radians. Numbers that a pose lacks are
+    NaN.
     """
 
     def refuse(wrong: NDArray[np.bool_], why: str) -> None:
@@ -283,8 +284,8 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         check_mapping(where, frame)
         if "transform_matrix_start" in frame:
             raise UserError(
-                f"{where}: transform_matrix_start: is of a camera that moves; give each frame one "
-                "transform_matrix"
+                f"{where}: transform_matrix_start: describes a camera that moves; give each frame "
+                "one transform_matrix"
             )
         key = "transform_matrix"
         world_from_cameras.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))

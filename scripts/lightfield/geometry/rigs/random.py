@@ -21,7 +21,7 @@ class Random(CountedRig):
     """Cameras at random places in free space, with at least ``clearance`` around them.
 
     ``file`` is not for scene YAMLs: scripts/free_places.py writes the free places to it. Without
-    it, the poses are those of an empty scene.
+    it, the rig places its cameras as in an empty scene.
     """
 
     shape = "CUBOID"

@@ -266,7 +266,7 @@ class Rig(Settings):
         thinner = self._thinned_to(max_views // self.views_a_position)
         if thinner is None:
             raise UserError(f"a rig of type {self.type} cannot have as few as {max_views} views")
-        # Names in a split are those of the full rig's views.
+        # A split's names refer to the full rig: a thinned rig may give them to other views.
         if isinstance(self.split, Chosen) and self.split.names:
             return thinner.model_copy(update={"split": None})
         return thinner
