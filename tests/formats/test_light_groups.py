@@ -112,7 +112,7 @@ def test_equal_names_are_numbered_and_do_not_depend_on_their_order():
 def test_255_groups_are_allowed_and_more_are_refused():
     emitters = [f"lamp {number}" for number in range(255)]
     assert len(resolved("each", emitters)) == 255
-    with pytest.raises(UserError, match=r"render\.light_groups: makes 256 groups, and Cycles has"):
+    with pytest.raises(UserError, match=r"render\.light_groups: makes 256 groups, and Cycles can"):
         resolved("each", ["one more", *emitters])
     assert len(resolved({"lamps": emitters}, ["one more", *emitters])) == 2
 

@@ -395,7 +395,7 @@ def test_a_camera_that_moves_while_it_exposes_is_refused(more, tmp_path):
     frame = {"file_path": "a.png", "transform_matrix_start": start, "transform_matrix_end": start}
     file = tmp_path / "transforms.json"
     file.write_text(json.dumps({"frames": [frame | more]}))
-    with pytest.raises(UserError, match=r"frames\[0\]: transform_matrix_start: is of a camera"):
+    with pytest.raises(UserError, match=r"frames\[0\]: transform_matrix_start: describes a camera"):
         from_settings({"type": "poses", "file": str(file)}).poses()
 
 
