@@ -25,7 +25,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.export import disparity
 from lightfield.export.points import evenly, one_a_voxel
-from lightfield.export.source import SourceDataset, ViewSurface
+from lightfield.export.source import SeenSurface, SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -1291,7 +1291,7 @@ def test_points_come_from_views_with_sky_too():
     rays = lens.pixel_rays()
     distance = np.full(rays.shape[:2], np.inf)
     distance[2:6, 2:6] = 3
-    surface = ViewSurface(lens, View.placed("one", np.eye(4)), rays, distance)
+    surface = SeenSurface(lens, View.placed("one", np.eye(4)), rays, distance)
     with np.errstate(invalid="raise"):
         points, normals = surface.points(1)
     assert points.shape == normals.shape == (16, 3)

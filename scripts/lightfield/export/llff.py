@@ -13,7 +13,7 @@ import numpy as np
 
 from lightfield.core.files import write_bytes
 from lightfield.export import cameras
-from lightfield.export.source import Floats, ViewSurface, pixel_indices
+from lightfield.export.source import Floats, SeenSurface, pixel_indices
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -23,7 +23,7 @@ _OUTLIERS = 0.1
 _STEP = 4
 
 
-def depths(lens: Rectilinear, view: View, surface: ViewSurface) -> Floats:
+def depths(lens: Rectilinear, view: View, surface: SeenSurface) -> Floats:
     """Return the Z of the points of a surface that are in a view's frame."""
     points = surface.points(_STEP)[0]
     local = (points - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]

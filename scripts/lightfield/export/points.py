@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
-from lightfield.export.source import Floats, SourceDataset, ViewSurface, pixel_indices
+from lightfield.export.source import Floats, SeenSurface, SourceDataset, pixel_indices
 from lightfield.formats.lightfield import View
 
 # Lift this many candidates for each point, and keep an even selection of them.
@@ -72,7 +72,7 @@ def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
     return joined(parts)
 
 
-def _points_of(source: SourceDataset, view: View, surface: ViewSurface, step: int) -> Points:
+def _points_of(source: SourceDataset, view: View, surface: SeenSurface, step: int) -> Points:
     """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
     positions, normals = surface.points(step)
     local = (positions - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]

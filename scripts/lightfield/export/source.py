@@ -200,7 +200,7 @@ class SourceDataset:
     def _rays(self) -> Floats:
         return self.lens.pixel_rays()
 
-    def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "ViewSurface"]]:
+    def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "SeenSurface"]]:
         """Yield each view with the surface that it sees, from the depth of its rendered view."""
         if self.rendered.depth is None:
             raise UserError(
@@ -214,11 +214,11 @@ class SourceDataset:
             rendered = by_name.get(name) or by_name[name.rpartition("_")[0]]
             path = self._path(rendered.name, "exr", ".exr")
             distance = depth_of(path, self.rendered, rays, "distance")
-            yield view, ViewSurface(self.rendered.lens, rendered, rays, distance)
+            yield view, SeenSurface(self.rendered.lens, rendered, rays, distance)
 
 
 @dataclass(frozen=True)
-class ViewSurface:
+class SeenSurface:
     """The first surface around a camera: ``distance`` (h, w) in metres along ``rays`` (h, w, 3)."""
 
     lens: Lens
