@@ -1,4 +1,5 @@
 # Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
+import atexit
 import sys
 from pathlib import Path
 
@@ -10,14 +11,16 @@ min_version("9.0")
 FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
-from lightfield.core.errors import UserError
-from lightfield.core.disk_space import obstacle
-from lightfield.core.yaml_files import as_written
 from lightfield.configuration.config_file import read_config
+from lightfield.core.disk_space import obstacle
+from lightfield.core.errors import UserError
+from lightfield.core.yaml_files import as_written
+from lightfield.workflow.failures import failure_report
+from lightfield.workflow.view_store import ViewStore
 
 # Snakemake ends with a traceback if it cannot write its notes.
-if cause := obstacle(Path(".snakemake")):
-    sys.exit(f"error: .snakemake: cannot be written: {cause}")
+if problem := obstacle(Path(".snakemake")):
+    sys.exit(f"error: .snakemake: cannot be written: {problem}")
 
 # The keys from the command line, or from the workflow whose module this is. config.yaml fills in
 # the others.

@@ -87,7 +87,7 @@ rule check_gpu:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
+        cache=of_first("paths.trials"),
         calibration=optional("calibration"),
         stem=subpath(output[0], strip_suffix=".json"),
     message:

@@ -1,52 +1,23 @@
 # The configuration, and where everything lies. Every path of the workflow comes from here.
-import atexit
-import json
 import os
 import re
 import shlex
-import subprocess
 import sys
-import tempfile
-import time
-from functools import cache
-from pathlib import Path
+from operator import attrgetter
+
+from lightfield.configuration.config_file import load_config
+from lightfield.configuration.dataset import Cluster
+from lightfield.configuration.dataset_paths import Paths
+from lightfield.core.errors import UserError
+from lightfield.core.gpus import visible
+from lightfield.core.memory import available
+from lightfield.workflow import ledger, presence, shard_counts
+from lightfield.workflow.build import Build
 
 # Relative to Snakemake's folder, which may be a user's own, and quoted for commands.
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
-from lightfield.core import disk_space, leftovers, units
-from lightfield.workflow.failures import (
-    batch_log,
-    cause,
-    failure_report,
-    first_sentence,
-    is_newer,
-)
-from lightfield.core.gpus import visible
-from lightfield.core.memory import available
-from lightfield.planning.cost import (
-    STAGES,
-    Cost,
-    cost,
-    light_group_count,
-    shard_threads,
-    temporary_bytes,
-    view_cost,
-)
-from lightfield.workflow import ledger, presence, shard_counts
-from lightfield.configuration.config_file import load_config
-from lightfield.configuration.dataset_paths import PICTURES, PLOTS, Paths
-from lightfield.configuration.dataset import Cluster
-from lightfield.formats.export_lists import MANIFEST
-from lightfield.configuration.exports import (
-    SEQUENCE_EXPORTS,
-)
-from lightfield.stages import job_settings
-from lightfield.workflow.build import Build, learned_exports, stage_of
-from lightfield.workflow.shard_files import JOURNAL_SUFFIX
-from lightfield.workflow.view_store import ViewStore
-from lightfield.geometry.lenses.cube_map import CUBE_FACES
 
 # The rigs in a config.yaml belong to the scenes in it. For other scenes, all rigs are chosen.
 NAMING = GIVEN if "scenes" in GIVEN else OWN
@@ -72,24 +43,8 @@ RESULTS = SETTINGS.results
 WORK = SETTINGS.work
 CHOSEN = BUILD.chosen
 DATASETS = BUILD.datasets
-CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
 # Imported scenes have only views.
 RENDERED_SCENES = list(dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported))
-
-# The imported scenes, as a wildcard's constraint. "(?!)" matches nothing.
-IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
-
-# The rigs with exports of a whole sequence, as a wildcard's constraint on the start of a path.
-SEQUENCES = (
-    "|".join(
-        {
-            re.escape(f"{d.scene_folder}/{d.rig_name}")
-            for d in DATASETS.values()
-            if d.sequence_exports
-        }
-    )
-    or "(?!)"
-)
 
 # The paths of a dataset, with wildcards.
 PATHS = Paths(RESULTS, WORK)
@@ -107,6 +62,19 @@ DEFAULT_GPUS = 0 if ASKS_FOR_GPUS else None
 GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else DEFAULT_GPUS
 
 
+def one_of(names):
+    """Return the wildcard's constraint that matches these names, or nothing without any."""
+    return "|".join(sorted(map(re.escape, names))) or "(?!)"
+
+
+# Only the datasets tell whether a path is a rig with frames, or a dataset without. So these are
+# constraints on both wildcards, written at ``scene``. A ruleorder comes too late for this:
+# Snakemake first asks for the inputs of every rule that matches, and one of them would refuse.
+SEQUENCES = one_of({d.sequence_name for d in DATASETS.values() if d.sequence_exports})
+SCENE_OF_SEQUENCE = rf"(?=(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+"
+SCENE_OF_DATASET = rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+"
+
+
 wildcard_constraints:
     name="[A-Za-z0-9_-]+",
     scene="[A-Za-z0-9_-]+",
@@ -121,9 +89,9 @@ wildcard_constraints:
     end=r"\d+",
 
 
-def is_of(job, *names):
-    """Return whether a job's rule is one of these. A workflow that has them as a module may rename it."""
-    return job.rule.name in {getattr(rules, name).rule.name for name in names}
+def is_of(job, name):
+    """Return whether a job's rule has this name, which a workflow with a module may change."""
+    return job.rule.name == getattr(rules, name).rule.name
 
 
 def log_of(job):
@@ -144,16 +112,6 @@ def asked(question, wildcards):
         sys.exit(f"error: {error}")
 
 
-def dataset_of(wildcards):
-    """Return the dataset of a job's wildcards."""
-    return asked(BUILD.dataset, wildcards)
-
-
-def scene_of(wildcards):
-    """Return any dataset of the scene of a job's wildcard."""
-    return asked(BUILD.scene, wildcards)
-
-
 def of_build(question):
     """Return an input function: it returns what a function of the build says of the job."""
     return of_each_shard(lambda wildcards: asked(question, wildcards))
@@ -164,17 +122,16 @@ def of_dataset(attribute):
 
     A file that the dataset lacks is an empty list.
     """
-    return of_each_shard(
-        lambda wildcards: getattr(dataset_of(wildcards), attribute) or []
-    )
+    return of_build(lambda names: attrgetter(attribute)(BUILD.dataset(names)) or [])
 
 
 def of_first(attribute):
     """Return an input function: an attribute of the dataset whose views are the scene's probes."""
-    return (
-        lambda wildcards: getattr(BUILD.first_of_scene(wildcards.scene), attribute)
-        or []
-    )
+
+    def of_probed(names):
+        return attrgetter(attribute)(BUILD.first_of_scene(names["scene"])) or []
+
+    return of_build(of_probed)
 
 
 def optional(*names, **flags):

@@ -5,7 +5,8 @@ rule costs:
     input:
         settings=settings("costs"),
         validation=PATHS.validation,
-        records=stored_records,
+        # Without a store the validation is enough, and a plan of many shards is shorter.
+        records=of_dataset("all_records") if STORE else [],
         published=of_dataset("published"),
         pictures=PATHS.pictures,
         blend=of_dataset("blend"),
@@ -21,12 +22,7 @@ rule costs:
         journals=f"{PATHS.work}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
         # A calibration belongs to the preset, the scene itself to all of them.
-        scene_benchmarks=lambda wildcards: [
-            f"{WORK}/benchmarks/{folder}"
-            for folder in dict.fromkeys(
-                (dataset_of(wildcards).scene_name, wildcards.scene)
-            )
-        ],
+        scene_benchmarks=of_dataset("scene_benchmarks"),
         blend=optional("blend"),
         inventory=optional("inventory"),
     message:
@@ -46,7 +42,7 @@ rule status:
     params:
         results=RESULTS,
         work=WORK,
-        datasets=lambda wildcards: status_arguments(),
+        datasets=status_arguments,
     message:
         "Looking at the progress of the chosen datasets"
     shell:

@@ -1,10 +1,16 @@
 # The terminal's display: the progress of a run, and the forecast of a dry run.
+import atexit
 import logging
 import resource
+import sys
+from functools import cache
+from pathlib import Path
 
 from lightfield.core.units import duration
-from lightfield.workflow.run_display import RunDisplay, Task
+from lightfield.planning.cost import STAGES, Cost, cost
 from lightfield.planning.forecast import SENSOR_PHASE, Work, forecast
+from lightfield.workflow.failures import failure_report
+from lightfield.workflow.run_display import RunDisplay, Task
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -41,17 +47,11 @@ PHASE_ORDER = {
 UNKNOWN_PHASES = ("measurement", "benchmark", "learn", "plan", "synthesis")
 
 
-def views_of(job):
-    """Return the number of views that a shard's job makes. Other jobs make none."""
-    wildcards = job.wildcards
-    if "first" in wildcards.keys():
-        return int(wildcards.end) - int(wildcards.first)
-    return 0
-
-
 def rendered_views(job):
     """Return the number of the dataset's views that a job renders."""
-    return views_of(job) if is_of(job, "render") else 0
+    if not is_of(job, "render"):
+        return 0
+    return int(job.wildcards.end) - int(job.wildcards.first)
 
 
 def is_of_sensor(job):
@@ -96,8 +96,7 @@ def cost_of(job):
     if is_of(job, "build_members"):
         return asked(BUILD.batch_cost, wildcards)
     stage = stages().get(job.rule.name, job.rule.name)
-    dataset = dataset_of(wildcards) if is_of_dataset(job) else None
-    return cost(stage, dataset, views_of(job), wildcards.get("reprojection", ""))
+    return cost_at(stage, wildcards) if is_of_dataset(job) else cost(stage)
 
 
 def task_of(job):
@@ -248,8 +247,7 @@ def dataset_name_of(job):
         return None
     if not is_of_dataset(job):
         return f"{wildcards.scene}/{wildcards.rig}"
-    dataset = dataset_of(wildcards)
-    return f"{dataset.scene_folder}/{dataset.rig_name}"
+    return asked(BUILD.dataset, wildcards).sequence_name
 
 
 def work_of(job):

@@ -43,7 +43,7 @@ rule calibrate:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
+        cache=of_first("paths.trials"),
         seconds=PATHS.calibration_seconds,
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
@@ -80,7 +80,7 @@ rule measure_error:
         gpu=GPUS,
     params:
         device=SETTINGS.device,
-        cache=lambda wildcards: BUILD.first_of_scene(wildcards.scene).paths.trials,
+        cache=of_first("paths.trials"),
         calibration=optional("calibration"),
         stem=subpath(output[0], strip_suffix=".json"),
     message:

@@ -1,4 +1,5 @@
 # Files with which trainers open a dataset.
+from lightfield.configuration.exports import SEQUENCE_EXPORTS
 
 
 rule export_to_instant_ngp:
@@ -24,34 +25,6 @@ rule export_to_instant_ngp:
         " --output {output} > {log} 2>&1"
 
 
-# The frames of a sequence lie in the rig's folder, beside the exports of all of them.
-rule export_sequence:
-    input:
-        settings=settings("export_sequence"),
-        views=of_build(BUILD.exported_frames),
-    output:
-        PATHS.export_list(),
-    log:
-        log_of("{scene}/{rig}/{source}export_{format}"),
-    benchmark:
-        times_of("{scene}/{rig}/export/{source}{format}")
-    wildcard_constraints:
-        rig="[A-Za-z0-9_.-]+",
-        format="|".join(SEQUENCE_EXPORTS),
-    resources:
-        mem_mb=4000,
-        runtime=240,
-    params:
-        rig=PATHS.folder,
-        folder=subpath(output[0], parent=True),
-    message:
-        "Exporting the sequence {wildcards.scene}/{wildcards.rig} for {wildcards.format}"
-    shell:
-        f"{taking('input.views')}python {SCRIPTS}/export.py"
-        " {wildcards.format} --settings {input.settings} --dataset {params.rig}"
-        " --output {params.folder} > {log} 2>&1"
-
-
 rule export:
     input:
         settings=settings("export"),
@@ -65,7 +38,7 @@ rule export:
     benchmark:
         times_of("{scene}/{rig}/export/{source}{format}")
     wildcard_constraints:
-        format=f"(?!(?:{'|'.join(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
+        format=rf"(?!(?:{one_of(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
     resources:
         mem_mb=4000,
         runtime=120,
@@ -78,3 +51,20 @@ rule export:
         f"{taking('input.views')}python {SCRIPTS}/export.py"
         " {wildcards.format} --settings {input.settings} --dataset {params.dataset}"
         " --output {params.folder} > {log} 2>&1"
+
+
+# The frames of a sequence lie in the rig's folder, beside the exports of all of them.
+use rule export as export_sequence with:
+    input:
+        settings=settings("export_sequence"),
+        views=of_build(BUILD.exported_frames),
+    wildcard_constraints:
+        rig="[A-Za-z0-9_.-]+",
+        format=one_of(SEQUENCE_EXPORTS),
+    resources:
+        mem_mb=4000,
+        runtime=240,
+    params:
+        dataset=PATHS.folder,
+    message:
+        "Exporting the sequence {wildcards.scene}/{wildcards.rig} for {wildcards.format}"

@@ -1,8 +1,14 @@
 # The causes of failed jobs, for the end of a run.
 import logging
+import os
 import signal
+from pathlib import Path
 
 from snakemake_interface_logger_plugins.common import LogEvent
+
+from lightfield.core.disk_space import obstacle
+from lightfield.workflow.failures import batch_log, cause, first_sentence, is_newer
+from lightfield.workflow.view_store import ViewStore
 
 # The executor's messages on failed jobs, such as that a job was refused, by the jobs' numbers.
 EXECUTOR_MESSAGES = {}

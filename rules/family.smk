@@ -1,10 +1,9 @@
 # Families of scenes. One job builds a batch of members, with all stages of each.
-
 from lightfield.configuration.corpus import CORPUS_FILES
 
 
 wildcard_constraints:
-    family="|".join(BUILD.family_names) or "(?!)",
+    family=one_of(BUILD.family_names),
     batch=r"(seeds|models)_\d+_(of_)?\d+",
 
 
@@ -19,7 +18,8 @@ rule build_members:
         times_of("{family}/batches/{batch}")
     # With a store, model files lie where Snakemake runs.
     localrule: bool(STORE) and any(family.models for family in BUILD.families.values())
-    threads: batch_threads
+    # One core, or more if there are fewer batches than cores.
+    threads: lambda wildcards: max(1, ALL_CORES // BUILD.batch_count)
     resources:
         mem_mb=8000,
         runtime=1440,

@@ -3,6 +3,7 @@ import atexit
 import contextlib
 import functools
 import inspect
+from pathlib import Path
 
 from snakemake.io import _IOFile
 

@@ -1,5 +1,9 @@
 # Radiance fields that learn from exported files. They are not part of a dataset: name the target.
+import os
+import shlex
+from pathlib import Path
 
+from lightfield.workflow.build import learned_exports
 
 # The environment that has torch.
 CONSUMERS = FOLDER / ".venv-consumers"
@@ -31,7 +35,7 @@ rule measure_learning:
 rule learn:
     input:
         [
-            f"{RESULTS}/benchmarks/learn/{dataset.scene_folder}/{dataset.rig_folder}.csv"
+            f"{RESULTS}/benchmarks/learn/{dataset.name}.csv"
             for dataset in CHOSEN
             if learned_exports(dataset)
         ],

@@ -1,8 +1,16 @@
 # Detects damaged and outdated files, by the ledger of finished jobs.
 import logging
+import os
+import re
+import sys
+import time
+from functools import cache
+from pathlib import Path
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
+from lightfield.configuration.family import outdated_members
+from lightfield.core.errors import UserError
 from lightfield.core.files import (
     read_json,
     set_aside,
@@ -10,8 +18,11 @@ from lightfield.core.files import (
     unreadable,
     write_json_if_changed,
 )
-from lightfield.configuration.family import outdated_members
+from lightfield.formats.export_lists import MANIFEST
+from lightfield.stages import job_settings
+from lightfield.workflow import ledger, presence
 from lightfield.workflow.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
+from lightfield.workflow.view_store import ViewStore
 
 # The records of the present shards. Records of shards with other bounds are obsolete.
 SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
@@ -94,7 +105,7 @@ def mark_stale_files_of(wildcards):
     if "batch" in names:
         mark_stale_batch(names["family"], names["batch"])
     elif "name" in names:
-        mark_stale_files(scene_of(wildcards).name)
+        mark_stale_files(asked(BUILD.scene, wildcards).name)
     elif "rig" in names:
         mark_stale_files(f"{names['scene']}/{names['rig']}")
     elif "scene" in names:
@@ -211,7 +222,9 @@ def listed_files(job):
         if isinstance(listed, dict):
             is_record = output.name != MANIFEST
             folder = (
-                dataset_of(job.wildcards).paths.folder if is_record else output.parent
+                asked(BUILD.dataset, job.wildcards).paths.folder
+                if is_record
+                else output.parent
             )
             for name, entry in listed.items():
                 digest = entry["sha256"] if is_record else entry

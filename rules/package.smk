@@ -4,7 +4,8 @@
 rule pack:
     input:
         settings=settings("pack"),
-        sums=packed_sums,
+        sums=of_build(BUILD.packed_sums),
+        lists=of_build(BUILD.packed_lists) if STORE else [],
     output:
         archive=PATHS.package,
         card=PATHS.card,
@@ -23,7 +24,8 @@ rule pack:
 rule publish:
     input:
         settings=settings("pack"),
-        sums=packed_sums,
+        sums=of_build(BUILD.packed_sums),
+        lists=of_build(BUILD.packed_lists) if STORE else [],
     output:
         PATHS.documents,
     log:

@@ -1,4 +1,5 @@
 # A table before rendering: the estimated time and size of the views.
+import shlex
 
 
 rule probe:

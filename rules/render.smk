@@ -13,7 +13,7 @@ rule import_views:
     log:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     wildcard_constraints:
-        scene=IMPORTED,
+        scene=one_of({d.scene_folder for d in DATASETS.values() if d.imported}),
     # With a store, the views to import are on the machine that runs Snakemake.
     localrule: bool(STORE)
     params:
@@ -43,8 +43,8 @@ rule render:
         times_of("{scene}/{rig}/render/{first}-{end}")
     threads: threads_of_shard
     resources:
-        mem_mb=shard_memory,
-        runtime=shard_minutes,
+        mem_mb=memory_of("render"),
+        runtime=lambda wildcards: cost_at("render", wildcards).most_minutes,
         gpu=GPUS,
         stall_seconds=stall_seconds,
     params:

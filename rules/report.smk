@@ -1,4 +1,5 @@
 # Pictures and pages of datasets.
+from lightfield.configuration.dataset_paths import PICTURES, PLOTS
 
 
 use rule lightfield as panorama_lightfield with:
@@ -31,7 +32,7 @@ rule render_panorama:
     benchmark:
         times_of("{scene}/{rig}/panorama/render")
     resources:
-        mem_mb=panorama_memory,
+        mem_mb=memory_of("render_panorama"),
         runtime=120,
         gpu=GPUS,
     params:
@@ -80,7 +81,8 @@ rule figures:
 
 rule page:
     input:
-        records=stored_records,
+        # Without a store the validation is enough, and a plan of many shards is shorter.
+        records=of_dataset("all_records") if STORE else [],
         published=of_dataset("published"),
         pictures=PATHS.pictures,
         validation=PATHS.validation,

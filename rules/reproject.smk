@@ -1,4 +1,5 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
 
 
 rule reprojected_lightfield:

@@ -1,4 +1,5 @@
 # A .blend: built by a scene builder, made of a model file, or brought by the user and checked.
+from pathlib import Path
 
 
 rule build_scene:
@@ -23,7 +24,7 @@ rule build_scene:
 rule import_model:
     input:
         settings=settings("import_model"),
-        model=lambda wildcards: local(scene_of(wildcards).source.model),
+        model=lambda wildcards: local(asked(BUILD.scene, wildcards).source.model),
     output:
         blend=PATHS.model_blend,
         record=PATHS.model_record,
@@ -47,7 +48,7 @@ rule import_model:
 rule check_blend:
     input:
         settings=settings("check_blend"),
-        blend=lambda wildcards: local(scene_of(wildcards).blend),
+        blend=lambda wildcards: local(asked(BUILD.scene, wildcards).blend),
     output:
         PATHS.blend_check,
     log:
@@ -66,7 +67,7 @@ rule check_blend:
 rule inventory:
     input:
         settings=settings("inventory"),
-        check=lambda wildcards: scene_of(wildcards).blend_check or [],
+        check=lambda wildcards: asked(BUILD.scene, wildcards).blend_check or [],
         blend=blend_of,
     output:
         PATHS.inventory,
@@ -103,7 +104,7 @@ rule fetch_blend:
     log:
         log_of("fetch_blend/{blend}"),
     wildcard_constraints:
-        blend="|".join(map(re.escape, MISSING)) or "(?!)",
+        blend=one_of(MISSING),
     # Run beside Snakemake, because a cluster's nodes may not reach the Internet.
     localrule: True
     params:
@@ -126,7 +127,7 @@ rule store_blend:
     log:
         log_of("store_blend/{blend}"),
     wildcard_constraints:
-        blend="|".join(map(re.escape, BLENDS if STORE else ())) or "(?!)",
+        blend=one_of(BLENDS if STORE else ()),
     localrule: True
     message:
         "Storing {input.blend}"

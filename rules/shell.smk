@@ -1,4 +1,8 @@
 # What the shell of each job does before its program.
+import shlex
+import sys
+from pathlib import Path
+
 from lightfield.workflow.view_store import VARIABLE
 
 # The rules call `python`: the one that runs Snakemake, or a container's own.

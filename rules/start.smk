@@ -1,9 +1,21 @@
 # Checks, notes and removals before the first job.
 import functools
+import os
 import resource
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
 
-from lightfield.workflow import live_runs
 from lightfield.configuration.blend_lock import expected_blend
+from lightfield.core import disk_space, leftovers, units
+from lightfield.core.disk_space import obstacle
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.planning.cost import light_group_count, temporary_bytes, view_cost
+from lightfield.workflow import live_runs, presence, shard_counts
+from lightfield.workflow.view_store import ViewStore
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -40,7 +52,8 @@ def check_disk_space():
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if is_of(job, "render")]
     datasets = {
-        d.paths.folder: d for d in (dataset_of(job.wildcards) for job in renders)
+        d.paths.folder: d
+        for d in (asked(BUILD.dataset, job.wildcards) for job in renders)
     }
     needs = []
     for dataset in datasets.values():
@@ -107,13 +120,13 @@ def check_start():
 def check_input(job):
     """Raise `UserError` for a user's file that a job would refuse."""
     if is_of(job, "check_blend"):
-        blend = Path(scene_of(job.wildcards).source.blend)
+        blend = Path(asked(BUILD.scene, job.wildcards).source.blend)
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))
     elif is_of(job, "inventory"):
-        presence.check_external_files(scene_of(job.wildcards))
+        presence.check_external_files(asked(BUILD.scene, job.wildcards))
     elif is_of(job, "import_views"):
-        presence.check_imported(dataset_of(job.wildcards))
+        presence.check_imported(asked(BUILD.dataset, job.wildcards))
 
 
 def announce_refusals():
@@ -133,7 +146,9 @@ def announce_refusals():
 def keep_shards():
     """Note the number of shards of each planned dataset, which keeps them."""
     jobs = [job for job in all_jobs() if is_of(job, "render")]
-    datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
+    datasets = {
+        d.name: d for d in (asked(BUILD.dataset, job.wildcards) for job in jobs)
+    }
     counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
     if counts:
         clear_folder(SHARDS)

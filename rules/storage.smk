@@ -1,5 +1,10 @@
 # Storage for jobs without a common folder. Snakemake's own storage holds declared files. The view
 # store, at the same place, holds the views, which are too many to declare.
+import sys
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.workflow.view_store import ViewStore
 
 # A shard's views are not among the outputs that Snakemake would bring to and from a job.
 if not (STORE or SHARES_FILES):
@@ -16,14 +21,6 @@ def taking(lists):
         return ""
     arguments = f"--mend --results {RESULTS} --work {WORK} {{{lists}}}"
     return f"python {SCRIPTS}/take_views.py {arguments} > {{log}} 2>&1; "
-
-
-def stored_records(wildcards):
-    """Return a dataset's records if the job takes its views from the store.
-
-    Without a store, the dataset's validation is enough, and makes plans of many shards shorter.
-    """
-    return dataset_of(wildcards).all_records if STORE else []
 
 
 def finished_in_store():

@@ -28,7 +28,7 @@ rule measure_synthesis:
 rule synthesis:
     input:
         [
-            f"{RESULTS}/benchmarks/synthesis/{dataset.scene_folder}/{dataset.rig_folder}.csv"
+            f"{RESULTS}/benchmarks/synthesis/{dataset.name}.csv"
             for dataset in CHOSEN
             if dataset.depth
         ],

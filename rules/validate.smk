@@ -19,7 +19,7 @@ rule validate:
     benchmark:
         times_of("{scene}/{rig}/validate")
     wildcard_constraints:
-        scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
+        scene=SCENE_OF_DATASET,
     threads: 2
     resources:
         mem_mb=4000,
@@ -48,7 +48,7 @@ rule checksums:
     log:
         log_of("{scene}/{rig}/checksums"),
     wildcard_constraints:
-        scene=rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
+        scene=SCENE_OF_DATASET,
     localrule: True
     params:
         page=PATHS.page,
@@ -74,7 +74,7 @@ rule validate_sequence:
     benchmark:
         times_of("{scene}/{rig}/validate")
     wildcard_constraints:
-        scene=rf"(?=(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+",
+        scene=SCENE_OF_SEQUENCE,
         rig="[A-Za-z0-9_.-]+",
     resources:
         mem_mb=4000,

@@ -74,6 +74,11 @@ class Dataset(Capture):
         """Scene and rig, as in garden_tiny/LFSphere."""
         return f"{self.scene_folder}/{self.rig_folder}"
 
+    @property
+    def sequence_name(self) -> str:
+        """Scene and rig, without the frame of a sequence."""
+        return f"{self.scene_folder}/{self.rig_name}"
+
     @cached_property
     def paths(self) -> Paths:
         """Where the dataset's files lie."""
@@ -180,6 +185,12 @@ class Dataset(Capture):
         return replace(self.paths, rig=self.trained_by).transforms(prefix)
 
     # Files that a dataset has several of.
+
+    @property
+    def scene_benchmarks(self) -> list[str]:
+        """The folders with the times of the scene's jobs: of all presets, and of this one."""
+        folders = dict.fromkeys((self.scene_name, self.scene_folder))
+        return [f"{self.work_root}/benchmarks/{folder}" for folder in folders]
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:

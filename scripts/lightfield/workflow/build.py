@@ -23,7 +23,7 @@ from lightfield.configuration.scene_yaml import load_scene, scene_path
 from lightfield.core.errors import UserError
 from lightfield.core.names import VIEWS
 from lightfield.formats.export_lists import MANIFEST
-from lightfield.planning.cost import Cost, members_cost
+from lightfield.planning.cost import Cost, cost, members_cost
 from lightfield.workflow.loading import (
     chosen_families,
     family_folder,
@@ -150,8 +150,7 @@ class Build:
         """Return the dataset of a rig, or the datasets of all frames of a sequence."""
         rigs: dict[str, list[Dataset]] = {}
         for dataset in self.datasets.values():
-            name = f"{dataset.scene_folder}/{dataset.rig_name}"
-            rigs.setdefault(name, []).append(dataset)
+            rigs.setdefault(dataset.sequence_name, []).append(dataset)
         name = f"{wildcards['scene']}/{wildcards['rig']}"
         return _entry(rigs, name, self.config.results, "dataset of the chosen scenes")
 
@@ -206,8 +205,7 @@ class Build:
         frames_of_rig: dict[str, list[Dataset]] = {}
         for dataset in self.chosen:
             if not dataset.imported:
-                name = f"{dataset.scene_folder}/{dataset.rig_name}"
-                frames_of_rig.setdefault(name, []).append(dataset)
+                frames_of_rig.setdefault(dataset.sequence_name, []).append(dataset)
         return [
             (name, len(frames), frames[0].paths.probe) for name, frames in frames_of_rig.items()
         ]
@@ -242,6 +240,32 @@ class Build:
                 name, preset, limits = dataset.scene_name, dataset.preset, dataset.limits
                 return scene_datasets(name, preset, limits, self.config)[0]
         return scene_datasets(folder, settings=self.config)[0]
+
+    def packed_sums(self, wildcards: Wildcards) -> list[str]:
+        """Return the checksums that exist when everything in an archive is finished."""
+        datasets = self.rig(wildcards)
+        sums = [dataset.paths.sums for dataset in datasets]
+        if sequence_sums := datasets[0].sequence_sums:
+            sums.append(sequence_sums)
+        return sums
+
+    def packed_lists(self, wildcards: Wildcards) -> list[str]:
+        """Return the validations and lists that name all files in an archive."""
+        datasets = self.rig(wildcards)
+        files = list(datasets[0].sequence_exports)
+        if files:
+            files.append(datasets[0].sequence_paths.validation)
+        for dataset in datasets:
+            files += [dataset.paths.validation, *dataset.published, *dataset.all_records]
+        return files
+
+    def job_cost(self, stage: str, wildcards: Wildcards) -> Cost:
+        """Return the cost of a job that makes a dataset, or a shard of it, at a stage."""
+        views = None
+        if "first" in wildcards:
+            views = int(wildcards["end"]) - int(wildcards["first"])
+        dataset = self.dataset(wildcards)
+        return cost(stage, dataset, views, wildcards.get("reprojection", ""))
 
     def truth_records(self, wildcards: Wildcards) -> list[str]:
         """Return the records of the views with which synthesised views are compared."""
@@ -295,6 +319,11 @@ class Build:
             except UserError as error:
                 raise UserError(f"{scene_path(name)}: {error}") from None
         return batches
+
+    @property
+    def batch_count(self) -> int:
+        """The number of batches of all families."""
+        return sum(map(len, self.batches.values()))
 
     def batch_records(self, wildcards: Wildcards) -> list[str]:
         """Return the records of all batches of a family."""
