@@ -45,9 +45,11 @@ rule lens_map:
         " {params.file} --settings {input.settings} --input-cfg {input.lightfield} > {log} 2>&1"
 
 
+# For a cube map, the program adds the name of each face to the path.
 use rule lens_map as lens_maps with:
     output:
         [PATHS.lens_map(face=face) for face in CUBE_FACES],
+    # Snakemake does not take this from the other rule.
     localrule: True
 
 
