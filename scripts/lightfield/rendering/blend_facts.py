@@ -134,13 +134,13 @@ def _check_pose(name: str, frame: float, world_from_camera: Floats) -> None:
     turn = world_from_camera[:3, :3]
     if is_skewed(turn):
         raise UserError(
-            f"the camera {name} is sheared or flat at frame {frame}, which a view's pose cannot "
-            "be; give each of its parents one scale for all axes, or apply the scales in Blender"
+            f"the camera {name} is sheared or flat at frame {frame}, and a view's pose cannot be; "
+            "give each parent one scale for all axes, or apply the scales in Blender"
         )
     if is_mirrored(turn):
         raise UserError(
-            f"the camera {name} is mirrored at frame {frame}, which a view's pose cannot be; "
-            "make the negative scale of the camera or of its parent positive"
+            f"the camera {name} is mirrored at frame {frame}, and a view's pose cannot be; "
+            "make the negative scale of the camera or its parent positive"
         )
 
 

@@ -48,9 +48,9 @@ def followers(choice: str) -> dict[str, list[str]]:
         freeze(file_camera)
         if moving := _changed_with(view_camera):
             raise UserError(
-                f"{_listed(moving)}: would follow each view's camera in a way that cannot be "
-                "turned off, so that each view would show another scene; change that in Blender, "
-                "or allow it: scene: {followed_camera: view}"
+                f"{_listed(moving)}: would follow each view's camera, and each view would show "
+                "another scene; change that in Blender, or allow it: "
+                "scene: {followed_camera: view}"
             )
     return {"by_name": by_name, "active": active}
 

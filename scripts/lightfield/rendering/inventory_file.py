@@ -75,8 +75,8 @@ def write_of_datasets(
         raise UserError(_refusal(path, contents["missing"]))
     if not light.may_be_lit():
         raise UserError(
-            f"{path}: has no light, so all views would be black: no lamp shines, no "
-            "material emits, and the world is black; give it one of these, as a world with a colour"
+            f"{path}: has no light, so all views would be black; add a lamp, a material that "
+            "emits, or a world with a colour"
         )
     if written and written.render and written.render.light_groups:
         contents["emitters"] = light.emitters()

@@ -17,7 +17,7 @@ def turn(is_on: bool) -> None:
 def centre() -> None:
     """Expose all rows evenly, and let the middle of the exposure be at the frame.
 
-    Depth, passes and poses are of that moment.
+    Depth, passes and poses describe that moment.
     """
     scene = bpy.context.scene
     scene.render.motion_blur_position = "CENTER"

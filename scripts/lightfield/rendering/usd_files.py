@@ -85,7 +85,7 @@ def _reference(layer: Any, name: str) -> FileReference | None:
     """Return the reference of a layer to a file that Blender reads. None for anything else.
 
     A name may be an address on a server, which is no file. <UDIM> stands for the tiles of a
-    texture, of which none exists.
+    texture, and is no file either.
     """
     usd = openusd()
     file = re.sub(r"\[.*\]$", "", name)
