@@ -673,22 +673,22 @@ EXPLAINED = [
     (
         "rigs.LFSphere.camera",
         {"lens": "rectilinear", "fov": 175, "resolution": [9, 9]},
-        "rigs.LFSphere.camera: its focal length in mm is 0.7859; Blender has at least 1",
+        "rigs.LFSphere.camera: its focal length in mm is 0.7859; must be at least 1 in Blender",
     ),
     (
         "rigs.LFSphere.camera.fov",
         5,
-        "rigs.LFSphere.camera: its fov in degrees is 5; Blender has at least 9.998",
+        "rigs.LFSphere.camera: its fov in degrees is 5; must be at least 9.998 in Blender",
     ),
     (
         "rigs.LFSphere.camera",
         {"lens": "equisolid", "focal_length": 200, "fov": 20, "resolution": [9, 9]},
-        "rigs.LFSphere.camera: its focal length in mm is 200; Blender has at most 100",
+        "rigs.LFSphere.camera: its focal length in mm is 200; must be at most 100 in Blender",
     ),
     (
         "rigs.LFSphere.camera",
         {"lens": "rectilinear", "focal_length": 2, "sensor_size": 0.5, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.sensor_size: is 0.5; Blender has at least 1 mm",
+        "rigs.LFSphere.camera.sensor_size: is 0.5; must be at least 1 mm in Blender",
     ),
     ("rigs.LFSphere.type", "ball", 'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,'),
     (

@@ -337,7 +337,7 @@ def test_settings_without_light_groups_are_as_before():
         ({"reprojections": {"flat": {"relight": "nigt"}}, "relight": {"night": {}}}, "mean night?"),
         (
             {"relight": {"olat": "each"}, "exports": {"colmap": {"sources": ["olat"]}}},
-            "exports.colmap.sources: olat has each view once for each light",
+            "exports.colmap.sources: olat holds one image per light",
         ),
         (
             {"reprojections": {"olat": {"relight": "each", "passes": ["light_groups"]}}},

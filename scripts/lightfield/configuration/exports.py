@@ -69,7 +69,7 @@ class Export(Settings):
                 "has fewer than two frames, and this export is for sequences; give the rig frames"
             )
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
-            return "has one view, so none is left to test with"
+            return "has only one view, so no view is left for testing"
         return None
 
 
@@ -147,7 +147,7 @@ class InstantNgp(Export):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         if self.scale is None and self.bounds == "rig" and rig.positions == 1:
-            return "has cameras at one place, so no scale follows; give scale, or bounds: depth"
+            return "has cameras at one place, which gives no scale; give scale, or bounds: depth"
         return None
 
     @property
@@ -414,7 +414,7 @@ class SceneFlow(Export):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         if rig.sequence and rig.sequence.step != 1:
-            return "leaves out frames, but the pass motion leads to the very next; give it step: 1"
+            return "leaves out frames, but the pass motion leads to the next frame; give it step: 1"
         return super().rig_refusal(rig)
 
 

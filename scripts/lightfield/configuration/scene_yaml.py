@@ -418,8 +418,8 @@ class Scene(Credits):
                 rigs = ", ".join(sorted(missing_rigs))
                 key = f"reprojections.{name}" if name in self.reprojections else "sensor"
                 raise ValueError(
-                    f"{key}.rigs: lacks {rigs}; must have all rigs "
-                    "of which one trains and others test, or none"
+                    f"{key}.rigs: lacks {rigs}; must have all rigs of the split, the one that "
+                    "trains and the ones that test, or none"
                 )
 
     def _check_export(self, key: str, export: Export) -> None:
@@ -433,7 +433,7 @@ class Scene(Credits):
             reprojection = None if source == VIEWS else developments[source]
             if reprojection and reprojection.relight == light_groups.EACH:
                 raise ValueError(
-                    f"{key}: {source} has each view once for each light, and an export once"
+                    f"{key}: {source} holds one image per light; an export needs one image per view"
                 )
             if reprojection:
                 has_depth &= reprojection.has_depth
@@ -540,9 +540,13 @@ def _check_blender_limits(key: str, lens: Lens) -> None:
         value = camera.get(name, least)
         if not least <= value <= most:
             bound = f"at least {least / unit:.4g}" if value < least else f"at most {most / unit:g}"
-            raise ValueError(f"{key}: its {title} is {value / unit:.4g}; Blender has {bound}")
+            raise ValueError(
+                f"{key}: its {title} is {value / unit:.4g}; must be {bound} in Blender"
+            )
     if max(lens.sensor) < 1:
-        raise ValueError(f"{key}.sensor_size: is {lens.sensor[0]:g}; Blender has at least 1 mm")
+        raise ValueError(
+            f"{key}.sensor_size: is {lens.sensor[0]:g}; must be at least 1 mm in Blender"
+        )
 
 
 def _check_cube_map(key: str, rig: Rig) -> None:

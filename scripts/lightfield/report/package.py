@@ -69,7 +69,7 @@ def write(job: Package) -> None:
     if job.output.suffix != ".tar":
         raise UserError(f"--output {job.output}: must end in .tar; .json lies beside it")
     if place_in(job.folder, job.output):
-        raise UserError(f"--output {job.output}: must not be in what it packs")
+        raise UserError(f"--output {job.output}: must not be in the folder that it packs")
     content = card(job.folder, job.output.stem, job.settings.scene)
     written = pack(job.folder, content, job.output, job.settings.most_bytes)
     parts = listed(written)

@@ -22,7 +22,7 @@ from lightfield.workflow.view_store import ViewStore
 def write(job: Publish) -> None:
     """Publish the folder of a rig."""
     if place_in(job.folder, job.output):
-        raise UserError(f"--output {job.output}: must not be in what it publishes")
+        raise UserError(f"--output {job.output}: must not be in the folder that it publishes")
     settings = job.settings
     name = job.output.resolve().name
     published = publish(job.folder, name, settings.scene, job.output, settings.most_bytes)

@@ -73,5 +73,5 @@ def _poses(path: Path | None) -> LightField | None:
         return LightField.read(path)
     rig = rigs.from_settings(read_yaml(path, str(path)), str(path))
     if rig.camera is None:
-        raise UserError(f"{path}: camera: is missing; it is what the views are seen through")
+        raise UserError(f"{path}: camera: is missing; it is the camera of the synthesised views")
     return LightField.from_rig(rig, lenses.from_camera(rig.camera))

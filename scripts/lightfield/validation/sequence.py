@@ -107,7 +107,7 @@ def _first_frame(rig: Path, path: Path, folders: Sequence[str]) -> LightField:
     source = path.parents[2].relative_to(rig)
     lightfields = [LightField.read(rig / folder / source / NAME) for folder in folders]
     if len(lightfields) < 2:
-        raise UserError(f"{path}: is of a sequence, which must have two frames or more")
+        raise UserError(f"{path}: exports a sequence, which must have two frames or more")
     first = lightfields[0]
     names = [view.name for view in first.views]
     for lightfield in lightfields:

@@ -69,7 +69,7 @@ def check_sequence(job: ValidateSequence) -> None:
 def _check_paths(job: Validate | ValidateSequence, folder: Path) -> None:
     """Raise `UserError` if there is no folder to check, or if one of two outputs is missing."""
     if (job.output is None) != (job.sums is None):
-        raise UserError("--output, --sums: go together")
+        raise UserError("--output, --sums: give both, or neither")
     if not folder.is_dir():
         raise UserError(f"{folder}: no such folder")
 

@@ -181,7 +181,7 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
     try:
         rig = _limited_rig(written.rigs[name], limits, written.render is not None)
     except UserError as error:
-        raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more") from None
+        raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more views") from None
     if written.flow and rig.is_at_one_place():
         raise UserError(
             f"{file}: flow: {scene_yaml.FLOW_PLACES}, but the preset "
