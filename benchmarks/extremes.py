@@ -121,7 +121,7 @@ def emission(strength: float) -> Any:
 
 
 def furnace(kind: str, albedo: float, **inputs: Any) -> Any:
-    """A surface that emits what it absorbs: in a closed room of it, the light is 1.
+    """A surface that emits as much as it absorbs: in a closed room of it, the light is 1.
 
     With n bounces the light is 1 − albedoⁿ⁺²: Cycles also counts what the last bounce's path meets.
     """

@@ -257,7 +257,7 @@ def opencv(pixels: Array, x: Array, y: Array, flag: int) -> Array:
 
 
 def read_and_write(source: Path, target: Path, lens: Lens) -> None:
-    """Do what every method shares: read a view, and write one of the target's size."""
+    """Do the steps of every method: read a view, and write one of the target's size."""
     read = images.read_image(source, ["R", "G", "B"]).channels
     wide = widen(*(read[name] for name in "RGB"))
     rows = np.arange(lens.height) % len(wide)

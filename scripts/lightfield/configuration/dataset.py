@@ -179,7 +179,7 @@ class Dataset(Capture):
         return self.sequence_paths.sums if self.sequence_exports else None
 
     def training_transforms(self, prefix: str) -> str | None:
-        """Return the export of a source to instant-ngp that trains what this dataset tests."""
+        """Return the transforms.json that trains the models that this dataset tests."""
         if self.trained_by is None:
             return None
         return replace(self.paths, rig=self.trained_by).transforms(prefix)

@@ -138,7 +138,7 @@ class Experiment:
     ) -> list[list[float]]:
         """Return the relative mean squared errors of a method, by window and seed.
 
-        ``left_out`` is the part of the pixels, those with the largest errors, that do not count.
+        ``left_out`` is the part of the pixels, with the largest errors, that does not count.
         """
         errors = []
         for number, reference in references.items():

@@ -25,7 +25,7 @@ SEEDS = 4
 SAMPLES = 16
 # Blocks of this many pixels along a side are compared, because means are less noisy than pixels.
 BLOCK = 8
-# The largest squared difference of the same picture, in units of that by noise alone.
+# The largest squared difference of the same picture, in units of the difference by noise alone.
 _MOST_OF_NOISE = 2.0
 # The largest difference of all light, in standard errors.
 _MOST_ERRORS = 6.0

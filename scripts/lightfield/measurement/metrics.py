@@ -288,7 +288,7 @@ def relative_mse(
 ) -> float:
     """Return the relative mean squared error, without the reference's own part of it.
 
-    ``left_out`` is the part of the pixels, those with the largest errors, that does not count.
+    ``left_out`` is the part of the pixels, with the largest errors, that does not count.
     """
     errors = (_squares(colour, reference) * reference.weights).mean(axis=-1)
     reference_error = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)

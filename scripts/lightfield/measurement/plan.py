@@ -173,8 +173,8 @@ def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
     if names:
         return f"Times of the graphics card, with {used} together."
     cores = processors.available()
-    taken = units.duration(seconds / cores)
-    return f"Times of one processor core; this machine's {cores} take {taken} and {used}."
+    run_time = units.duration(seconds / cores)
+    return f"Times of one processor core; this machine's {cores} take {run_time} and {used}."
 
 
 def cheaper_parts(

@@ -334,14 +334,14 @@ def _reprojected_view(dataset: Dataset, name: str) -> Cost:
         read_pixels *= 1 + all_groups
     pass_names = reprojection.passes
     groups = all_groups if LIGHT_GROUPS in pass_names else 0
-    others = [passes.by_name(each) for each in pass_names if each != LIGHT_GROUPS]
+    other_passes = [passes.by_name(each) for each in pass_names if each != LIGHT_GROUPS]
     # Light groups are resampled twice: once to add them up.
-    resampled_passes = 2 * groups + len(others)
+    resampled_passes = 2 * groups + len(other_passes)
     read_pixels += dataset.pixels * resampled_passes
     pixel_seconds = REPROJECTION_SECONDS * (1 + resampled_passes)
     if sensor := reprojection.sensor:
         pixel_seconds += SENSOR_SECONDS if sensor.bracket is None else BRACKET_SECONDS
-    pass_bytes = COMPRESSED * (6 * groups + sum(each.bytes for each in others))
+    pass_bytes = COMPRESSED * (6 * groups + sum(each.bytes for each in other_passes))
     pixel_bytes = _developed_bytes(reprojection) + pass_bytes
     return Cost(
         read_pixels * READ_SECONDS + made_pixels * pixel_seconds,

@@ -44,22 +44,26 @@ def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[st
     """
     cached = _read(cache)
     valid = [member for member in members if member.is_valid and member.datasets]
-    kept = {member.name: cached[member.name] for member in valid if _holds(folder, member, cached)}
-    new = [member for member in valid if member.name not in kept]
+    looks_by_member = {
+        member.name: cached[member.name] for member in valid if _holds(folder, member, cached)
+    }
+    new = [member for member in valid if member.name not in looks_by_member]
     if new:
-        progress = Progress(len(new), "thumbnails", "members", len(kept))
+        progress = Progress(len(new), "thumbnails", "members", len(looks_by_member))
         for number, member in enumerate(new, 1):
-            kept[member.name] = {"made_of": _made_of(member), **_look(folder, member)}
+            looks_by_member[member.name] = {"made_of": _made_of(member), **_look(folder, member)}
             if number % STEP == 0:
-                write_json(cache, kept)
+                write_json(cache, looks_by_member)
             progress.done()
-    if kept != cached:
-        write_json(cache, kept)
+    if looks_by_member != cached:
+        write_json(cache, looks_by_member)
     for path in folder.glob(f"{THUMBNAILS}/*.webp"):
-        if path.stem not in kept:
+        if path.stem not in looks_by_member:
             path.unlink()
     return {
-        member.name: {key: value for key, value in kept[member.name].items() if key != "made_of"}
+        member.name: {
+            key: value for key, value in looks_by_member[member.name].items() if key != "made_of"
+        }
         for member in valid
     }
 

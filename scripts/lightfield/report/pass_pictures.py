@@ -18,7 +18,7 @@ from lightfield.report.packing import light_scale, pack_light, webp
 
 # The longer side of a picture in pixels, at most.
 SIDE = 320
-# The same for a light group. Smaller for more than _MANY_GROUPS.
+# The same for a light group's picture. It is smaller if there are more than _MANY_GROUPS.
 _GROUP_SIDE = 256
 _SMALLER_GROUP_SIDE = 128
 _MANY_GROUPS = 16

@@ -50,7 +50,7 @@ class Published:
 
     @property
     def files(self) -> list[dict[str, Any]]:
-        """The entries of all files but those that describe them."""
+        """The entries of all files except the descriptions."""
         return [*(entry for entries in self.shards.values() for entry in entries), *self.others]
 
     @property

@@ -91,9 +91,9 @@ def read_dataset(root: Path, folder: Path) -> DatasetFiles:
         files += view_files(folder, image_set, number)[0]
     for file in [*files, *pass_files(folder, sets)[0]]:
         _add_file(samples, source, sets[file.set], file, folder, sums)
-    taken = {path for sample in samples for path in sample.files.values()}
-    others = [name for name in (*sums, SUMS) if folder / name not in taken]
-    return DatasetFiles(samples, _others(root, folder, others))
+    sample_files = {path for sample in samples for path in sample.files.values()}
+    names = [name for name in (*sums, SUMS) if folder / name not in sample_files]
+    return DatasetFiles(samples, _others(root, folder, names))
 
 
 def _others(root: Path, folder: Path, names: Iterable[str]) -> dict[str, Path]:

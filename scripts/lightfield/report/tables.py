@@ -56,8 +56,8 @@ def validation(path: Path) -> dict[str, Any] | None:
     try:
         for check in content["checks"]:
             group, _, name = check["name"].rpartition("/")
-            kept = {key: check[key] for key in _CHECK_KEYS}
-            groups.setdefault(group, []).append({**kept, "short": name})
+            figures = {key: check[key] for key in _CHECK_KEYS}
+            groups.setdefault(group, []).append({**figures, "short": name})
         return {"valid": content["valid"], "groups": groups}
     except (LookupError, TypeError, AttributeError):
         raise UserError(f"{path}: is not what scripts/validate.py writes") from None

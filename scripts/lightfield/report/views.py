@@ -102,7 +102,7 @@ def collect(
 
     ``folder`` holds the views of ``lightfield``. ``rig`` has placed their cameras. The
     ``unreadable`` views are black. ``sensor`` holds the views as a sensor sees them, if there are
-    such. Raises `UserError` for any other view that cannot be read.
+    any. Raises `UserError` for any other view that cannot be read.
     """
     names = [view.name for view in lightfield.views]
     lens = lightfield.lens

@@ -19,7 +19,7 @@ _CAMERA_KEYS = ("camera", "split")
 
 
 def _places_as_written(rig: Random) -> dict[str, Any]:
-    """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
+    """Return the keys of a rig in its scene YAML, without the keys that move no camera."""
     return {key: value for key, value in as_written(rig).items() if key not in _CAMERA_KEYS}
 
 

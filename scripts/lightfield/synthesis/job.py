@@ -48,16 +48,18 @@ def run(job: Synthesize) -> None:
     size = (lens.width, lens.height)
     with video(path, size, job.rate) if job.video else nullcontext() as add_to_video:
         for view in targets.views:
-            made = sources.synthesise(view.world_from_camera, lens, job.best)
+            synthesised = sources.synthesise(view.world_from_camera, lens, job.best)
             if exposure is None:
-                exposure = pictures.exposure_for(made.colour[~made.holes])
-            images.write_exr(job.output / "exr" / f"{view.name}.exr", made.channels(depth, rays))
-            picture = pictures.develop(np.nan_to_num(made.colour), exposure)
-            opaque = np.where(np.isfinite(made.colour[..., 0]), 255, 0).astype(np.uint8)
+                exposure = pictures.exposure_for(synthesised.colour[~synthesised.holes])
+            images.write_exr(
+                job.output / "exr" / f"{view.name}.exr", synthesised.channels(depth, rays)
+            )
+            picture = pictures.develop(np.nan_to_num(synthesised.colour), exposure)
+            opaque = np.where(np.isfinite(synthesised.colour[..., 0]), 255, 0).astype(np.uint8)
             images.write_png(job.output / "png" / f"{view.name}.png", np.dstack([picture, opaque]))
             if add_to_video:
                 add_to_video(picture)
-            holes.append(made.hole_fraction(rays))
+            holes.append(synthesised.hole_fraction(rays))
             progress.done()
     print(
         f"{count(len(holes), 'view')} of {min(job.best, len(views))} each; "

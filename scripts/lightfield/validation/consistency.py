@@ -420,7 +420,7 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     """Return the pairs (i, j), i < j, of views to compare, in order.
 
     Each view gets the three nearest views that see enough of its patches, and three farther away.
-    The wider baselines of those show errors that the near ones cannot. Views at the same place
+    The farther views' wider baselines show errors that near views cannot. Views at the same place
     count as neighbours.
     """
     positions = np.array([camera.position for camera in cameras])
@@ -529,6 +529,6 @@ def scales(answers: Answer) -> tuple[Array, Array]:
     inverse = np.linalg.inv(squares)
     errors = inverse @ products
     unexplained = max(float(answers.moments[2, 2] - errors @ products), 0.0)
-    # The residuals of rounding depend on each other. So many of them determine no more than one.
+    # The residuals of rounding depend on each other. So many of them say no more than one.
     variance = max(unexplained / answers.measured, ROUNDING**2 * answers.measured)
     return errors, np.sqrt(np.diagonal(inverse) * variance)

@@ -160,7 +160,7 @@ class Integrity:
                     ledger.forget(ledger_path, name)
 
     def _is_kept(self, path: Path) -> bool:
-        """Return whether a file is none of the dataset's, and a link leads to its folder."""
+        """Return whether a file is not the dataset's own, but lies behind a link."""
         if path in self._expected or not _is_below(path, self.dataset):
             return False
         return link_above(self.dataset, path.relative_to(self.dataset).as_posix()) is not None
@@ -171,7 +171,7 @@ class Integrity:
             yield path.with_name(path.name.replace(LOG_SUFFIX, ".json"))
         is_listed = path in self._published or not self._published
         if is_listed and path not in self._recorded and not self._is_noted(path):
-            # An export's file.
+            # The file belongs to an export, whose list or transforms.json is the declared output.
             for folder in path.relative_to(self.dataset).parents:
                 for name in (MANIFEST, "transforms.json"):
                     if (self.dataset / folder / name).is_file():

@@ -22,10 +22,10 @@ def verify(job: Verify) -> None:
     corpora = [folder for folder in job.dataset if is_corpus(folder)]
     for folder in corpora:
         faulty_paths |= _verify_corpus(job, folder)
-    others = [folder for folder in job.dataset if folder not in corpora]
+    folders = [folder for folder in job.dataset if folder not in corpora]
     # A family has no corpus before its first run has ended.
-    members = {_relative(path) for folder in others for path in _member_datasets(folder)}
-    for folder in dict.fromkeys([*_datasets(others), *sorted(members)]):
+    members = {_relative(path) for folder in folders for path in _member_datasets(folder)}
+    for folder in dict.fromkeys([*_datasets(folders), *sorted(members)]):
         faulty_paths |= _verify_dataset(job, folder, folder in members, faulty_paths)
     names = ", ".join(map(str, job.dataset))
     if faulty_paths:

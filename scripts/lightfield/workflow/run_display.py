@@ -215,9 +215,9 @@ class RunDisplay:
         for phase in [phase for phase in self._phases if phase not in waiting]:
             del self._phases[phase]
             tasks = [task for task in self._tasks.values() if task.phase == phase]
-            made = sum(task.views_made for task in tasks)
+            views_made = sum(task.views_made for task in tasks)
             has_views = any(task.views for task in tasks)
-            done = count(made, "view") if has_views else count(len(tasks), "job")
+            done = count(views_made, "view") if has_views else count(len(tasks), "job")
             began = min(task.began or self._began for task in tasks)
             ended = max(task.ended or began for task in tasks)
             self._say(f"{phase}: {done} in {duration(ended - began)}")
@@ -238,10 +238,10 @@ class RunDisplay:
         views = sum(task.views for task in tasks)
         if views:
             parts.append(f"{sum(task.views_done for task in tasks)} of {views} views")
-            made = sum(task.views_made for task in tasks)
+            views_made = sum(task.views_made for task in tasks)
             since = min((task.began for task in tasks if task.views and task.began), default=now)
-            if made and now > since and any(task.views for task in self._open.values()):
-                parts[-1] += f", {60 * made / (now - since):.3g} a minute"
+            if views_made and now > since and any(task.views for task in self._open.values()):
+                parts[-1] += f", {60 * views_made / (now - since):.3g} a minute"
         parts.append(f"{duration(self.seconds_left(now))} left")
         at_work = [task.at_work for task in self._open.values() if task.began is not None]
         return " · ".join([*parts, *dict.fromkeys(at_work)])
