@@ -27,7 +27,7 @@ _NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|clus
 
 
 @dataclass(frozen=True)
-class Run:
+class LiveRun:
     """A run by its note: its process, its host's name, and whether its jobs run on a cluster."""
 
     note: Path
@@ -54,7 +54,7 @@ class Run:
         )
 
 
-def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> list[Run]:
+def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> list[LiveRun]:
     """Note that this run works in a folder. Return the other runs there that may live.
 
     If all of them were killed, ``remove_locks`` removes Snakemake's locks. Waits for jobs that
@@ -80,7 +80,7 @@ def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> l
     return live_runs
 
 
-def refusal(live_runs: list[Run]) -> str:
+def refusal(live_runs: list[LiveRun]) -> str:
     """Return why a run cannot work on files that another run has locked, and what to do."""
     if not live_runs:
         return (
@@ -104,13 +104,13 @@ def refusal(live_runs: list[Run]) -> str:
     )
 
 
-def _runs(folder: Path) -> list[Run]:
+def _runs(folder: Path) -> list[LiveRun]:
     """Return the other runs that have left a note."""
     runs = []
     for path in sorted(folder.iterdir()):
         name = _NAME.fullmatch(path.name)
         if name and path not in _LOCKED_NOTES:
-            runs.append(Run(path, int(name["pid"]), name["host"], name["place"] == "cluster"))
+            runs.append(LiveRun(path, int(name["pid"]), name["host"], name["place"] == "cluster"))
     return runs
 
 
