@@ -5,7 +5,7 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.26")
 
 # The folder of this workflow, which may be a module of another one.
 FOLDER = Path(workflow.current_basedir)
