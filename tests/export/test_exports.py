@@ -1190,7 +1190,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
         TypeAdapter(Scene).validate_python(content)
     content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
     content["reprojections"] = {}
-    for name, why in (("instant_ngp", "cameras at one place"), ("colmap", "one view")):
+    for name, why in (("instant_ngp", "cameras at one place"), ("colmap", "only one view")):
         content["exports"] = {name: {"sources": ["views"]}}
         with pytest.raises(ValidationError, match=f"views is of the rig One, which has {why}"):
             TypeAdapter(Scene).validate_python(content)
