@@ -14,7 +14,7 @@ from pydantic import Field
 from lightfield.core.errors import UserError
 from lightfield.core.flags import parsed, parser_of
 from lightfield.core.settings import Settings
-from lightfield.core.stage import Stage, cause, option, paths_of, reads, writes
+from lightfield.core.stage import Stage, cause, option, reads, writes
 from lightfield.stages.registry import STAGES
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
@@ -58,8 +58,6 @@ def test_flags_become_the_fields_of_the_stage_and_the_keys_of_its_settings():
         output=Path("c"),
         size=(1.0, 2.5),
     )
-    assert paths_of(pot, "read") == [Path("a"), Path("b")]
-    assert paths_of(pot, "written") == [Path("c")]
 
 
 def test_a_flag_may_be_empty_given_again_or_have_another_name():

@@ -18,7 +18,6 @@ member.
 import importlib
 from abc import abstractmethod
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -106,23 +105,3 @@ def cause(text: str) -> Any:
 
 def _field(role: str, text: str, default: Any, flag: dict[str, Any]) -> Any:
     return Field(default, description=text, json_schema_extra={"role": role, **flag})
-
-
-def fields_of(stage: type[Stage[Any]], role: str) -> list[str]:
-    """Return the names of a stage's fields that have this role: read, written or option."""
-    return [
-        name
-        for name, field in stage.model_fields.items()
-        if isinstance(field.json_schema_extra, dict) and field.json_schema_extra["role"] == role
-    ]
-
-
-def paths_of(job: Stage[Any], role: str) -> list[Path]:
-    """Return the paths that a job reads or writes."""
-    paths: list[Path] = []
-    for name in fields_of(type(job), role):
-        value = getattr(job, name)
-        for entry in value if isinstance(value, list) else [value]:
-            values = entry if isinstance(entry, tuple) else (entry,)
-            paths += [each for each in values if isinstance(each, Path)]
-    return paths
