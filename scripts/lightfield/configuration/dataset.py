@@ -12,7 +12,7 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
-from lightfield.configuration.exports import Exports
+from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.names import PARTS
 from lightfield.formats import passes
@@ -215,6 +215,10 @@ class Dataset(Capture):
     def all_records(self) -> list[str]:
         """The records of all stages."""
         return [file for stage in self.stages for file in self.records(stage)]
+
+    def testing_rigs(self, export: Export) -> tuple[str, ...]:
+        """Return the folders of the rigs whose views go into an ``export``, to test with."""
+        return self.tested_by if export.is_for_training else ()
 
     def lens_maps(self, name: str) -> list[str]:
         """Return the lens maps of a reprojection: one, or one for each face of a cube map."""

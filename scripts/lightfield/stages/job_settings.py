@@ -9,6 +9,7 @@ import os
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -303,9 +304,11 @@ _OF_REPROJECTION: Mapping[str, Callable[[Reprojection], Content]] = {
 
 def export(dataset: Dataset, name: str, options: Export, source: str) -> ExportSettings[Export]:
     """Return the settings that export a source of a dataset in the format ``name``."""
-    rigs = dataset.tested_by if options.is_for_training else ()
     # In a sequence the frame's folder follows the rig's name.
-    folders = {rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder for rig in rigs}
+    folders = {
+        rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder
+        for rig in dataset.testing_rigs(options)
+    }
     return _export_settings(dataset, name, options, source, tested_by=folders)
 
 
@@ -403,31 +406,41 @@ def _index(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
 def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     name = build.family_names[folder]
-    family = build.families[name]
-    content = scene_content(name)
-    # New members must not change the settings of the others.
-    del content["family"]
+    values = build.families[name].values
+    scene, fingerprint = _family_scene(name, has_drawn_light="scene.light" in values)
     settings = BatchSettings.of(
         members=build.members(wildcards),
         family=name,
-        scene=content,
-        values=family.values,
+        scene=scene,
+        values=values,
         preset=build.config.preset,
         limits=build.config.presets[build.config.preset],
         results=build.config.results,
         work=build.config.work,
-        fingerprint=_source_fingerprint(load_scene(name).scene, family.values),
+        fingerprint=fingerprint,
         bpy=version("bpy"),
     )
     return f"batches/{wildcards['batch']}", settings
 
 
-def _source_fingerprint(source: SceneSource, values: Mapping[str, Any]) -> str | None:
+@cache
+def _family_scene(name: str, has_drawn_light: bool) -> tuple[Content, str | None]:
+    """Return a family's scene YAML without its members, and the fingerprint of its source.
+
+    Computed once for all batches, of which a family may have hundreds.
+    """
+    content = scene_content(name)
+    # New members must not change the settings of the others.
+    del content["family"]
+    return content, _source_fingerprint(load_scene(name).scene, has_drawn_light)
+
+
+def _source_fingerprint(source: SceneSource, has_drawn_light: bool) -> str | None:
     """Return what changes with a builder's text, or with the import of models."""
     if source.builder:
         return keys.scene_fingerprint(source)
     # A drawn light may be the softboxes.
-    light = SOFTBOXES if "scene.light" in values else source.light
+    light = SOFTBOXES if has_drawn_light else source.light
     import_version = keys.import_version(light)
     # Batches of the first version keep their settings.
     return str(import_version) if import_version > 1 else None

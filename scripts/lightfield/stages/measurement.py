@@ -7,13 +7,11 @@ from typing import Annotated, Generic, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.configuration.config_file import Energy
-from lightfield.core.names import VIEWS
+from lightfield.core.names import INVENTORY, VIEWS
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
-
-INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 
 class FullSize(Settings):

@@ -122,7 +122,7 @@ class Build:
 
     def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
         """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
-        rigs = dataset.tested_by if export.is_for_training else ()
+        rigs = dataset.testing_rigs(export)
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
@@ -146,13 +146,18 @@ class Build:
         path = self.dataset(wildcards).training_transforms(wildcards["source"])
         return [path] if path else []
 
-    def rig(self, wildcards: Wildcards) -> list[Dataset]:
-        """Return the dataset of a rig, or the datasets of all frames of a sequence."""
+    @cached_property
+    def _rigs(self) -> dict[str, list[Dataset]]:
+        """The dataset of each rig, or the datasets of all frames of its sequence."""
         rigs: dict[str, list[Dataset]] = {}
         for dataset in self.datasets.values():
             rigs.setdefault(dataset.sequence_name, []).append(dataset)
+        return rigs
+
+    def rig(self, wildcards: Wildcards) -> list[Dataset]:
+        """Return the dataset of a rig, or the datasets of all frames of a sequence."""
         name = f"{wildcards['scene']}/{wildcards['rig']}"
-        return _entry(rigs, name, self.config.results, "dataset of the chosen scenes")
+        return _entry(self._rigs, name, self.config.results, "dataset of the chosen scenes")
 
     def frames(self, wildcards: Wildcards) -> list[Dataset]:
         """Return the datasets of a rig's sequence, in the order of time.
@@ -237,8 +242,7 @@ class Build:
         """
         for dataset in self.datasets.values():
             if dataset.scene_folder == folder:
-                name, preset, limits = dataset.scene_name, dataset.preset, dataset.limits
-                return scene_datasets(name, preset, limits, self.config)[0]
+                return dataset
         return scene_datasets(folder, settings=self.config)[0]
 
     def packed_sums(self, wildcards: Wildcards) -> list[str]:
