@@ -14,6 +14,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
+from lightfield.core.stage import cause
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import OMNIDIRECTIONAL
@@ -202,12 +203,11 @@ class LightfieldSettings(Settings):
         "only view.",
         json_schema_extra={"unit": "pixels"},
     )
-    fingerprint: str | None = Field(
-        None, description="Hash of the builder's code. If it changes, the scene is captured again."
+    fingerprint: str | None = cause(
+        "Hash of the builder's code. If it changes, the scene is captured again."
     )
-    poses_sha256: str | None = Field(
-        None,
-        description="SHA-256 of the rig's file of poses. If it changes, the file is read again.",
+    poses_sha256: str | None = cause(
+        "SHA-256 of the rig's file of poses. If it changes, the file is read again."
     )
 
     @classmethod

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 from pydantic import Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
+from lightfield.core.setting_types import Stops, White
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -76,17 +77,13 @@ class Export(Settings):
 class Developed(Export):
     """Exports of 8-bit images. ``exposure`` and ``reinhard`` apply only to EXR sources."""
 
-    exposure: float = Field(
+    exposure: Stops = Field(
         0.0,
-        ge=-100,
-        le=100,
         description="Exposure that is applied to EXR sources.",
         json_schema_extra={"unit": "stops"},
     )
-    reinhard: float = Field(
+    reinhard: White = Field(
         1.0,
-        ge=1e-9,
-        le=1e9,
         description="Reinhard tone mapping of EXR sources: the value that becomes white. 1: no "
         "tone mapping.",
         json_schema_extra={"unit": "light"},

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import TypeAliasType
 
-from lightfield.core.setting_types import Primaries
+from lightfield.core.setting_types import Primaries, Stops, White
 from lightfield.core.settings import Name, Settings, Vector, as_list
 from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
@@ -32,8 +32,6 @@ _Strength = Annotated[float, Field(ge=0, le=1e6)]
 _Colour = TypeAliasType("_Colour", Annotated[tuple[_Strength, _Strength, _Strength], as_list(3)])
 Light = Literal["each"] | dict[str, _Strength | _Colour]
 """The strengths of light groups by name. each: every group alone."""
-
-Stops = Annotated[float, Field(ge=-100, le=100)]
 
 
 Filter = Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]
@@ -71,10 +69,8 @@ class ReprojectionOptions(Settings):
     bits: Literal[8, 16] = Field(
         8, description="Bits per channel of a PNG.", json_schema_extra={"unit": "bits"}
     )
-    reinhard: float = Field(
+    reinhard: White = Field(
         1.0,
-        ge=1e-9,
-        le=1e9,
         description="Reinhard tone mapping: the value that becomes white. 1: no tone mapping.",
         json_schema_extra={"unit": "light"},
     )

@@ -142,7 +142,7 @@ def _flags_of(model: type[BaseModel]) -> Iterator[tuple[str, FieldInfo, str | No
 def _add(parser: Any, name: str, field: FieldInfo, may_be_required: bool) -> None:
     """Add the flag of a field to a parser, or to a group of it."""
     extra = _extra(field)
-    keywords: dict[str, Any] = {"help": help_of(field), **_values(field, extra)}
+    keywords: dict[str, Any] = {"help": _help_of(field), **_values(field, extra)}
     if "metavar" in extra:
         keywords["metavar"] = extra["metavar"]
     if extra.get("positional"):
@@ -154,16 +154,16 @@ def _add(parser: Any, name: str, field: FieldInfo, may_be_required: bool) -> Non
     parser.add_argument(*extra.get("short", ()), flag, dest=name, **keywords)
 
 
-def help_of(field: FieldInfo) -> str:
+def _help_of(field: FieldInfo) -> str:
     """Return the help of a field, with its default if that says something."""
     text = (field.description or "").rstrip(".")
-    default = default_of(field)
+    default = _default_of(field)
     if default is not None and "default:" not in text:
         text += f" (default: {default})"
     return text.replace("%", "%%")
 
 
-def default_of(field: FieldInfo) -> str | None:
+def _default_of(field: FieldInfo) -> str | None:
     """Return the default of a field as text. None if it has none, or one that says nothing."""
     default = field.default
     if isinstance(default, bool) or not isinstance(default, str | int | float) or default == "":

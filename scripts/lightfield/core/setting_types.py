@@ -31,6 +31,10 @@ Folder = Annotated[
 ]
 # The characters of a path that the rules quote in commands.
 QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
+# An exposure, in stops.
+Stops = Annotated[float, Field(ge=-100, le=100)]
+# The value of light that Reinhard tone mapping makes white.
+White = Annotated[float, Field(ge=1e-9, le=1e9)]
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Auto = Literal["auto"]
 DenoisePrefilter = Literal["accurate", "fast", "none"]

@@ -15,11 +15,11 @@ from lightfield.configuration.reprojections import (
     MOST_SAMPLES,
     Filter,
     Reprojection,
-    Stops,
 )
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.flags import checked_flags
+from lightfield.core.setting_types import Stops, White
 from lightfield.core.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import named_numbers
@@ -232,7 +232,7 @@ class ReprojectFlags(LensMapFlags):
         group=_FILES,
     )
     exposure: Stops = option("exposure in stops", 0.0, group="Colour")
-    reinhard: Annotated[float, Field(ge=1e-9, le=1e9)] = option(
+    reinhard: White = option(
         "Reinhard tone mapping: the value that becomes white (default: 1, no tone mapping)",
         1.0,
         group="Colour",

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.configuration.config_file import Energy
 from lightfield.core.names import INVENTORY, VIEWS
-from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.setting_types import AtLeastOne, Stops, White
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
@@ -271,17 +271,13 @@ class EvaluationSettings(Settings):
         VIEWS, description=f"Name of a reprojection. {VIEWS}: the views as rendered."
     )
     suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the dataset's views.")
-    exposure: float = Field(
+    exposure: Stops = Field(
         0.0,
-        ge=-100,
-        le=100,
         description="Exposure of EXR views in stops, as in the export.",
         json_schema_extra={"unit": "stops"},
     )
-    reinhard: float = Field(
+    reinhard: White = Field(
         1.0,
-        ge=1e-9,
-        le=1e9,
         description="Tone mapping of EXR views, as in the export: the value that becomes white. 1: "
         "no tone mapping.",
         json_schema_extra={"unit": "light"},

@@ -7,7 +7,7 @@ from pydantic import Field, PlainSerializer
 
 from lightfield.core.names import ROOT
 from lightfield.core.settings import Settings
-from lightfield.core.stage import PlainStage, Stage, option, reads, writes
+from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.geometry.rigs import AnyRig, as_written
 
 
@@ -37,10 +37,8 @@ class MeasurementFile(Settings):
     """A file that a measurement wrote, and that the page shows."""
 
     file: str = Field(description="Path of the file.")
-    modified_ns: int | None = Field(
-        None,
-        description="When the file was modified, in nanoseconds. If it changes, the page is made "
-        "again.",
+    modified_ns: int | None = cause(
+        "When the file was modified, in nanoseconds. If it changes, the page is made again."
     )
 
 

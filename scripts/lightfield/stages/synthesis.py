@@ -1,11 +1,8 @@
 """The stage that synthesises views between a dataset's cameras."""
 
 from pathlib import Path
-from typing import Annotated
 
-from pydantic import Field
-
-from lightfield.core.setting_types import AtLeastOne
+from lightfield.core.setting_types import AtLeastOne, Stops
 from lightfield.core.stage import PlainStage, option, reads, writes
 
 # A picture is made of this many views.
@@ -28,7 +25,7 @@ class Synthesize(PlainStage):
         None,
     )
     best: AtLeastOne = option("views a picture is made of", BEST, metavar="K")
-    exposure: Annotated[float, Field(ge=-100, le=100)] | None = option(
+    exposure: Stops | None = option(
         "exposure of the PNGs, in stops (default: chosen from the first picture)", None
     )
     video: bool = option("also write the video walk.mp4, with ffmpeg", False)
