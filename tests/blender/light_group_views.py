@@ -10,13 +10,13 @@ import sys
 from pathlib import Path
 
 import bpy
+import one_shard
 
 from lightfield.core.errors import UserError
 from lightfield.formats.light_groups import resolved
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, inventory, light
-from lightfield.stages.views import RenderShard
 
 SIZE = 24
 LENSES = {
@@ -111,15 +111,8 @@ def main(folder: Path) -> None:
         content = LightField.from_rig(
             RIG, lenses.from_camera(LENSES[lens]), depth=None, frame=1, scene={}, render=block
         )
-        content.write(folder / name / "lightfield.json")
-        RenderShard(
-            lightfield=folder / name / "lightfield.json",
-            output=folder / name / "exr",
-            blend=folder / "scene.blend",
-            device="cpu",
-            threads=1,
-            record=folder / f"{name}.json",
-        ).run()
+        record = folder / f"{name}.json"
+        one_shard.render(content, folder / name, folder / "scene.blend", record=record)
 
     groups = resolved("each", emitters)
     for lens in LENSES:

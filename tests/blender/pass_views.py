@@ -14,13 +14,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import one_shard
 from mathutils import Vector
 
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file
-from lightfield.stages.views import RenderShard
 
 # The wall's places at the frames 1, 2 and 3. Frame 2 is rendered.
 WALL = [(-0.1, 2.8, 0), (0, 3, 0), (0.25, 3.1, 0.05)]
@@ -227,17 +227,8 @@ def main(folder: Path) -> None:
     blend_file.save_scene(blend)
 
     def render(name, content, views=":"):
-        content.write(folder / name / "lightfield.json")
-        RenderShard(
-            lightfield=folder / name / "lightfield.json",
-            views=views,
-            output=folder / name / "exr",
-            blend=blend,
-            device="cpu",
-            threads=1,
-            record=folder / f"{name}.json",
-            journal=folder / f"{name}.jsonl",
-        ).run()
+        notes = {"record": folder / f"{name}.json", "journal": folder / f"{name}.jsonl"}
+        one_shard.render(content, folder / name, blend, views=views, **notes)
 
     objects = {}
     for name in LENSES:

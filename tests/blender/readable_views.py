@@ -13,13 +13,13 @@ import sys
 from pathlib import Path
 
 import bpy
+import one_shard
 
 from lightfield.configuration import keys
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file
-from lightfield.stages.views import RenderShard
 
 # The view shows rows of square tiles.
 ROW = 12
@@ -393,16 +393,8 @@ def main(folder: Path) -> None:
     blend_file.open_scene(blend)
     render_with_blender(folder / "blender.exr")
     for name, choice in CHOICES.items():
-        lightfield = content(**choice)
-        lightfield.write(folder / name / "lightfield.json")
-        RenderShard(
-            lightfield=folder / name / "lightfield.json",
-            output=folder / name / "exr",
-            blend=blend,
-            device="cpu",
-            threads=1,
-            record=folder / f"{name}.json",
-        ).run()
+        record = folder / f"{name}.json"
+        one_shard.render(content(**choice), folder / name, blend, record=record)
 
 
 if __name__ == "__main__":

@@ -10,11 +10,11 @@ import sys
 from pathlib import Path
 
 import bpy
+import one_shard
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file
-from lightfield.stages.views import RenderShard
 
 SIZE = 48
 LENSES = {
@@ -248,15 +248,8 @@ def main(folder: Path) -> None:
         depth = "z" if made.has_z_depth else "distance"
         block = {**RENDER, **settings}
         content = LightField.from_rig(rig, made, depth=depth, frame=1, scene={}, render=block)
-        content.write(folder / name / "lightfield.json")
-        RenderShard(
-            lightfield=folder / name / "lightfield.json",
-            output=folder / name / "exr",
-            blend=folder / "scene.blend",
-            device="cpu",
-            threads=1,
-            record=folder / f"{name}.json",
-        ).run()
+        record = folder / f"{name}.json"
+        one_shard.render(content, folder / name, folder / "scene.blend", record=record)
 
     for lens in LENSES:
         render(lens, lens)

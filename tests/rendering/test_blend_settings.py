@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 import blend_scenes
 import numpy as np
+import one_shard
 import pytest
 from blend_settings import IGNORED, NO_CASE, OWNERS, PAGE, REFUSED, ROWS, page
 
@@ -18,7 +19,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.rendering import lightfield_file
-from lightfield.stages.views import RenderShard
 from lightfield.workflow.loading import datasets_of
 
 CASES = [
@@ -157,15 +157,7 @@ def of_plenoforge(path, yaml):
     views = lightfield_file.from_settings(LightfieldSettings.of_capture(dataset), inventory)
     folder = path.parent / "exr"
     with contextlib.redirect_stderr(io.StringIO()):
-        views.write(path.parent / "lightfield.json")
-        RenderShard(
-            lightfield=path.parent / "lightfield.json",
-            output=folder,
-            blend=path,
-            inventory=inventory,
-            device="cpu",
-            threads=1,
-        ).run()
+        one_shard.render(views, path.parent, path, inventory=inventory)
     channels = "RGBA" if views.transparent else "RGB"
     image = images.read_image(folder / f"{views.views[0].name}.exr", [*channels, "Z"])
     pixels = np.stack([image.channels[name] for name in channels], axis=-1)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import blend_scenes
 import camera_followers as followers
 import numpy as np
+import one_shard
 import pytest
 from test_blend_settings import difference, of_blender, open_file, save
 
@@ -18,7 +19,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.rendering import lightfield_file
-from lightfield.stages.views import RenderShard
 from lightfield.validation.validate import validate
 from lightfield.workflow.loading import datasets_of
 
@@ -81,16 +81,8 @@ def dataset(path, folder, change=None, **scene):
     with contextlib.redirect_stdout(said):
         inventory_file.write_of_datasets(path, written, [made], inventory, False)
     views = lightfield_file.from_settings(LightfieldSettings.of_capture(made), inventory)
-    views.write(folder / "lightfield.json")
     with contextlib.redirect_stderr(io.StringIO()):
-        RenderShard(
-            lightfield=folder / "lightfield.json",
-            output=folder / "exr",
-            blend=path,
-            inventory=inventory,
-            device="cpu",
-            threads=1,
-        ).run()
+        one_shard.render(views, folder, path, inventory=inventory)
     pictures = []
     for view in views.views:
         image = images.read_image(folder / "exr" / f"{view.name}.exr", "RGB")

@@ -3,13 +3,13 @@
 import json
 
 import numpy as np
+import one_shard
 import pytest
 
 from lightfield.core.files import read_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
-from lightfield.stages.views import RenderShard
 
 pytestmark = pytest.mark.slow
 
@@ -112,14 +112,7 @@ def rendered(folder, *passes):
     }
     views = LightField.from_rig(rig, lenses.from_camera(CAMERA), frame=1, render=render, depth="z")
     target = folder / "-".join(["made", *passes])
-    views.write(target / "lightfield.json")
-    RenderShard(
-        lightfield=target / "lightfield.json",
-        output=target / "exr",
-        blend=folder / "main.blend",
-        device="cpu",
-        threads=1,
-    ).run()
+    one_shard.render(views, target, folder / "main.blend")
     return target
 
 

@@ -3,6 +3,7 @@
 import shutil
 
 import numpy as np
+import one_shard
 import pytest
 
 from lightfield.core.errors import UserError
@@ -11,7 +12,6 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
-from lightfield.stages.views import RenderShard
 from lightfield.validation import validate as validation
 
 pytestmark = pytest.mark.slow
@@ -74,14 +74,7 @@ def rendered(tmp_path_factory, run_program):
     views = LightField.from_rig(
         rigs.from_settings(rig), lenses.from_camera(CAMERA), frame=1, render=RENDER, depth="z"
     ).with_flow()
-    views.write(folder / "lightfield.json")
-    RenderShard(
-        lightfield=folder / "lightfield.json",
-        output=folder / "exr",
-        blend=blend,
-        device="cpu",
-        threads=2,
-    ).run()
+    one_shard.render(views, folder, blend, threads=2)
     run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
     return folder
 
@@ -203,15 +196,7 @@ def test_a_holdout_is_no_surface(transparent, tmp_path):
     lightfield = LightField.from_rig(
         rigs.from_settings(rig), lenses.from_camera(CAMERA), frame=1, render=render, depth="z"
     )
-    folder = tmp_path / "exr"
-    lightfield.write(tmp_path / "lightfield.json")
-    RenderShard(
-        lightfield=tmp_path / "lightfield.json",
-        output=folder,
-        blend=path,
-        device="cpu",
-        threads=1,
-    ).run()
+    one_shard.render(lightfield, tmp_path, path)
     (view,) = lightfield.views
     cube, ground, _ = true_distances(lightfield, view)
     image = planes(tmp_path, "exr", view)
