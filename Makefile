@@ -1,6 +1,7 @@
 # make             sets up the environment and builds the default dataset
 # make test        sets up and runs the checks and tests
 # make test-other  runs mypy, and the tests that are not slow, with the other supported Python
+# make test-snakemakes  builds the smoke scene with the oldest and the newest Snakemake
 # make consumers   reads exports with the consumers' own code, in an environment of its own
 # make learn       learns radiance fields from exported files, in the same environment
 # make docs        builds the documents as a site with a search, in site/
@@ -21,9 +22,13 @@ PYTEST = env -u PYTHONDONTWRITEBYTECODE python -m pytest
 # The version of the environment's Python, as in the locks' names, and the other supported version.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
+# Snakemake finds logger plugins only in its environment, and passes over editable installs.
+PLUGIN = envs/snakemake_logger_plugin_plenoforge
+INSTALL_PLUGIN = cp -R $(PLUGIN) \
+	"$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test test-other check consumers learn soak docs locks
+.PHONY: all test test-other test-snakemakes check consumers learn soak docs locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -39,6 +44,19 @@ test-other: .venv-other/complete
 	mypy scripts/lightfield
 	$(PYTEST) -n $(CORES) -m "not slow"
 
+# The oldest is the one that the Snakefile asks for. The first run is killed, and the next goes on.
+test-snakemakes: .venv-snakemake-9.20/complete .venv-snakemake-9/complete
+	rm -rf work/snakemakes
+	@set -e; for version in 9.20 9; do \
+		export PATH=$(CURDIR)/.venv-snakemake-$$version/bin:$$PATH; \
+		mkdir -p work/snakemakes/$$version; \
+		smoke="snakemake --directory work/snakemakes/$$version smoke"; \
+		$$smoke --dry-run; \
+		timeout --signal KILL 15 $$smoke --cores $(CORES) || true; \
+		$$smoke --cores $(CORES); \
+		echo "smoke builds with Snakemake $$(snakemake --version)"; \
+	done
+
 # Style, types, and Snakemake's own advice.
 check: .venv/complete-for-tests
 	ruff check .
@@ -52,7 +70,7 @@ consumers: .venv/complete .venv-consumers/complete
 	.venv-consumers/bin/python -W ignore tests/consumers/check.py work/consumers
 
 # Several GB: for Linux, the package index only has torch with CUDA.
-.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
+.venv-consumers/complete: .venv/packages envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
 	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-consumers
 	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
@@ -79,7 +97,7 @@ soak: .venv/complete
 	python benchmarks/corpus.py --output work/soak --views 4 --samples 1
 
 # PYTHON names an interpreter. Without it, envs/find_python.sh chooses one.
-.venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt
+.venv/packages: envs/requirements-3.13.txt envs/requirements-3.11.txt
 	@$(NO_LINK)
 	@set -e; python=$$(envs/find_python.sh $(PYTHON)); \
 	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
@@ -89,12 +107,16 @@ soak: .venv/complete
 	@.venv/$(COMPILE) .venv/lib || true
 	@touch $@
 
+.venv/complete: .venv/packages $(PLUGIN)/__init__.py
+	@$(INSTALL_PLUGIN)
+	@touch $@
+
 .venv/complete-for-tests: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
 	@$(PIP) install --no-compile --require-hashes -r envs/requirements-test-$(VERSION).txt
 	@.venv/$(COMPILE) .venv/lib || true
 	@touch $@
 
-.venv-other/complete: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
+.venv-other/packages: .venv/packages envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
 	@$(NO_LINK)
 	@set -e; python=$$(envs/find_python.sh $(OTHER)); \
 	echo "setting up .venv-other with $$python: some minutes, mostly to download 400 MB"; \
@@ -105,20 +127,34 @@ soak: .venv/complete
 	@.venv-other/$(COMPILE) .venv-other/lib || true
 	@touch $@
 
+.venv-other/complete: .venv-other/packages $(PLUGIN)/__init__.py
+	@$(INSTALL_PLUGIN)
+	@touch $@
+
+# The other packages are those of .venv.
+.venv-snakemake-%/complete: .venv/packages $(PLUGIN)/__init__.py
+	@$(NO_LINK)
+	.venv/bin/python -m venv --clear $(@D)
+	$(@D)/bin/pip -qq --disable-pip-version-check install 'snakemake==$*.*'
+	@$(INSTALL_PLUGIN)
+	@.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))' \
+		> $(@D)/lib/python$(VERSION)/site-packages/others.pth
+	@touch $@
+
 # For machines without a common folder.
 .venv/complete-with-storage: .venv/complete envs/requirements-storage-3.13.txt envs/requirements-storage-3.11.txt
 	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
 	@touch $@
 
 # The S3 server of benchmarks/cloud.py needs other versions of the environment's packages.
-.venv-s3-server/complete: .venv/complete envs/requirements-s3-server.txt
+.venv-s3-server/complete: .venv/packages envs/requirements-s3-server.txt
 	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-s3-server
 	.venv-s3-server/bin/pip -qq --disable-pip-version-check install --require-hashes \
 		-r envs/requirements-s3-server.txt
 	@touch $@
 
-.venv-docs/complete: .venv/complete envs/requirements-docs.txt
+.venv-docs/complete: .venv/packages envs/requirements-docs.txt
 	@$(NO_LINK)
 	.venv/bin/python -m venv --clear .venv-docs
 	.venv-docs/bin/pip -qq --disable-pip-version-check install --require-hashes -r envs/requirements-docs.txt

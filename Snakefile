@@ -1,11 +1,20 @@
 # Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
-import atexit
+import os
 import sys
 from pathlib import Path
 
 from snakemake.utils import min_version
 
-min_version("9.26")
+min_version("9.20")
+
+# Jobs on a cluster read this file again. They get the variable from the run.
+IS_MAIN_PROCESS = "PLENOFORGE_RUN" not in os.environ
+os.environ["PLENOFORGE_RUN"] = "1"
+
+
+envvars:
+    "PLENOFORGE_RUN",
+
 
 # The folder of this workflow, which may be a module of another one.
 FOLDER = Path(workflow.current_basedir)
@@ -15,8 +24,6 @@ from lightfield.configuration.config_file import read_config
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import UserError
 from lightfield.core.yaml_files import as_written
-from lightfield.workflow.failures import failure_report
-from lightfield.workflow.view_store import ViewStore
 
 # Snakemake ends with a traceback if it cannot write its notes.
 if problem := obstacle(Path(".snakemake")):
@@ -24,14 +31,14 @@ if problem := obstacle(Path(".snakemake")):
 
 # The keys from the command line, or from the workflow whose module this is. config.yaml fills in
 # the others.
-GIVEN = set(config)
+GIVEN_KEYS = set(config)
 HAS_OWN_CONFIG = Path("config.yaml").exists() and Path.cwd() != FOLDER
 
 # Snakemake loads both files without a limit of size, and does not name the line of a mistake.
 try:
     # The defaults, and the values of the user's own folder.
     DEFAULTS = read_config(FOLDER / "config.yaml")
-    OWN = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
+    USER_CONFIG = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
 except UserError as error:
     sys.exit(f"error: {error}")
 
@@ -46,31 +53,31 @@ if HAS_OWN_CONFIG:
 
 # Snakemake reads no file for a module with a given configuration, and reads 12:30 as 750. So this
 # replaces Snakemake's values, and adds the missing defaults.
-OWN_READ = {key: value for key, value in OWN.items() if key in config}
-for written in (DEFAULTS, OWN_READ):
+USER_VALUES = {key: value for key, value in USER_CONFIG.items() if key in config}
+for written in (DEFAULTS, USER_VALUES):
     as_written(
-        config, {key: value for key, value in written.items() if key not in GIVEN}
+        config, {key: value for key, value in written.items() if key not in GIVEN_KEYS}
     )
 
 
 report: "captions/workflow.rst"
 
 
-include: "rules/internals.smk"
-
-
 # With --software-deployment-method apptainer, each job runs in the image of envs/plenoforge.def.
-# Without containers the path must not have blanks either, because Snakemake checks it anyway.
-container: f"{FOLDER}/envs/plenoforge.sif" if USES_CONTAINERS else "plenoforge.sif"
+# Snakemake refuses a path with blanks, also if no job runs in a container.
+IMAGE = f"{FOLDER}/envs/plenoforge.sif"
+
+
+container: IMAGE if " " not in IMAGE else "plenoforge.sif"
 
 
 include: "rules/common.smk"
-include: "rules/shell.smk"
 include: "rules/storage.smk"
+include: "rules/shell.smk"
 include: "rules/selectors.smk"
-include: "rules/ledger.smk"
+include: "rules/check.smk"
+include: "rules/settings.smk"
 include: "rules/start.smk"
-include: "rules/failures.smk"
 include: "rules/display.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
@@ -91,52 +98,51 @@ include: "rules/synthesis.smk"
 include: "rules/learn.smk"
 
 
+# Only Snakemake's path of an output says whether it has a storage.
+HAS_STORAGE = ".snakemake/storage/" in str(rules.index.output[0])
+if IS_MAIN_PROCESS and STORE and not HAS_STORAGE:
+    sys.exit(
+        "error: storage: Snakemake has no storage: add --default-storage-provider "
+        f"and --default-storage-prefix {STORE}"
+    )
+if IS_MAIN_PROCESS and HAS_STORAGE and not STORE:
+    sys.exit(
+        "error: storage: is empty, but Snakemake has a storage: add --config storage=<its place>"
+    )
+
+
 onstart:
     try:
+        announce_changes()
+        run_lock.take(scene_folders())
         check_start()
-        if STORE:
-            ViewStore(STORE).check()
-        keep_shards()
+        write_new_settings()
         remove_leftovers()
-        announce_damage()
-        set_damage_aside()
         begin_display()
-        begin_notes()
         announce_stop()
     except UserError as error:
         sys.exit(f"error: {error}")
 
 
 onsuccess:
-    end_display()
-    end_notes()
-    print_pages()
-    print_families()
+    DISPLAY.at_close(print_results)
 
 
 onerror:
-    end_display()
-    end_notes()
-    # Snakemake prints more after this. So print the failures when the process ends.
-    atexit.register(
-        print,
-        failure_report(failed_jobs(failed_entries())) or UNFINISHED,
-        file=sys.stderr,
-        flush=True,
-    )
+    DISPLAY.at_close(print_failures)
 
 
 rule all:
     default_target: True
     input:
-        [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
+        [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN_DATASETS],
         f"{RESULTS}/index.html",
         BUILD.family_targets,
 
 
 rule report_html:
     input:
-        [dataset.paths.page for dataset in CHOSEN],
+        [dataset.paths.page for dataset in CHOSEN_DATASETS],
         f"{RESULTS}/index.html",
 
 
@@ -147,5 +153,5 @@ rule smoke:
 
 rule package:
     input:
-        [dataset.sequence_paths.package for dataset in CHOSEN],
+        [dataset.sequence_paths.package for dataset in CHOSEN_DATASETS],
         BUILD.documents,

@@ -25,7 +25,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.progress import Progress
-from lightfield.validation.corpus_integrity import corpus_faults
+from lightfield.validation import verification
 
 # Angle of view, distance and elevation are as in allenai/objaverse-rendering, and so are bounces,
 # adaptive sampling and the denoiser.
@@ -76,7 +76,8 @@ def problems(build: FamilyBuild, expected: dict[str, Any], kills: int) -> list[s
     repeated = [name for (_, name), times in begun.items() if times > 1 and name in valid]
     if len(repeated) > kills * build.cores:
         faults.append(f"built more than once: {', '.join(repeated)}")
-    return faults + [str(fault) for fault in corpus_faults(build.root / RESULTS)]
+    found = verification.faults(build.root / RESULTS)
+    return faults + [f"{path}: {problem}" for path, problem in found.items()]
 
 
 def stage_seconds(build: FamilyBuild) -> dict[str, float]:

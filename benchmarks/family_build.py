@@ -9,8 +9,9 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json_lines, write_json, write_text
+from lightfield.core.files import write_json, write_text
 from lightfield.core.names import ROOT
 
 
@@ -25,12 +26,12 @@ class FamilyBuild:
         settings = {"scenes": [*scenes], "rigs": "all", "preset": "full", "device": "cpu"}
         write_json(root / "config.yaml", settings)
 
-    def start(self, *arguments: str) -> subprocess.Popen[str]:
+    def start(self) -> subprocess.Popen[str]:
         """Start Snakemake in a process group of its own."""
         snakemake = str(Path(sys.executable).with_name("snakemake"))
         command = [snakemake, "--snakefile", str(ROOT / "Snakefile"), "--cores", str(self.cores)]
         return subprocess.Popen(
-            [*command, *arguments],
+            command,
             cwd=self.root,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -43,11 +44,12 @@ class FamilyBuild:
         return len([*self.root.glob("results/*/*/member.json")])
 
     def begun(self) -> Counter[tuple[str, str]]:
-        """Return how often each member was begun, by family and name, from the journals."""
+        """Return how often each member was begun, by family and name."""
+        files = self.root.glob("work/receipts/*/batches/*.*")
         return Counter(
-            (journal.parts[-3], line["member"])
-            for journal in self.root.glob("work/*/batches/*.journal.jsonl")
-            for line in read_json_lines(journal)
+            (path.parts[-3], line["member"])
+            for path in {file.with_suffix(receipts.SUFFIX) for file in files}
+            for line in receipts.history(path)
             if "began" in line
         )
 
@@ -60,7 +62,6 @@ class FamilyBuild:
             time.sleep(0.2)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
-        self.start("--unlock").communicate()
 
     def finish(self) -> list[str]:
         """Build to the end. Return the lines that count the members of each family."""

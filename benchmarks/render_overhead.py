@@ -7,7 +7,6 @@ files.
 """
 
 import argparse
-import json
 import statistics
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
+from lightfield.core import receipts
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[str, Any]]:
-    """Render ``count`` views in one process, after one more view; return their journal lines."""
+    """Render ``count`` views in one process, after one more view; return their lines of history."""
     lens = lenses.from_camera(
         {"lens": "equidistant", "fov": 180, "resolution": [RESOLUTION, RESOLUTION]}
     )
@@ -65,7 +65,7 @@ def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[st
     render = {"samples": samples, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     render |= {"depth_precision": "float"}
     lightfield = folder / f"{samples}.json"
-    journal = folder / f"{samples}.jsonl"
+    receipt = folder / receipts.FOLDER / f"{samples}.jsonl"
     LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(lightfield)
     run(
         "render_shard.py",
@@ -75,16 +75,15 @@ def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[st
         lightfield,
         "--output",
         folder / str(samples),
-        "--journal",
-        journal,
+        "--receipt",
+        receipt,
         "--device",
         "cpu",
         "--threads",
         "1",
     )
-    lines = [json.loads(line) for line in journal.read_text().splitlines()]
     # The first view pays for the scene's acceleration structures.
-    return [line for line in lines if "view" in line][1:]
+    return [line for line in receipts.history(receipt) if "view" in line][1:]
 
 
 def run(program: str, *arguments: object) -> None:

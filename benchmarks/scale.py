@@ -26,12 +26,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import bookkeeping
+import simulated
 from checkouts import jobs_on
 
 from lightfield.configuration import config_file as configuration
 from lightfield.configuration import keys
 from lightfield.configuration.dataset import Dataset
-from lightfield.core.files import read_json, sha256, write_json, write_text
+from lightfield.core.files import read_json, write_json, write_text
 from lightfield.core.names import ROOT
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
@@ -227,44 +228,39 @@ def simulate() -> None:
     )
     content = Path("view.exr").read_bytes()
     for first, end in dataset.shards:
-        files = []
+        shard_keys = {}
         for view in lightfield.views[first:end]:
             path = folder / f"{view.name}.exr"
-            key = keys.render_key(lightfield, view)
-            path.write_bytes(content.replace(pattern.encode(), key.encode()))
-            sums = {"bytes": len(content), "sha256": sha256(path)}
-            files.append((f"exr/{path.name}", key, sums))
+            shard_keys[path] = keys.render_key(lightfield, view)
+            path.write_bytes(content.replace(pattern.encode(), shard_keys[path].encode()))
         record = bookkeeping.shard(dataset.name, "render", f"{first}-{end}")
-        bookkeeping.write_shard(Path(record), files)
-    finish(dict.fromkeys(dataset.all_records, dataset.paths.folder))
+        bookkeeping.note_shard(record, shard_keys)
+    finish()
 
 
 def simulate_family() -> None:
-    """Write the files of a finished family that a plan looks at: no views, but all notes."""
+    """Write the files of a finished family that a plan looks at: no views, but all receipts."""
     (family,) = chosen_families(chosen_settings()).values()
     for name, members in family.batches().items():
-        names = [member.name for member in members]
-        bookkeeping.write_batch(Path(f"work/scale/batches/{name}.json"), names, ["LFPlane"])
-        for member in names:
-            write_text(f"results/scale/{member}/member.json", "{}")
-            write_text(f"results/scale/{member}/LFPlane/sha256sums.txt", "sums\n")
-    finish({})
+        files = []
+        for member in members:
+            folder = f"results/scale/{member.name}"
+            files += [f"{folder}/member.json", f"{folder}/LFPlane/sha256sums.txt"]
+        for file in files:
+            write_text(file, "{}")
+        bookkeeping.note_batch("scale", name, files)
+    finish()
 
 
-def finish(shards: dict[str, str]) -> None:
-    """Write all other files that a build makes, and note that their jobs are finished.
-
-    ``shards`` are the records of shards, with the folders of their datasets.
-    """
-    inputs = {name: job["input"] for job in planned_jobs() for name in job["output"]}
-    for name in inputs:
+def finish() -> None:
+    """Write all other files that a build makes, and note that their jobs are finished."""
+    jobs = planned_jobs()
+    for name in {name for job in jobs for name in job["output"]}:
         if not Path(name).exists():
             write_text(name, '{"valid": true}')
-    timestamp = 1_700_000_000
-    for root in ("results", "work"):
-        for path in Path(root).rglob("*"):
-            os.utime(path, (timestamp, timestamp))
-    bookkeeping.note_build(".", inputs, shards, timestamp)
+    simulated.set_times(Path())
+    bookkeeping.note_build(".", jobs)
+    simulated.set_times(Path())
 
 
 def planned_jobs() -> list[dict[str, Any]]:

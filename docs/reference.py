@@ -309,7 +309,7 @@ PROGRAM_PAGES = {
     "programs-publish.md": (
         "Programs that publish and fetch",
         "These programs pack finished datasets, or copy them from a storage.",
-        ["publish_checksums", "package", "publish", "take_dataset", "take_views"],
+        ["publish_checksums", "package", "publish", "take_dataset"],
     ),
     "programs-check.md": (
         "Programs that check",

@@ -69,22 +69,26 @@ rule render_overhead:
 
 rule check_gpu:
     input:
-        settings=settings("gpu_check"),
-        check=of_first("blend_check"),
-        blend=of_first("blend"),
-        inventory=of_first("inventory"),
-        lightfield=PATHS.probes,
-        calibration=of_first("calibration"),
+        reads(
+            "{scene}/gpu_check",
+            "gpu_check",
+            check=of_first("blend_check"),
+            blend=of_first("blend"),
+            inventory=of_first("inventory"),
+            lightfield=PATHS.probes,
+            calibration=of_first("calibration"),
+        ),
     output:
         multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
+        receipt=receipt_of("{scene}/gpu_check"),
     log:
         log_of("{scene}/gpu_check"),
     # Alone on the machine, so that nothing else is in the times.
     threads: ALL_CORES
     resources:
+        **GPU,
         mem_mb=6000,
         runtime=60,
-        gpu=GPUS,
     params:
         device=SETTINGS.device,
         cache=of_first("paths.trials"),
@@ -97,7 +101,8 @@ rule check_gpu:
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device}"
         " --threads {threads} --settings {input.settings}"
-        " --cache {params.cache} --output {params.stem} > {log} 2>&1"
+        " --cache {params.cache} --output {params.stem} --receipt {output.receipt}"
+        " > {log} 2>&1"
 
 
 # Without a GPU the run ends before its first job.

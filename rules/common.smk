@@ -11,7 +11,7 @@ from lightfield.configuration.dataset_paths import Paths
 from lightfield.core.errors import UserError
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.workflow import ledger, presence, shard_counts
+from lightfield.workflow import presence
 from lightfield.workflow.build import Build
 
 # Relative to Snakemake's folder, which may be a user's own, and quoted for commands.
@@ -20,18 +20,25 @@ BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
 
 # The rigs in a config.yaml belong to the scenes in it. For other scenes, all rigs are chosen.
-NAMING = GIVEN if "scenes" in GIVEN else OWN
-if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
+CHOOSING_KEYS = GIVEN_KEYS if "scenes" in GIVEN_KEYS else USER_CONFIG
+if "scenes" in CHOOSING_KEYS and "rigs" not in {*GIVEN_KEYS, *CHOOSING_KEYS}:
     config["rigs"] = "all"
 
 # The cores of this machine, or of each job on a cluster.
-ALL_CORES = CORES or 1
-
-# On a cluster, shards are small, so that no job waits long for the last one.
-CLUSTER = Cluster(jobs=NODES, cores=ALL_CORES) if NODES else None
+try:
+    ALL_CORES = workflow.cores
+except Exception:
+    # Commands that run no job, such as --summary, need no --cores.
+    ALL_CORES = 1
 
 try:
     SETTINGS = load_config(config)
+    # On a cluster, shards are small, so that no job waits long for the last one.
+    CLUSTER = (
+        Cluster(jobs=SETTINGS.cluster_jobs, cores=ALL_CORES)
+        if SETTINGS.cluster_jobs
+        else None
+    )
     BUILD = Build.load(SETTINGS, CLUSTER)
     if IS_MAIN_PROCESS:
         for dataset in BUILD.chosen:
@@ -39,27 +46,28 @@ try:
 except UserError as error:
     sys.exit(f"error: {error}")
 
+# Where the storage of jobs without a common folder is. Empty if they have one.
+STORE = SETTINGS.storage
+RUNS_HERE = not CLUSTER
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
-CHOSEN = BUILD.chosen
+CHOSEN_DATASETS = BUILD.chosen
 DATASETS = BUILD.datasets
 # Imported scenes have only views.
-RENDERED_SCENES = list(dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported))
+RENDERED_SCENES = list(
+    dict.fromkeys(d.scene_name for d in CHOSEN_DATASETS if not d.imported)
+)
 
 # The paths of a dataset, with wildcards.
 PATHS = Paths(RESULTS, WORK)
-LEDGER = f"{WORK}/{ledger.NAME}"
 # Damaged files are moved here, so that nobody loses anything.
 REMOVED = f"{WORK}/removed"
-SHARDS = f"{WORK}/{shard_counts.NAME}"
 MEMORY = available()
-# Each render takes a GPU, so as many renders run at once as there are GPUs. Nodes count their own.
+# Each render takes a GPU, and waits until one is free. Nodes count their own.
 LOCAL_GPUS = visible() if RUNS_HERE and SETTINGS.device != "cpu" else []
-if RUNS_HERE:
-    limit_resource("gpu", max(1, len(LOCAL_GPUS)))
-# Without GPUs the resource is left out, unless a submit command needs the number.
-DEFAULT_GPUS = 0 if ASKS_FOR_GPUS else None
-GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else DEFAULT_GPUS
+GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else 0
+# Without GPUS the resource is left out, so that a profile's default counts.
+GPU = {"gpu": GPUS} if GPUS else {}
 
 
 def one_of(names):
@@ -75,23 +83,25 @@ SCENE_OF_SEQUENCE = rf"(?=(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+"
 SCENE_OF_DATASET = rf"(?!(?:{SEQUENCES})/[^/]+$)[A-Za-z0-9_-]+"
 
 
-wildcard_constraints:
-    name="[A-Za-z0-9_-]+",
-    scene="[A-Za-z0-9_-]+",
+CONSTRAINTS = {
+    "name": "[A-Za-z0-9_-]+",
+    "scene": "[A-Za-z0-9_-]+",
     # A sequence's datasets lie a folder deeper, one for each frame.
-    rig=r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
-    # The records of the views lie beside those of the reprojections.
-    reprojection=r"(?!f\d{5,7}/|flow/|render/)[A-Za-z0-9_.-]+",
+    "rig": r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
+    # The receipts of the views lie beside the receipts of the reprojections.
+    "reprojection": r"(?!f\d{5,7}/|flow/|render/|panorama/)[A-Za-z0-9_.-]+",
     # Of an export: nothing for the views, or a reprojection's name and a slash.
-    source=r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
-    format="[a-z0-9_]+",
-    first=r"\d+",
-    end=r"\d+",
+    "source": r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
+    "format": "[a-z0-9_]+",
+    "first": r"\d+",
+    "end": r"\d+",
+    "family": one_of(BUILD.family_names),
+    "batch": r"(seeds|models)_\d+_(of_)?\d+",
+}
 
 
-def is_of(job, name):
-    """Return whether a job's rule has this name, which a workflow with a module may change."""
-    return job.rule.name == getattr(rules, name).rule.name
+wildcard_constraints:
+    **CONSTRAINTS,
 
 
 def log_of(job):
@@ -114,7 +124,7 @@ def asked(question, wildcards):
 
 def of_build(question):
     """Return an input function: it returns what a function of the build says of the job."""
-    return of_each_shard(lambda wildcards: asked(question, wildcards))
+    return lambda wildcards: asked(question, wildcards)
 
 
 def of_dataset(attribute):

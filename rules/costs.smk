@@ -3,23 +3,26 @@
 
 rule costs:
     input:
-        settings=settings("costs"),
-        validation=PATHS.validation,
-        # Without a store the validation is enough, and a plan of many shards is shorter.
-        records=of_dataset("all_records") if STORE else [],
-        published=of_dataset("published"),
-        pictures=PATHS.pictures,
-        blend=of_dataset("blend"),
-        inventory=of_dataset("blend_inventory"),
+        reads(
+            "{scene}/{rig}/costs",
+            "costs",
+            validation=PATHS.validation,
+            published=of_dataset("published"),
+            views=of_dataset("all_receipts") if STORE else [],
+            pictures=PATHS.pictures,
+            blend=of_dataset("blend"),
+            inventory=of_dataset("blend_inventory"),
+        ),
     output:
-        PATHS.costs,
+        costs=update(PATHS.costs),
+        receipt=receipt_of("{scene}/{rig}/costs"),
     log:
         log_of("{scene}/{rig}/costs"),
     localrule: True
     params:
-        dataset=subpath(output[0], ancestor=2),
-        # These folders hold the journals and benchmarks of all earlier runs.
-        journals=f"{PATHS.work}/render",
+        dataset=subpath(output.costs, ancestor=2),
+        # These folders hold the history and the benchmarks of all earlier runs.
+        receipts=f"{RECEIPTS}/{{scene}}/{{rig}}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
         # A calibration belongs to the preset, the scene itself to all of them.
         scene_benchmarks=of_dataset("scene_benchmarks"),
@@ -28,10 +31,11 @@ rule costs:
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
-        f"{taking('input')}python {SCRIPTS}/costs.py"
-        " --dataset {params.dataset} --journals {params.journals}"
+        f"python {SCRIPTS}/costs.py"
+        " --dataset {params.dataset} --receipts {params.receipts}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
-        " {params.blend} --settings {input.settings} {params.inventory} --output {output} > {log} 2>&1"
+        " {params.blend} --settings {input.settings} {params.inventory}"
+        " --output {output.costs} --receipt {output.receipt} > {log} 2>&1"
 
 
 # It has no input and no output, so that it can run at any time, even during a build.
@@ -48,4 +52,4 @@ rule status:
     shell:
         f"python {SCRIPTS}/status.py"
         " --results {params.results} --work {params.work}"
-        " {params.datasets} > {log} 2>&1"
+        " {params.datasets} 2>&1 | tee {log}"

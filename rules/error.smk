@@ -8,12 +8,16 @@ PROBES = [f"{WORK}/{name}/probes.json" for name in RENDERED_SCENES]
 
 use rule lightfield as probe_cameras with:
     input:
-        settings=settings("probes"),
-        inventory=of_first("lightfield_inventory"),
-        model=of_first("model_record"),
-        places=of_first("places"),
+        reads(
+            "{scene}/probe_cameras",
+            "probes",
+            inventory=of_first("lightfield_inventory"),
+            model=of_first("model_record"),
+            places=of_first("places"),
+        ),
     output:
-        PATHS.probes,
+        lightfield=update(PATHS.probes),
+        receipt=receipt_of("{scene}/probe_cameras"),
     log:
         log_of("{scene}/probe_cameras"),
     benchmark:
@@ -26,21 +30,25 @@ use rule lightfield as probe_cameras with:
 # Only scenes with a target error need this. Its output is reproducible, except for --seconds.
 rule calibrate:
     input:
-        check=of_first("blend_check"),
-        blend=of_first("blend"),
-        inventory=of_first("inventory"),
-        lightfield=PATHS.probes,
+        reads(
+            "{scene}/calibrate",
+            check=of_first("blend_check"),
+            blend=of_first("blend"),
+            inventory=of_first("inventory"),
+            lightfield=PATHS.probes,
+        ),
     output:
-        PATHS.calibration,
+        calibration=update(PATHS.calibration),
+        receipt=receipt_of("{scene}/calibrate"),
     log:
         log_of("{scene}/calibrate"),
     benchmark:
         times_of("{scene}/calibrate")
     threads: ALL_CORES
     resources:
+        **GPU,
         mem_mb=6000,
         runtime=240,
-        gpu=GPUS,
     params:
         device=SETTINGS.device,
         cache=of_first("paths.trials"),
@@ -51,16 +59,20 @@ rule calibrate:
         f"python {SCRIPTS}/calibrate.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --threads {threads}"
-        " --cache {params.cache} --output {output} --seconds {params.seconds} > {log} 2>&1"
+        " --cache {params.cache} --output {output.calibration} --seconds {params.seconds}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule measure_error:
     input:
-        check=of_first("blend_check"),
-        blend=of_first("blend"),
-        inventory=of_first("inventory"),
-        lightfield=PATHS.probes,
-        calibration=of_first("calibration"),
+        reads(
+            "{scene}/error_vs_time",
+            check=of_first("blend_check"),
+            blend=of_first("blend"),
+            inventory=of_first("inventory"),
+            lightfield=PATHS.probes,
+            calibration=of_first("calibration"),
+        ),
     output:
         multiext(
             f"{RESULTS}/benchmarks/error_vs_time/{{scene}}",
@@ -70,14 +82,15 @@ rule measure_error:
             ".svg",
             ".png",
         ),
+        receipt=receipt_of("{scene}/error_vs_time"),
     log:
         log_of("{scene}/error_vs_time"),
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
     threads: ALL_CORES
     resources:
+        **GPU,
         mem_mb=6000,
         runtime=240,
-        gpu=GPUS,
     params:
         device=SETTINGS.device,
         cache=of_first("paths.trials"),
@@ -89,7 +102,8 @@ rule measure_error:
         f"python {SCRIPTS}/error_vs_time.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
-        " --cache {params.cache} --output {params.stem} > {log} 2>&1"
+        " --cache {params.cache} --output {params.stem}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule error_vs_time:

@@ -4,12 +4,17 @@ from lightfield.configuration.exports import SEQUENCE_EXPORTS
 
 rule export_to_instant_ngp:
     input:
-        settings=settings("instant_ngp"),
-        records=of_build(BUILD.records),
-        lightfield=PATHS.source_lightfield(),
-        trained=of_build(BUILD.training_transforms),
+        reads(
+            "{scene}/{rig}/{source}export_instant_ngp",
+            "instant_ngp",
+            views=of_build(BUILD.receipts),
+            lightfield=PATHS.source_lightfield(),
+            trained=of_build(BUILD.training_transforms),
+        ),
     output:
-        PATHS.transforms(),
+        transforms=update(PATHS.transforms()),
+        receipt=receipt_of("{scene}/{rig}/{source}export_instant_ngp"),
+        bundle=bundle_of("{scene}/{rig}/{source}export_instant_ngp"),
     log:
         log_of("{scene}/{rig}/{source}export_instant_ngp"),
     benchmark:
@@ -20,25 +25,30 @@ rule export_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
     shell:
-        f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
+        f"python {SCRIPTS}/export_instant_ngp.py"
         " --settings {input.settings} --input-cfg {input.lightfield} --image-dir {params.views}"
-        " --output {output} > {log} 2>&1"
+        " --output {output.transforms} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule export:
     input:
-        settings=settings("export"),
-        views=of_build(BUILD.exported_views),
-        lightfield=PATHS.source_lightfield(),
-        dataset=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/{source}export_{format}",
+            "export",
+            views=of_build(BUILD.exported_views),
+            lightfield=PATHS.source_lightfield(),
+            dataset=PATHS.lightfield,
+        ),
     output:
-        PATHS.export_list(),
+        update(PATHS.export_list()),
+        receipt=receipt_of("{scene}/{rig}/{source}export_{format}"),
+        bundle=bundle_of("{scene}/{rig}/{source}export_{format}"),
     log:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:
         times_of("{scene}/{rig}/export/{source}{format}")
     wildcard_constraints:
-        format=rf"(?!(?:{one_of(SEQUENCE_EXPORTS)})/)[a-z0-9_]+",
+        format=rf"(?!(?:{one_of([* SEQUENCE_EXPORTS, 'instant_ngp'])})[/.])[a-z0-9_]+",
     resources:
         mem_mb=4000,
         runtime=120,
@@ -48,16 +58,25 @@ rule export:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
-        f"{taking('input.views')}python {SCRIPTS}/export.py"
+        f"python {SCRIPTS}/export.py"
         " {wildcards.format} --settings {input.settings} --dataset {params.dataset}"
-        " --output {params.folder} > {log} 2>&1"
+        " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"
 
 
 # The frames of a sequence lie in the rig's folder, beside the exports of all of them.
 use rule export as export_sequence with:
     input:
-        settings=settings("export_sequence"),
-        views=of_build(BUILD.exported_frames),
+        reads(
+            "{scene}/{rig}/{source}sequence_{format}",
+            "export_sequence",
+            views=of_build(BUILD.exported_frames),
+        ),
+    output:
+        update(PATHS.export_list()),
+        receipt=receipt_of("{scene}/{rig}/{source}sequence_{format}"),
+        bundle=bundle_of("{scene}/{rig}/{source}sequence_{format}"),
+    log:
+        log_of("{scene}/{rig}/{source}sequence_{format}"),
     wildcard_constraints:
         rig="[A-Za-z0-9_.-]+",
         format=one_of(SEQUENCE_EXPORTS),

@@ -2,16 +2,12 @@
 from lightfield.configuration.corpus import CORPUS_FILES
 
 
-wildcard_constraints:
-    family=one_of(BUILD.family_names),
-    batch=r"(seeds|models)_\d+_(of_)?\d+",
-
-
 rule build_members:
     input:
-        settings=settings("batch"),
+        reads("{family}/batches/{batch}", "batch"),
     output:
-        f"{WORK}/{{family}}/batches/{{batch}}.json",
+        receipt=receipt_of("{family}/batches/{batch}"),
+        bundle=bundle_of("{family}/batches/{batch}"),
     log:
         log_of("{family}/batches/{batch}"),
     benchmark:
@@ -21,9 +17,9 @@ rule build_members:
     # One core, or more if there are fewer batches than cores.
     threads: lambda wildcards: max(1, ALL_CORES // BUILD.batch_count)
     resources:
+        **GPU,
         mem_mb=8000,
         runtime=1440,
-        gpu=GPUS,
     params:
         device=SETTINGS.device,
     message:
@@ -31,15 +27,16 @@ rule build_members:
     shell:
         f"python {SCRIPTS}/build_members.py"
         " --settings {input.settings} --device {params.device} --threads {threads}"
-        " --record {output} > {log} 2>&1"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule corpus:
     input:
-        settings=settings("corpus"),
-        records=of_build(BUILD.batch_records),
+        reads("{family}/corpus", "corpus", batches=of_build(BUILD.batch_receipts)),
     output:
-        [f"{RESULTS}/{{family}}/{name}" for name in CORPUS_FILES],
+        [update(f"{RESULTS}/{{family}}/{name}") for name in CORPUS_FILES],
+        receipt=receipt_of("{family}/corpus"),
+        bundle=bundle_of("{family}/corpus"),
     log:
         log_of("{family}/corpus"),
     benchmark:
@@ -52,17 +49,21 @@ rule corpus:
         "Collecting the members of {wildcards.family}"
     shell:
         f"python {SCRIPTS}/corpus.py"
-        " {params.folder} --settings {input.settings} --cache {params.cache} > {log} 2>&1"
+        " {params.folder} --settings {input.settings} --cache {params.cache}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 # It fails if a member has failed, after all others are built and collected.
 rule count_members:
     input:
-        settings=settings("members"),
-        records=of_build(BUILD.batch_records),
-        corpus=f"{RESULTS}/{{family}}/corpus.json",
+        reads(
+            "{family}/members",
+            "members",
+            corpus=f"{RESULTS}/{{family}}/corpus.json",
+        ),
     output:
-        f"{WORK}/{{family}}/members.json",
+        members=update(f"{WORK}/{{family}}/members.json"),
+        receipt=receipt_of("{family}/members"),
     log:
         log_of("{family}/members"),
     localrule: True
@@ -72,4 +73,5 @@ rule count_members:
         "Counting the members of {wildcards.family}"
     shell:
         f"python {SCRIPTS}/count_members.py"
-        " --settings {input.settings} --failed {params.failed} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --corpus {input.corpus} --failed {params.failed}"
+        " --output {output.members} --receipt {output.receipt} > {log} 2>&1"

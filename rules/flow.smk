@@ -4,10 +4,15 @@
 rule flow:
     input:
         # A neighbour may belong to another shard.
-        records=of_build(BUILD.records),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/flow/{first}-{end}",
+            "flow",
+            views=of_build(BUILD.receipts),
+            lightfield=PATHS.lightfield,
+        ),
     output:
-        PATHS.record("flow"),
+        receipt=receipt_of("{scene}/{rig}/flow/{first}-{end}"),
+        bundle=bundle_of("{scene}/{rig}/flow/{first}-{end}"),
     log:
         log_of("{scene}/{rig}/flow/{first}-{end}"),
     benchmark:
@@ -20,6 +25,6 @@ rule flow:
         "Computing the flow of views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"{taking('input.records')}python {SCRIPTS}/flow.py"
-        " --lightfield {input.lightfield} --views {wildcards.first}:{wildcards.end}"
-        " --output {params.folder} --record {output} > {log} 2>&1"
+        f"python {SCRIPTS}/flow.py"
+        " --settings {input.settings} --lightfield {input.lightfield} --views {wildcards.first}:{wildcards.end}"
+        " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"

@@ -12,7 +12,8 @@ CONSUMERS_PYTHON = shlex.quote(os.path.relpath(CONSUMERS / "bin/python"))
 
 rule measure_learning:
     input:
-        of_build(BUILD.learned_from),
+        consumers=consumers,
+        exports=of_build(BUILD.learned_from),
     output:
         multiext(
             f"{RESULTS}/benchmarks/learn/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
@@ -23,7 +24,9 @@ rule measure_learning:
         mem_mb=2000,
         runtime=120,
     params:
-        folders=lambda wildcards, input: [str(Path(path).parent) for path in input],
+        folders=lambda wildcards, input: [
+            str(Path(path).parent) for path in input.exports
+        ],
         stem=subpath(output[0], strip_suffix=".csv"),
     message:
         "Learning what the exports of {wildcards.scene}/{wildcards.rig} show"
@@ -36,6 +39,6 @@ rule learn:
     input:
         [
             f"{RESULTS}/benchmarks/learn/{dataset.name}.csv"
-            for dataset in CHOSEN
+            for dataset in CHOSEN_DATASETS
             if learned_exports(dataset)
         ],

@@ -3,12 +3,17 @@
 
 rule mesh:
     input:
-        settings=settings("mesh"),
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("inventory"),
+        reads(
+            "{scene}/{rig}/mesh",
+            "mesh",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("inventory"),
+        ),
     output:
-        PATHS.mesh_list,
+        update(PATHS.mesh_list),
+        receipt=receipt_of("{scene}/{rig}/mesh"),
+        bundle=bundle_of("{scene}/{rig}/mesh"),
     log:
         log_of("{scene}/{rig}/mesh"),
     benchmark:
@@ -23,4 +28,4 @@ rule mesh:
     shell:
         f"python {SCRIPTS}/surface.py"
         " --blend {input.blend:q} --settings {input.settings} --inventory {input.inventory}"
-        " --output {params.folder} > {log} 2>&1"
+        " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"

@@ -3,12 +3,17 @@
 
 rule pack:
     input:
-        settings=settings("pack"),
-        sums=of_build(BUILD.packed_sums),
-        lists=of_build(BUILD.packed_lists) if STORE else [],
+        reads(
+            "{scene}/{rig}/package",
+            "pack",
+            sums=of_build(BUILD.packed_sums),
+            files=of_build(BUILD.packed_lists) if STORE else [],
+        ),
     output:
         archive=PATHS.package,
-        card=PATHS.card,
+        card=update(PATHS.card),
+        receipt=receipt_of("{scene}/{rig}/package"),
+        bundle=bundle_of("{scene}/{rig}/package"),
     log:
         log_of("{scene}/{rig}/package"),
     params:
@@ -16,18 +21,23 @@ rule pack:
     message:
         "Packing {output.archive}"
     shell:
-        f"{taking('input')}python {SCRIPTS}/package.py"
+        f"python {SCRIPTS}/package.py"
         " --settings {input.settings} --folder {params.folder} --output {output.archive}"
-        " > {log} 2>&1"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule publish:
     input:
-        settings=settings("pack"),
-        sums=of_build(BUILD.packed_sums),
-        lists=of_build(BUILD.packed_lists) if STORE else [],
+        reads(
+            "{scene}/{rig}/publish",
+            "pack",
+            sums=of_build(BUILD.packed_sums),
+            files=of_build(BUILD.packed_lists) if STORE else [],
+        ),
     output:
-        PATHS.documents,
+        [update(document) for document in PATHS.documents],
+        receipt=receipt_of("{scene}/{rig}/publish"),
+        bundle=bundle_of("{scene}/{rig}/publish"),
     log:
         log_of("{scene}/{rig}/publish"),
     params:
@@ -36,6 +46,6 @@ rule publish:
     message:
         "Publishing {wildcards.scene}/{wildcards.rig} in {params.output}"
     shell:
-        f"{taking('input')}python {SCRIPTS}/publish.py"
+        f"python {SCRIPTS}/publish.py"
         " --settings {input.settings} --folder {params.folder} --output {params.output}"
-        " > {log} 2>&1"
+        " --receipt {output.receipt} > {log} 2>&1"

@@ -4,18 +4,22 @@ import shlex
 
 rule probe:
     input:
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("inventory"),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/probe",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("inventory"),
+            lightfield=PATHS.lightfield,
+        ),
     output:
-        PATHS.probe,
+        probe=update(PATHS.probe),
+        receipt=receipt_of("{scene}/{rig}/probe"),
     log:
         log_of("{scene}/{rig}/probe"),
     resources:
+        **GPU,
         mem_mb=6000,
         runtime=60,
-        gpu=GPUS,
     params:
         device=SETTINGS.device,
     message:
@@ -23,11 +27,11 @@ rule probe:
     shell:
         f"python {SCRIPTS}/probe.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
-        " --lightfield {input.lightfield} --device {params.device} --output {output}"
-        " > {log} 2>&1"
+        " --lightfield {input.lightfield} --device {params.device} --output {output.probe}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
-# It has no output: its log is printed.
+# It has no output, and answers on the terminal.
 rule plan:
     input:
         [probe for _, _, probe in BUILD.probes],
@@ -49,4 +53,4 @@ rule plan:
     shell:
         f"python {SCRIPTS}/plan.py"
         " {params.datasets} {params.families} {params.advice}"
-        " --watts {params.watts} --cores {params.cores} --output {params.table} > {log} 2>&1"
+        " --watts {params.watts} --cores {params.cores} --output {params.table} 2>&1 | tee {log}"

@@ -7,9 +7,10 @@ ruleorder: import_views > render
 
 rule import_views:
     input:
-        lightfield=PATHS.lightfield,
+        reads("{scene}/{rig}/render/{first}-{end}", lightfield=PATHS.lightfield),
     output:
-        PATHS.record("render"),
+        receipt=receipt_of("{scene}/{rig}/render/{first}-{end}"),
+        bundle=bundle_of("{scene}/{rig}/render/{first}-{end}"),
     log:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     wildcard_constraints:
@@ -24,32 +25,35 @@ rule import_views:
     shell:
         f"python {SCRIPTS}/import_views.py"
         " --dataset {params.dataset:q} --lightfield {input.lightfield}"
-        " --views {wildcards.first}:{wildcards.end} --output {params.folder} --record {output}"
+        " --views {wildcards.first}:{wildcards.end} --output {params.folder} --receipt {output.receipt}"
         " > {log} 2>&1"
 
 
 rule render:
     input:
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("inventory"),
-        lightfield=PATHS.lightfield,
-        cameras=PATHS.cameras,
+        reads(
+            "{scene}/{rig}/render/{first}-{end}",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("inventory"),
+            lightfield=PATHS.lightfield,
+            cameras=PATHS.cameras,
+        ),
     output:
-        PATHS.record("render"),
+        receipt=receipt_of("{scene}/{rig}/render/{first}-{end}"),
+        bundle=bundle_of("{scene}/{rig}/render/{first}-{end}"),
     log:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     benchmark:
         times_of("{scene}/{rig}/render/{first}-{end}")
     threads: threads_of_shard
     resources:
+        **GPU,
         mem_mb=memory_of("render"),
         runtime=lambda wildcards: cost_at("render", wildcards).most_minutes,
-        gpu=GPUS,
         stall_seconds=stall_seconds,
     params:
         folder=PATHS.views,
-        journal=f"{PATHS.work}/render/{{first}}-{{end}}.journal.jsonl",
         device=SETTINGS.device,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
@@ -58,6 +62,6 @@ rule render:
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
-        " --output {params.folder} --journal {params.journal} --record {output}"
+        " --output {params.folder} --receipt {output.receipt}"
         " --stall {resources.stall_seconds}"
         " > {log} 2>&1"

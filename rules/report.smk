@@ -4,12 +4,16 @@ from lightfield.configuration.dataset_paths import PICTURES, PLOTS
 
 use rule lightfield as panorama_lightfield with:
     input:
-        settings=settings("panorama"),
-        inventory=of_dataset("blend_inventory"),
-        model=of_dataset("model_record"),
-        calibration=of_dataset("calibration"),
+        reads(
+            "{scene}/{rig}/panorama/lightfield",
+            "panorama",
+            inventory=of_dataset("blend_inventory"),
+            model=of_dataset("model_record"),
+            calibration=of_dataset("calibration"),
+        ),
     output:
-        PATHS.panorama_lightfield,
+        lightfield=update(PATHS.panorama_lightfield),
+        receipt=receipt_of("{scene}/{rig}/panorama/lightfield"),
     log:
         log_of("{scene}/{rig}/panorama/lightfield"),
     benchmark:
@@ -21,20 +25,24 @@ use rule lightfield as panorama_lightfield with:
 
 rule render_panorama:
     input:
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("inventory"),
-        lightfield=PATHS.panorama_lightfield,
+        reads(
+            "{scene}/{rig}/panorama/render",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("inventory"),
+            lightfield=PATHS.panorama_lightfield,
+        ),
     output:
-        PATHS.panorama,
+        update(PATHS.panorama),
+        receipt=receipt_of("{scene}/{rig}/panorama/render"),
     log:
         log_of("{scene}/{rig}/panorama/render"),
     benchmark:
         times_of("{scene}/{rig}/panorama/render")
     resources:
+        **GPU,
         mem_mb=memory_of("render_panorama"),
         runtime=120,
-        gpu=GPUS,
     params:
         folder=PATHS.panorama_views,
         device=SETTINGS.device,
@@ -44,15 +52,19 @@ rule render_panorama:
         f"python {SCRIPTS}/render_shard.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
-        " --device {params.device} --threads {threads} --output {params.folder} > {log} 2>&1"
+        " --device {params.device} --threads {threads} --output {params.folder}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule figures:
     input:
-        settings=settings("figures"),
-        records=of_build(BUILD.records),
-        lightfield=PATHS.lightfield,
-        panorama=of_dataset("panorama"),
+        reads(
+            "{scene}/{rig}/figures",
+            "figures",
+            views=of_build(BUILD.receipts),
+            lightfield=PATHS.lightfield,
+            panorama=of_dataset("panorama"),
+        ),
     output:
         [
             report(
@@ -63,7 +75,8 @@ rule figures:
             )
             for picture in PICTURES
         ],
-        [f"{PATHS.folder}/report/{plot}.svg" for plot in PLOTS],
+        [update(f"{PATHS.folder}/report/{plot}.svg") for plot in PLOTS],
+        receipt=receipt_of("{scene}/{rig}/figures"),
     log:
         log_of("{scene}/{rig}/figures"),
     benchmark:
@@ -74,54 +87,63 @@ rule figures:
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"{taking('input.records')}python {SCRIPTS}/report_figures.py"
+        f"python {SCRIPTS}/report_figures.py"
         " --dataset {params.dataset} --settings {input.settings}"
-        " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
+        " --panorama {input.panorama} --output {params.dataset}/report"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule page:
     input:
-        # Without a store the validation is enough, and a plan of many shards is shorter.
-        records=of_dataset("all_records") if STORE else [],
-        published=of_dataset("published"),
-        pictures=PATHS.pictures,
-        validation=PATHS.validation,
-        costs=PATHS.costs,
-        inventory=of_dataset("blend_inventory"),
-        settings=settings("page"),
+        reads(
+            "{scene}/{rig}/page",
+            "page",
+            published=of_dataset("published"),
+            views=of_dataset("all_receipts") if STORE else [],
+            pictures=PATHS.pictures,
+            validation=PATHS.validation,
+            costs=PATHS.costs,
+            inventory=of_dataset("blend_inventory"),
+        ),
     output:
-        PATHS.page,
+        page=update(PATHS.page),
+        receipt=receipt_of("{scene}/{rig}/page"),
     log:
         log_of("{scene}/{rig}/page"),
     benchmark:
         times_of("{scene}/{rig}/report/page")
     localrule: True
     params:
-        dataset=subpath(output[0], ancestor=2),
+        dataset=subpath(output.page, ancestor=2),
         inventory=optional("inventory"),
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"{taking('input')}python {SCRIPTS}/report_html.py"
+        f"python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --settings {input.settings}"
-        " {params.inventory} --output {output} > {log} 2>&1"
+        " {params.inventory} --output {output.page} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule index:
     input:
-        settings=settings("index"),
-        pages=[dataset.paths.page for dataset in CHOSEN],
-        corpora=BUILD.corpora,
+        reads(
+            "index",
+            "index",
+            pages=[dataset.paths.page for dataset in CHOSEN_DATASETS],
+            corpora=BUILD.corpora,
+        ),
     output:
-        f"{RESULTS}/index.html",
+        page=update(f"{RESULTS}/index.html"),
+        receipt=receipt_of("index"),
     log:
         log_of("index"),
     localrule: True
     params:
-        results=subpath(output[0], parent=True),
+        results=subpath(output.page, parent=True),
     message:
         "Making the page of all datasets"
     shell:
         f"python {SCRIPTS}/report_index.py"
-        " --results {params.results} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --results {params.results} --output {output.page}"
+        " --receipt {output.receipt} > {log} 2>&1"

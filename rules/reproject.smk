@@ -4,10 +4,14 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACES
 
 rule reprojected_lightfield:
     input:
-        settings=settings("reproject"),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/{reprojection}/lightfield",
+            "reproject",
+            lightfield=PATHS.lightfield,
+        ),
     output:
-        PATHS.source_lightfield("{reprojection}/"),
+        lightfield=update(PATHS.source_lightfield("{reprojection}/")),
+        receipt=receipt_of("{scene}/{rig}/{reprojection}/lightfield"),
     log:
         log_of("{scene}/{rig}/{reprojection}/lightfield"),
     benchmark:
@@ -21,16 +25,21 @@ rule reprojected_lightfield:
     shell:
         f"python {SCRIPTS}/reproject.py"
         " --dry-run --settings {input.settings}"
-        " --input-cfg {input.lightfield} --output-cfg {output} --input-dir {params.views}"
-        " --output-dir {params.folder} > {log} 2>&1"
+        " --input-cfg {input.lightfield} --output-cfg {output.lightfield}"
+        " --input-dir {params.views} --output-dir {params.folder} --receipt {output.receipt}"
+        " > {log} 2>&1"
 
 
 rule lens_map:
     input:
-        settings=settings("lens_map"),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/{reprojection}/lens_map",
+            "lens_map",
+            lightfield=PATHS.lightfield,
+        ),
     output:
         PATHS.lens_map(),
+        receipt=receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
     log:
         log_of("{scene}/{rig}/{reprojection}/lens_map"),
     benchmark:
@@ -42,25 +51,31 @@ rule lens_map:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/lens_map.py"
-        " {params.file} --settings {input.settings} --input-cfg {input.lightfield} > {log} 2>&1"
+        " {params.file} --settings {input.settings} --input-cfg {input.lightfield}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 # For a cube map, the program adds the name of each face to the path.
 use rule lens_map as lens_maps with:
     output:
         [PATHS.lens_map(face=face) for face in CUBE_FACES],
+        receipt=receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
     # Snakemake does not take this from the other rule.
     localrule: True
 
 
 rule reproject:
     input:
-        record=PATHS.record("render"),
-        lightfield=PATHS.lightfield,
-        lens_maps=of_build(BUILD.lens_maps),
-        settings=settings("reproject"),
+        reads(
+            "{scene}/{rig}/{reprojection}/{first}-{end}",
+            "reproject",
+            views=PATHS.receipt("render"),
+            lightfield=PATHS.lightfield,
+            lens_maps=of_build(BUILD.lens_maps),
+        ),
     output:
-        PATHS.record(),
+        receipt=receipt_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
+        bundle=bundle_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
     log:
         log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
     benchmark:
@@ -75,8 +90,8 @@ rule reproject:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        f"{taking('input.record')}python {SCRIPTS}/reproject.py"
+        f"python {SCRIPTS}/reproject.py"
         " --settings {input.settings}"
         " --lens-map {params.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
-        " --source-record {input.record} --record {output} > {log} 2>&1"
+        " --source-receipt {input.views} --receipt {output.receipt} > {log} 2>&1"

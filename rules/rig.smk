@@ -4,12 +4,16 @@
 # Only a random rig's places depend on the scene.
 rule free_places:
     input:
-        settings=settings("free_places"),
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("blend_inventory"),
+        reads(
+            "{scene}/{rig}/free_places",
+            "free_places",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("blend_inventory"),
+        ),
     output:
-        PATHS.places,
+        places=update(PATHS.places),
+        receipt=receipt_of("{scene}/{rig}/free_places"),
     log:
         log_of("{scene}/{rig}/free_places"),
     benchmark:
@@ -24,18 +28,22 @@ rule free_places:
     shell:
         f"python {SCRIPTS}/free_places.py"
         " --blend {input.blend:q} --settings {input.settings} {params.inventory}"
-        " --output {output} > {log} 2>&1"
+        " --output {output.places} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule lightfield:
     input:
-        settings=settings("lightfield"),
-        inventory=of_dataset("lightfield_inventory"),
-        model=of_dataset("model_record"),
-        calibration=of_dataset("calibration"),
-        places=of_dataset("places"),
+        reads(
+            "{scene}/{rig}/lightfield",
+            "lightfield",
+            inventory=of_dataset("lightfield_inventory"),
+            model=of_dataset("model_record"),
+            calibration=of_dataset("calibration"),
+            places=of_dataset("places"),
+        ),
     output:
-        PATHS.lightfield,
+        lightfield=update(PATHS.lightfield),
+        receipt=receipt_of("{scene}/{rig}/lightfield"),
     log:
         log_of("{scene}/{rig}/lightfield"),
     benchmark:
@@ -47,17 +55,22 @@ rule lightfield:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --settings {input.settings} {params.optional} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.optional} --output {output.lightfield}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule check_cameras:
     input:
-        check=of_dataset("blend_check"),
-        blend=of_dataset("blend"),
-        inventory=of_dataset("blend_inventory"),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/check_cameras",
+            check=of_dataset("blend_check"),
+            blend=of_dataset("blend"),
+            inventory=of_dataset("blend_inventory"),
+            lightfield=PATHS.lightfield,
+        ),
     output:
-        PATHS.cameras,
+        cameras=update(PATHS.cameras),
+        receipt=receipt_of("{scene}/{rig}/check_cameras"),
     log:
         log_of("{scene}/{rig}/check_cameras"),
     benchmark:
@@ -72,15 +85,15 @@ rule check_cameras:
     shell:
         f"python {SCRIPTS}/check_cameras.py"
         " --blend {input.blend:q} --lightfield {input.lightfield} {params.inventory}"
-        " --output {output} > {log} 2>&1"
+        " --output {output.cameras} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule splits:
     input:
-        settings=settings("splits"),
-        lightfields=of_build(BUILD.split_lightfields),
+        reads("{scene}/splits", lightfields=of_build(BUILD.split_lightfields)),
     output:
-        PATHS.splits,
+        splits=update(PATHS.splits),
+        receipt=receipt_of("{scene}/splits"),
     log:
         log_of("{scene}/splits"),
     localrule: True
@@ -88,4 +101,4 @@ rule splits:
         "Listing what the views of {wildcards.scene} are for"
     shell:
         f"python {SCRIPTS}/splits.py"
-        " --output {output} {input.lightfields} > {log} 2>&1"
+        " --output {output.splits} --receipt {output.receipt} {input.lightfields} > {log} 2>&1"

@@ -4,9 +4,11 @@ from pathlib import Path
 
 rule build_scene:
     input:
-        settings=settings("build_scene"),
+        reads("{name}/build_scene", "build_scene"),
     output:
-        PATHS.built_blend,
+        # Snakemake copies a file before it is updated, and this one is large.
+        blend=PATHS.built_blend,
+        receipt=receipt_of("{name}/build_scene"),
     log:
         log_of("{name}/build_scene"),
     benchmark:
@@ -18,16 +20,21 @@ rule build_scene:
         "Building the scene {wildcards.name}"
     shell:
         f"python {SCRIPTS}/build_scene.py"
-        " --settings {input.settings} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --output {output.blend} --receipt {output.receipt}"
+        " > {log} 2>&1"
 
 
 rule import_model:
     input:
-        settings=settings("import_model"),
-        model=lambda wildcards: local(asked(BUILD.scene, wildcards).source.model),
+        reads(
+            "{name}/import_model",
+            "import_model",
+            model=lambda wildcards: local(asked(BUILD.scene, wildcards).source.model),
+        ),
     output:
         blend=PATHS.model_blend,
-        record=PATHS.model_record,
+        record=update(PATHS.model_record),
+        receipt=receipt_of("{name}/import_model"),
     log:
         log_of("{name}/import_model"),
     benchmark:
@@ -42,15 +49,19 @@ rule import_model:
     shell:
         f"python {SCRIPTS}/import_model.py"
         " --settings {input.settings} --output {output.blend} --record {output.record}"
-        " > {log} 2>&1"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule check_blend:
     input:
-        settings=settings("check_blend"),
-        blend=lambda wildcards: local(asked(BUILD.scene, wildcards).blend),
+        reads(
+            "{name}/check_blend",
+            "check_blend",
+            blend=lambda wildcards: local(asked(BUILD.scene, wildcards).blend),
+        ),
     output:
-        PATHS.blend_check,
+        check=update(PATHS.blend_check),
+        receipt=receipt_of("{name}/check_blend"),
     log:
         log_of("{name}/check_blend"),
     benchmark:
@@ -60,17 +71,22 @@ rule check_blend:
         "Checking {input.blend}"
     shell:
         f"python {SCRIPTS}/check_blend.py"
-        " --scene {wildcards.name} --blend {input.blend:q}"
-        " --output {output} > {log} 2>&1"
+        " --scene {wildcards.name} --blend {input.blend:q} --settings {input.settings}"
+        " --output {output.check} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule inventory:
     input:
-        settings=settings("inventory"),
-        check=lambda wildcards: asked(BUILD.scene, wildcards).blend_check or [],
-        blend=blend_of,
+        reads(
+            "{name}/inventory",
+            "inventory",
+            check=lambda wildcards: asked(BUILD.scene, wildcards).blend_check or [],
+            blend=blend_of,
+        ),
     output:
-        PATHS.inventory,
+        inventory=update(PATHS.inventory),
+        receipt=receipt_of("{name}/inventory"),
+        bundle=bundle_of("{name}/inventory"),
     log:
         log_of("{name}/inventory"),
     benchmark:
@@ -84,7 +100,8 @@ rule inventory:
         "Listing what the scene {wildcards.name} contains"
     shell:
         f"python {SCRIPTS}/inventory.py"
-        " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
+        " --scene {wildcards.name} --blend {input.blend:q} --settings {input.settings}"
+        " --output {output.inventory} --receipt {output.receipt} > {log} 2>&1"
 
 
 # The users' .blend files, by path. Several scenes may share one.

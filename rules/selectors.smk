@@ -1,5 +1,7 @@
 # What single rules ask for: inputs, resources and arguments that take more than a look at a dataset.
+import os
 import shlex
+import sys
 from pathlib import Path
 
 from lightfield.planning.cost import cost, shard_threads
@@ -12,27 +14,23 @@ def cost_at(stage, wildcards):
 
 def memory_of(stage):
     """Return the resource function of a stage's memory in MB. Each further attempt gets more."""
-    return of_each_shard(
-        lambda wildcards, attempt: cost_at(stage, wildcards).megabytes(attempt)
-    )
+    return lambda wildcards, attempt: cost_at(stage, wildcards).megabytes(attempt)
 
 
-@of_each_shard
 def threads_of_shard(wildcards):
     """Return the cores of each shard, so that the shards at work fit this machine's memory."""
-    shards = sum(len(dataset.shards) for dataset in CHOSEN)
+    shards = sum(len(dataset.shards) for dataset in CHOSEN_DATASETS)
     need = cost_at("render", wildcards).memory_bytes
     return shard_threads(ALL_CORES, shards, need, MEMORY)
 
 
-@of_each_shard
 def stall_seconds(wildcards):
     """Return the seconds after which a view counts as hung.
 
     On this machine it is 0, which means never: the user may suspend and continue a build.
     """
     a_view = cost("render", asked(BUILD.dataset, wildcards), views=1)
-    return a_view.stall_seconds if RUNS_ELSEWHERE else 0
+    return 0 if RUNS_HERE else a_view.stall_seconds
 
 
 def blend_of(wildcards):
@@ -44,7 +42,7 @@ def blend_of(wildcards):
 def status_arguments(wildcards):
     """Return the arguments that name each chosen dataset and family to scripts/status.py."""
     arguments = []
-    for dataset in CHOSEN:
+    for dataset in CHOSEN_DATASETS:
         reprojections = ",".join(dataset.reprojections)
         arguments += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
     for folder, batches in BUILD.batches.items():
@@ -56,7 +54,7 @@ def status_arguments(wildcards):
 def advice_arguments():
     """Return the arguments that name the files of `error_vs_time` to scripts/plan.py."""
     arguments = []
-    for name, scene in {d.sequence_name: d.scene_name for d in CHOSEN}.items():
+    for name, scene in {d.sequence_name: d.scene_name for d in CHOSEN_DATASETS}.items():
         file = f"{RESULTS}/benchmarks/error_vs_time/{scene}.json"
         if Path(file).exists():
             arguments += ["--advice", name, file]
@@ -66,11 +64,29 @@ def advice_arguments():
 def verify_command(wildcards):
     """Return the command that verifies all folders. Without any, it does nothing.
 
-    With a store, these are the folders of finished datasets: no list has the checksums of others.
-    The ledger does not know what other machines made.
+    With a store, it takes the finished datasets: no list has the checksums of others.
     """
-    if STORE:
-        folders = shlex.join(paths.folder for paths in finished_in_store())
-        return f"python {SCRIPTS}/verify.py {folders}" if folders else ":"
-    folders = shlex.join(BUILD.verified_folders)
-    return f"python {SCRIPTS}/verify.py {folders} --work {WORK}"
+    if not STORE:
+        folders = shlex.join(BUILD.verified_folders)
+        return f"python {SCRIPTS}/verify.py {folders} --work {WORK}"
+    homes = [dataset.paths for dataset in CHOSEN_DATASETS]
+    homes += [d.sequence_paths for d in CHOSEN_DATASETS if d.sequence_exports]
+    folders = shlex.join(
+        paths.folder
+        for paths in dict.fromkeys(homes)
+        if Path(paths.sums).name in STORAGE.names(paths.folder)
+    )
+    take = (
+        f"python {SCRIPTS}/take_dataset.py --store {shlex.quote(STORE)} --work {WORK}"
+    )
+    return f"{take} {folders}" if folders else ":"
+
+
+def consumers(wildcards):
+    """Return the file that says that the consumers' environment is complete."""
+    if not (CONSUMERS / "complete").exists():
+        sys.exit(
+            f"error: learn: torch is missing: set up {os.path.relpath(CONSUMERS)} "
+            f"with `make -C {shlex.quote(os.path.relpath(FOLDER))} .venv-consumers/complete`"
+        )
+    return ancient(str(CONSUMERS / "complete"))

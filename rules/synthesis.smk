@@ -3,14 +3,18 @@
 
 rule measure_synthesis:
     input:
-        settings=settings("synthesis"),
-        records=of_build(BUILD.rendered_records),
-        truth=of_build(BUILD.truth_records),
-        lightfield=PATHS.lightfield,
+        reads(
+            "{scene}/{rig}/synthesis",
+            "synthesis",
+            views=of_build(BUILD.rendered_receipts),
+            truth=of_build(BUILD.truth_receipts),
+            lightfield=PATHS.lightfield,
+        ),
     output:
         multiext(
             f"{RESULTS}/benchmarks/synthesis/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
         ),
+        receipt=receipt_of("{scene}/{rig}/synthesis"),
     log:
         log_of("{scene}/{rig}/synthesis"),
     resources:
@@ -22,13 +26,14 @@ rule measure_synthesis:
         "Measuring how well views of {wildcards.scene}/{wildcards.rig} are synthesised"
     shell:
         f"python {SCRIPTS}/synthesis_quality.py"
-        " {params.dataset} --settings {input.settings} --output {params.stem} > {log} 2>&1"
+        " {params.dataset} --settings {input.settings} --output {params.stem}"
+        " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule synthesis:
     input:
         [
             f"{RESULTS}/benchmarks/synthesis/{dataset.name}.csv"
-            for dataset in CHOSEN
+            for dataset in CHOSEN_DATASETS
             if dataset.depth
         ],

@@ -5,15 +5,18 @@
 # page, because the profile lets a run go on with other jobs after a failure (`keep-going`).
 rule validate:
     input:
-        settings=settings("validate"),
-        records=of_dataset("all_records"),
-        published=of_dataset("published"),
-        cameras=of_dataset("cameras"),
-        inventory=of_dataset("inventory"),
-        splits=of_dataset("splits"),
+        reads(
+            "{scene}/{rig}/validate",
+            "validate",
+            views=of_dataset("all_receipts"),
+            published=of_dataset("published"),
+            cameras=of_dataset("cameras"),
+            inventory=of_dataset("inventory"),
+            splits=of_dataset("splits"),
+        ),
     output:
-        validation=PATHS.validation,
-        sums=PATHS.checksums,
+        validation=update(PATHS.validation),
+        receipt=receipt_of("{scene}/{rig}/validate"),
     log:
         log_of("{scene}/{rig}/validate"),
     benchmark:
@@ -28,23 +31,27 @@ rule validate:
         dataset=PATHS.folder,
         optional=optional("inventory", "splits", clearance="cameras"),
         removed=REMOVED,
-        # The storage has its own copies of what other machines made.
-        ledger=f"--ledger {LEDGER}" if not STORE else "",
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"{taking('input')}python {SCRIPTS}/validate.py"
+        f"python {SCRIPTS}/validate.py"
         " {params.dataset} --settings {input.settings} {params.optional} --processes {threads}"
-        " --removed {params.removed} {params.ledger}"
-        " --output {output.validation} --sums {output.sums} > {log} 2>&1"
+        " --removed {params.removed}"
+        " --output {output.validation} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule checksums:
     input:
-        validation=PATHS.validation,
-        sums=PATHS.checksums,
+        reads(
+            "{scene}/{rig}/checksums",
+            "checksums",
+            validation=PATHS.validation,
+            receipts=of_dataset("all_receipts"),
+            lists=of_dataset("published"),
+        ),
     output:
-        PATHS.sums,
+        sums=update(PATHS.sums),
+        receipt=receipt_of("{scene}/{rig}/checksums"),
     log:
         log_of("{scene}/{rig}/checksums"),
     wildcard_constraints:
@@ -56,21 +63,25 @@ rule checksums:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/publish_checksums.py"
-        " --validation {input.validation} --page {params.page}"
-        " --sums {input.sums} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --validation {input.validation} --page {params.page}"
+        " --output {output.sums} --receipt {output.receipt} > {log} 2>&1"
 
 
 # The frames of a sequence are datasets. This is for the exports of all of them.
 rule validate_sequence:
     input:
-        settings=settings("validate_sequence"),
-        exports=of_build(BUILD.sequence_exports),
-        views=of_build(BUILD.validated_frames),
+        reads(
+            "{scene}/{rig}/validate_sequence",
+            "validate_sequence",
+            exports=of_build(BUILD.sequence_exports),
+            views=of_build(BUILD.validated_frames),
+        ),
     output:
-        validation=PATHS.validation,
-        sums=PATHS.sums,
+        validation=update(PATHS.validation),
+        sums=update(PATHS.sums),
+        receipt=receipt_of("{scene}/{rig}/validate_sequence"),
     log:
-        log_of("{scene}/{rig}/validate"),
+        log_of("{scene}/{rig}/validate_sequence"),
     benchmark:
         times_of("{scene}/{rig}/validate")
     wildcard_constraints:
@@ -85,16 +96,15 @@ rule validate_sequence:
     message:
         "Validating the sequence {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"{taking('input')}python {SCRIPTS}/validate_sequence.py"
+        f"python {SCRIPTS}/validate_sequence.py"
         " {params.rig} --settings {input.settings} --removed {params.removed}"
-        " --output {output.validation} --sums {output.sums} > {log} 2>&1"
+        " --output {output.validation} --sums {output.sums} --receipt {output.receipt}"
+        " > {log} 2>&1"
 
 
 # The jobs that made the files are unknown when this is planned. It reads all files, also those of an
-# unfinished build. With a view store, it first fetches the files.
+# unfinished build. With a storage, it takes the finished datasets from there.
 rule verify:
-    input:
-        stored_lists,
     log:
         log_of("verify"),
     params:
@@ -102,4 +112,4 @@ rule verify:
     message:
         "Checking every byte of the chosen datasets"
     shell:
-        f"{taking('input')}{{params.verify}} > {{log}} 2>&1"
+        "{params.verify} 2>&1 | tee {log}"

@@ -1,11 +1,11 @@
 """Add up what a dataset has cost, and estimate what it costs at full size: report/costs.json.
 
 Times are in seconds, memory and sizes in bytes, and energy in kWh. Wall and processor time of the
-views come from the journals of their shards. Journals survive kills. So they hold all the time that
-was spent, also on views that were lost or rendered again. Any other job counts with the time and
-memory of its last run, as Snakemake measured them. Snakemake measures every half second, and after
-a while every 30 s. So the processor time may be too short by that much. A job that ends before the
-first measurement counts as busy throughout.
+views come from the history in the receipts of their shards. It survives kills, so it holds all the
+time that was spent, also on views that were lost or rendered again. Any other job counts with the
+time and memory of its last run, as Snakemake measured them. Snakemake measures every half second,
+and after a while every 30 s. So the processor time may be too short by that much. A job that ends
+before the first measurement counts as busy throughout.
 
     {
       "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
@@ -34,7 +34,7 @@ a single view. The rest of each view's time (writing, reprojection, validation) 
 views and pixels. Everything else stays as it was. The first view of each process prepares the scene
 for Cycles, so it counts for neither. Gigabytes are the size of the rendered views, in proportion to
 their pixels. They are an upper estimate, because larger views compress better. "device" and
-"extrapolation" are null if no journal has a rendered view. That happens if the working folder was
+"extrapolation" are null if no receipt has a rendered view. That happens if the working folder was
 deleted and the views were kept.
 """
 

@@ -1,6 +1,6 @@
 """Count the members of a family that are built. List those that failed, and fail if there are any.
 
-The settings file is JSON: {"family": "chairs", "records": ["work/chairs/batches/seeds_0_31.json"]}.
+The settings file is JSON: {"family": "chairs"}.
 """
 
 from lightfield.core.flags import program

@@ -1,6 +1,6 @@
 """Publish the checksums of a valid dataset. Fail with the first reasons if it is not valid.
 
-The checksums of an invalid dataset are removed, so that the next run validates it again.
+The checksums are those in the receipts of the jobs that made the files.
 """
 
 from lightfield.core.flags import program

@@ -1,8 +1,8 @@
 """Print the progress of the chosen datasets, also while a build runs.
 
-Only the datasets' files are read. The time left assumes that rendering continues as in the last ten
-minutes: with as many processes, and as many seconds for each view. The journals of the shards
-record both.
+The receipts of the shards say which views are finished, and how long each took. The time left
+assumes that rendering continues as in the last ten minutes: with as many processes, and as many
+seconds for each view.
 """
 
 from lightfield.core.flags import program

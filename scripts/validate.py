@@ -2,13 +2,13 @@
 
 Prints a line for each failure. The exit status is then 1.
 
-With --output and --sums, which the workflow gives, the exit status is 0 even for an invalid
-dataset. The program then writes validation.json, and the checksums of all files that the dataset
-publishes. scripts/publish_checksums.py makes them the sha256sums.txt of a valid dataset. Removes an
-earlier sha256sums.txt first, and the hidden *.tmp files that a killed run has left.
+With --output, which the workflow gives, the exit status is 0 even for an invalid dataset. The
+program then writes validation.json. scripts/publish_checksums.py writes the sha256sums.txt of a
+valid dataset. Removes an earlier sha256sums.txt first, and the hidden *.tmp files that a killed run
+has left.
 
-A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "records": []}, for the
-flags --reprojection, --exports and --records.
+A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "inputs": []}, for the
+flags --reprojection, --exports and --receipts.
 """
 
 from lightfield.core.flags import program

@@ -6,56 +6,52 @@ notes, as a kill or a second build may.
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import re
+import tarfile
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from lightfield.core.files import read_json_lines, sha256, write_json
-from lightfield.validation.integrity import Integrity
-from lightfield.workflow import ledger, shard_files
-from lightfield.workflow.records import ShardRecord
-from lightfield.workflow.view_store import ViewStore
+from lightfield.core import bundles, receipts
+from lightfield.core.files import Stamp, read_json
+from lightfield.core.receipts import Output, Receipt
+from lightfield.stages.registry import VERSIONS
+from lightfield.validation.verification import faults
+from lightfield.workflow.check import JobCheck
 
-# The notes of all jobs of a build.
-NOTES = f"work/{ledger.NAME}"
+# The folder of the notes of all jobs of a build.
+NOTES = f"work/{receipts.FOLDER}"
 
 # The files of a build that note finished work: for each kind two files, as in `faults.KINDS`.
 CUBOID, PLANE, LATTICE = (
     f"smoke/{rig}" for rig in ("LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos")
 )
 KINDS = {
-    "record of views": (f"work/{CUBOID}/render/0-6.json", f"work/{LATTICE}/render/0-2.json"),
-    "record of a reprojection": (
-        f"work/{PLANE}/perspective/0-6.json",
-        f"work/{LATTICE}/perspective/0-2.json",
+    "receipt of views": (
+        f"{NOTES}/{CUBOID}/render/0-6.jsonl",
+        f"{NOTES}/{LATTICE}/render/0-2.jsonl",
     ),
-    "log of checksums": (
-        f"work/{PLANE}/render/0-6.sums.jsonl",
-        f"work/{LATTICE}/render/0-2.sums.jsonl",
+    "receipt of a reprojection": (
+        f"{NOTES}/{PLANE}/perspective/0-6.jsonl",
+        f"{NOTES}/{LATTICE}/perspective/0-2.jsonl",
     ),
-    "journal": (
-        f"work/{PLANE}/render/0-6.journal.jsonl",
-        f"work/{LATTICE}/render/0-2.journal.jsonl",
-    ),
-    "sums of work": (f"work/{PLANE}/checksums.txt", f"work/{LATTICE}/checksums.txt"),
-    "note of shards": ("work/shards.json", f"results/{LATTICE}/report/rig.svg"),
+    "receipt of a file": (f"{NOTES}/{PLANE}/validate.jsonl", f"{NOTES}/{LATTICE}/validate.jsonl"),
     "benchmark": (
         f"work/benchmarks/{PLANE}/render/0-6.tsv",
         f"work/benchmarks/{LATTICE}/render/0-2.tsv",
     ),
     "log": (f"work/logs/{PLANE}/render/0-6.log", f"work/logs/{LATTICE}/render/0-2.log"),
 }
-# These kinds record finished work, and no job can make them again. A run finds only those that it
-# cannot read. `snakemake verify` finds the rest.
-HISTORY = {"log of checksums", "journal", "benchmark"}
-# A job's log has no checksum.
-WITHOUT_CHECKSUM = {"log"}
-# Each plan writes settings, and each run notes its shards.
-REWRITTEN = {"settings", "note of shards"}
+# Nothing depends on these, and they have no checksum.
+WITHOUT_CHECKSUM = {"benchmark", "log"}
+# A plan itself writes these files.
+OF_PLANS = ("work/check.txt", "work/sums.json")
+# A run writes settings when it starts.
+REWRITTEN = {"settings"}
 
 
 # ---- what is damaged ------------------------------------------------------------------------
@@ -66,16 +62,20 @@ def named_in_plan(stderr):
     return set(re.findall(r"^([^:\n]+): .*; it is made anew$", stderr, re.M))
 
 
+def outdated_in_plan(stderr):
+    """Return what a plan names as changed, by the jobs that are outdated."""
+    return dict(re.findall(r"^outdated: ([^:\n]+): (.*)$", stderr, re.M))
+
+
 def problems(folders, work="work"):
     """Return what `snakemake verify` finds in datasets, by path.
 
     Without ``work`` the datasets are copies, of which nothing else exists.
     """
-    return {
-        str(fault.path): fault.problem
-        for folder in folders
-        for fault in Integrity(Path(folder), Path(work) if work else None).faults()
-    }
+    found = {}
+    for folder in folders:
+        found |= faults(Path(folder), Path(work) if work else None)
+    return found
 
 
 # ---- what was made, and from what -----------------------------------------------------------
@@ -91,35 +91,73 @@ class Noted(NamedTuple):
 def noted(folder):
     """Return what is noted in a build's folder, by the outputs of its jobs."""
     return {
-        output: Noted(_digests(job.inputs), _digests(job.files))
-        for job in _latest_jobs(folder)
-        for output in job.outputs
+        output: Noted(dict(receipt.inputs), _digests(receipt))
+        for path, receipt in _receipts(folder).items()
+        for output in (path, *receipt.outputs)
     }
 
 
-def _latest_jobs(folder):
-    """Return the last note of each job, in the order of the jobs."""
-    jobs = {}
-    for job in reversed([*ledger.jobs(Path(folder, NOTES))]):
-        jobs[tuple(job.outputs)] = job
-    return list(jobs.values())
+def _receipts(folder):
+    """Return the receipts of a build's finished jobs, by their paths from its folder."""
+    paths = sorted(Path(folder, NOTES).rglob(f"*{receipts.SUFFIX}"))
+    found = {str(path.relative_to(folder)): receipts.read(path) for path in paths}
+    return {path: receipt for path, receipt in found.items() if receipt}
 
 
-def _digests(stamps):
-    return {name: stamp.sha256 for name, stamp in stamps.items()}
+def unchanged_notes(folder, other_folder):
+    """Return the notes that say the same of inputs and files in two copies of a build."""
+    first, second = _receipts(folder), _receipts(other_folder)
+    return {
+        path for path in first.keys() & second.keys() if _says(first, path) == _says(second, path)
+    }
 
 
-def each_changed_input(folder, scratch):
+def _says(found, path):
+    receipt = found[path]
+    return receipt.version, receipt.settings, receipt.inputs, _digests(receipt)
+
+
+def times_of_making(folder):
+    """Return when each file was made that a finished job has made, in nanoseconds."""
+    return {
+        name: output.stamp.modified_ns
+        for receipt in _receipts(folder).values()
+        for name, output in receipt.outputs.items()
+    }
+
+
+def _digests(receipt):
+    return {path: output.stamp.sha256 for path, output in receipt.outputs.items()}
+
+
+def digest_of_input(folder, name):
+    """Return what is noted about a file when a job reads it now."""
+    return receipts.input_sum(Path(folder, name))
+
+
+def is_content(name):
+    """Return whether the content of a job's input decides what the job makes.
+
+    The mark only starts a job, and receipts hold the settings themselves. Others are checks that
+    must succeed before a job may begin.
+    """
+    path = Path(name)
+    is_check = path.name in ("blend.json", "cameras.json")
+    return name not in OF_PLANS and "settings" not in path.parts and not is_check
+
+
+def each_changed_input(folder):
     """Yield an output, and one of its inputs, for each input that a job has read.
 
-    Also yield what is outdated if only this input is noted with other content. ``scratch`` is a
-    file for such notes.
+    Also yield what is outdated if only this input is noted with other content.
     """
     with contextlib.chdir(folder):
-        for job in _latest_jobs("."):
-            for name in job.inputs:
-                scratch.write_text(_line(_with_other_inputs(job, [name])))
-                yield job.outputs, name, [*ledger.Ledger(scratch).outdated_outputs()]
+        for path, receipt in _receipts(".").items():
+            for name in receipt.inputs:
+                _write(path, _with_other_inputs(receipt, [name]))
+                check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+                yield path, name, check.verdict(path, receipt.settings).outdated
+            _write(path, receipt)
 
 
 # ---- notes as a kill or a second build leaves them ------------------------------------------
@@ -127,45 +165,70 @@ def each_changed_input(folder, scratch):
 
 def forget(folder, output):
     """Remove what is noted about the job of an output, as if it had been killed at its end."""
-    jobs = _latest_jobs(folder)
-    kept = [job for job in jobs if output not in job.outputs]
-    assert len(kept) == len(jobs) - 1
-    Path(folder, NOTES).write_text("".join(map(_line, kept)))
+    (path,) = (
+        path
+        for path, receipt in _receipts(folder).items()
+        if output == path or output in receipt.outputs
+    )
+    Path(folder, path).unlink()
+
+
+def forget_all(folder):
+    """Remove what is noted about all jobs."""
+    for path in _receipts(folder):
+        Path(folder, path).unlink()
 
 
 @contextlib.contextmanager
 def made_from_other_inputs(folder, inputs):
     """Note that jobs have read other content than is there, as if two builds had been mixed up.
 
-    ``inputs`` are the names of such files, by the first output of each job.
+    ``inputs`` are the names of such files, by an output of each job.
     """
-    path = Path(folder, NOTES)
-    before = path.read_bytes()
-    jobs = [_with_other_inputs(job, inputs.get(job.outputs[0], ())) for job in _latest_jobs(folder)]
-    path.write_text("".join(map(_line, jobs)))
+    changed = {}
+    for path, receipt in _receipts(folder).items():
+        names = {name for output in (path, *receipt.outputs) for name in inputs.get(output, ())}
+        if names & receipt.inputs.keys():
+            changed[path] = receipt
+            other = _with_other_inputs(receipt, names & receipt.inputs.keys())
+            _write(Path(folder, path), other)
     yield
-    path.write_bytes(before)
+    for path, receipt in changed.items():
+        _write(Path(folder, path), receipt)
 
 
-def _with_other_inputs(job, names):
-    return job._replace(
-        inputs=job.inputs | {name: ledger.Stamp("0" * 64, 0, 0, 0) for name in names}
-    )
+def _with_other_inputs(receipt, names):
+    return replace(receipt, inputs={**receipt.inputs, **dict.fromkeys(names, "0" * 64)})
 
 
-def _line(job):
-    text = json.dumps(job._asdict(), separators=(",", ":"))
-    return f"{hashlib.sha256(text.encode()).hexdigest()} {text}\n"
-
-
-def keep_one_line_a_job(folder, *unwanted):
-    """Keep the last note of each job, but none with ``unwanted`` in the name of an output."""
-    jobs = [
-        job
-        for job in _latest_jobs(folder)
-        if not any(word in output for word in unwanted for output in job.outputs)
+def _write(path, receipt):
+    """Write a receipt."""
+    header = {name: getattr(receipt, name) for name in ("stage", "version", "settings", "inputs")}
+    outputs = [
+        {"file": name, **output.stamp._asdict()} | ({"key": output.key} if output.key else {})
+        for name, output in receipt.outputs.items()
     ]
-    Path(folder, NOTES).write_text("".join(map(_line, jobs)))
+    lines = [json.dumps(line) + "\n" for line in (header, *outputs, *receipt.history)]
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    Path(path).write_text("".join(lines))
+
+
+def write_as_older_version(folder, dataset, stage, views):
+    """Note a shard's files as versions before receipts did, and remove its receipt."""
+    path = Path(folder, shard(dataset, stage, views))
+    log = Path(folder, "work", dataset, stage, f"{views}.sums.jsonl")
+    log.parent.mkdir(parents=True, exist_ok=True)
+    lines = [
+        {
+            "file": str(Path(name).relative_to(f"results/{dataset}")),
+            "key": output.key,
+            "bytes": output.stamp.bytes,
+            "sha256": output.stamp.sha256,
+        }
+        for name, output in receipts.read(path).outputs.items()
+    ]
+    log.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    path.unlink()
 
 
 # ---- notes of a simulated build -------------------------------------------------------------
@@ -173,72 +236,50 @@ def keep_one_line_a_job(folder, *unwanted):
 
 def note(names):
     """Note that a separate job made each of these files. Paths are from the current folder."""
-    jobs = ledger.Ledger(Path(NOTES))
     for name in names:
-        stamps = {name: ledger.Stamp.of(name)}
-        is_history = name.endswith((".jsonl", ".tsv"))
-        files, history = ({}, stamps) if is_history else (stamps, {})
-        jobs.note(ledger.Job([name], files, history, {}))
+        folder = Path(*Path(name).parts[1:]).parent
+        path = Path(NOTES, folder, f"{Path(name).name.replace('.', '_')}{receipts.SUFFIX}")
+        _write(path, Receipt("", None, {}, {}, {str(name): Output(Stamp.of(name))}))
 
 
-def note_shard(record, folder, files, key):
-    """Note that a shard is finished. Its ``files`` in ``folder`` were made by the same ``key``."""
-    shard = ShardRecord(record, folder)
-    for file in files:
-        shard.add(file, key)
-    shard.write(files)
+def note_shard(record, keys: dict, history=()):
+    """Note that a shard is finished. ``keys`` has the key of each of its files."""
+    outputs = {str(file): Output(Stamp.of(file), key) for file, key in keys.items()}
+    _write(record, Receipt("", None, {}, {}, outputs, [*history]))
 
 
-def write_shard(record, files):
-    """Write the notes of a finished shard of views. ``files`` have a path, a key and sums each."""
-    record.parent.mkdir(parents=True, exist_ok=True)
-    lines = [json.dumps({"file": path, "key": key, **sums}) + "\n" for path, key, sums in files]
-    record.with_suffix(shard_files.LOG_SUFFIX).write_text("".join(lines))
-    record.write_text(json.dumps({"files": {path: sums for path, _, sums in files}}))
+def note_build(folder, jobs: Iterable[dict]):
+    """Note that jobs have made their outputs from their inputs.
 
-
-def write_batch(record, members, rigs):
-    """Write the notes of a finished batch of a family. Each of its ``members`` has these rigs."""
-    datasets = {rig: {"split": None} for rig in rigs}
-    finished = {name: {"state": "valid", "datasets": datasets} for name in members}
-    write_json(record, {"sources": {}, "members": finished})
-
-
-def note_build(folder, inputs, shards, time):
-    """Note that each output in ``inputs`` has a job of its own, which read these inputs.
-
-    ``shards`` are the records of shards, with the folders of their datasets. ``time`` is when the
-    last job finished.
+    Shards have noted their files already.
     """
     with contextlib.chdir(folder):
-        stamps = {name: ledger.Stamp.of(name) for names in inputs.values() for name in names}
-        jobs = []
-        for name, read in inputs.items():
-            files = {name: ledger.Stamp.of(name)}
-            history = {}
-            if name in shards:
-                for view, (_, digest) in shard_files.read_record(Path(name)).items():
-                    path = f"{shards[name]}/{view}"
-                    files[path] = ledger.Stamp.of(path, digest)
-                log = f"{name.removesuffix('.json')}{shard_files.LOG_SUFFIX}"
-                history[log] = ledger.Stamp.of(log)
-            job = ledger.Job([name], files, history, {path: stamps[path] for path in read})
-            jobs.append(job)
-        Path(NOTES).write_text("".join(map(_line, jobs)))
-        os.utime(NOTES, (time, time))
+        paths = {path: job for job in jobs for path in job["output"] if receipts.is_receipt(path)}
+        for path, job in paths.items():
+            made = receipts.read(path)
+            keys = {name: output.key for name, output in made.outputs.items()} if made else {}
+            keys |= {name: None for name in job["output"] if name != path}
+            outputs = {name: Output(Stamp.of(name), key) for name, key in keys.items()}
+            _write(path, Receipt("", None, {}, {}, outputs))
+        sums = {}
+        for path, job in paths.items():
+            settings = {}
+            for name in job["input"]:
+                if "settings" in Path(name).parts:
+                    settings = read_json(name)
+                elif name not in sums:
+                    sums[name] = receipts.input_sum(name)
+            inputs = {name: sums[name] for name in job["input"] if is_content(name)}
+            _write(path, replace(receipts.read(path), settings=settings, inputs=inputs))
 
 
 def accept(folder, dataset, stage, views, file):
     """Note that the job of a shard has made a file of it as the file is now."""
-    record = shard(dataset, stage, views)
-    path = folder / "results" / dataset / file
-    content = json.loads((folder / record).read_text())
-    content["files"][file] = {"bytes": path.stat().st_size, "sha256": sha256(path)}
-    write_json(folder / record, content)
-    (job,) = (job for job in _latest_jobs(folder) if record in job.outputs)
-    with contextlib.chdir(folder):
-        files = {name: ledger.Stamp.of(name) for name in job.files}
-        ledger.Ledger(Path(NOTES)).note(job._replace(files=files))
+    record = folder / shard(dataset, stage, views)
+    name = f"results/{dataset}/{file}"
+    receipt = receipts.read(record)
+    output = receipt.outputs[name]._replace(stamp=Stamp.of(folder / name))
+    _write(record, replace(receipt, outputs={**receipt.outputs, name: output}))
 
 
 # ---- shards ---------------------------------------------------------------------------------
@@ -246,42 +287,57 @@ def accept(folder, dataset, stage, views, file):
 
 def shard(dataset, stage, views):
     """Return the target that makes a shard of a dataset. ``views`` are its bounds, such as 0-6."""
-    return f"work/{dataset}/{stage}/{views}.json"
+    return f"{NOTES}/{dataset}/{stage}/{views}{receipts.SUFFIX}"
 
 
 def files_of_shard(folder, dataset, stage, views):
     """Return the bytes and the SHA-256 of each file of a finished shard, by path in the dataset."""
-    return shard_files.read_record(Path(folder, shard(dataset, stage, views)))
+    receipt = receipts.read(Path(folder, shard(dataset, stage, views)))
+    return {
+        str(Path(name).relative_to(f"results/{dataset}")): (output.stamp.bytes, output.stamp.sha256)
+        for name, output in receipt.outputs.items()
+    }
 
 
 def finished_files(folder, dataset):
     """Return the SHA-256 and the bytes of each view that is finished, also of killed shards."""
     files = {}
-    for log in Path(folder, "work", dataset).glob(f"*/*{shard_files.LOG_SUFFIX}"):
-        for line in read_json_lines(log):
-            path = Path(folder, "results", dataset, line["file"])
-            files[path] = (line["sha256"], line["bytes"])
+    for path in _shards(folder, dataset):
+        receipt = receipts.read(path)
+        outputs = {**(receipt.outputs if receipt else {}), **receipts.read_part(path)[0]}
+        for name, output in outputs.items():
+            if output.key:
+                files[Path(folder, name)] = (output.stamp.sha256, output.stamp.bytes)
     return files
 
 
 def views_of(path):
-    """Return the views that a file is needed for: those of a log, or the one with its name."""
-    if path.name.endswith(shard_files.LOG_SUFFIX):
-        return {Path(line["file"]).stem for line in read_json_lines(path)}
+    """Return the views that a file is needed for: those of a receipt, or the one with its name."""
+    if receipts.is_receipt(path):
+        receipt = receipts.read(path)
+        return {Path(name).stem for name in receipt.outputs} if receipt else set()
     return {path.name.partition(".")[0]}
 
 
-def _journals(folder, dataset="**", views="*"):
-    return Path(folder).glob(f"work/{dataset}/{views}{shard_files.JOURNAL_SUFFIX}")
+def _shards(folder, dataset="**", views="*"):
+    """Return the receipts of shards, also of shards that are not finished."""
+    pattern = f"{dataset}/*/{views}" if dataset != "**" else f"**/{views}"
+    files = [
+        path
+        for suffix in (receipts.SUFFIX, receipts.PART_SUFFIX)
+        for path in Path(folder, NOTES).glob(f"{pattern}{suffix}")
+        if receipts.is_shard(path)
+    ]
+    return sorted({path.with_suffix(receipts.SUFFIX) for path in files})
 
 
-def rendered(folder):
+def rendered(folder, dataset="**"):
     """Return how often each view has been rendered, by its shards' folder and its name."""
     counts = Counter()
-    for journal in _journals(folder):
-        # Shards of another size have journals of their own for the same views.
+    for path in _shards(folder, dataset):
+        # Shards of another size have a history of their own for the same views.
         counts.update(
-            (journal.parent, line["view"]) for line in read_json_lines(journal) if "view" in line
+            (path.parent, line["view"]) for line in receipts.history(path) if "view" in line
         )
     return counts
 
@@ -289,12 +345,10 @@ def rendered(folder):
 def unfinished_shards(folder, scene):
     """Return the shards of a scene that have rendered views, but not all of them."""
     return [
-        journal
-        for journal in _journals(folder, f"{scene}/*/render")
-        if any("view" in line for line in read_json_lines(journal))
-        and not journal.with_name(
-            f"{journal.name.removesuffix(shard_files.JOURNAL_SUFFIX)}.json"
-        ).exists()
+        path
+        for path in _shards(folder, f"{scene}/*")
+        if path.parent.name == "render"
+        and any("view" in line for line in receipts.read_part(path)[1])
     ]
 
 
@@ -302,17 +356,16 @@ def workers(folder, dataset, views="*"):
     """Return the numbers of the processes that have rendered a shard of a dataset, or any shard."""
     return {
         line["pid"]
-        for journal in _journals(folder, f"{dataset}/render", views)
-        for line in read_json_lines(journal)
+        for path in _shards(folder, dataset, views)
+        if path.parent.name == "render"
+        for line in receipts.history(path)
         if "pid" in line
     }
 
 
 def memory_of_views(record):
     """Return the memory in bytes that each view of a shard took, in the order of rendering."""
-    journal = record.with_suffix(shard_files.JOURNAL_SUFFIX)
-    lines = read_json_lines(journal)
-    return [line["memory_bytes"] for line in lines if line.get("memory_bytes")]
+    return [line["memory_bytes"] for line in receipts.history(record) if line.get("memory_bytes")]
 
 
 # ---- families -------------------------------------------------------------------------------
@@ -320,15 +373,22 @@ def memory_of_views(record):
 
 def batch(family, name):
     """Return the target that makes a batch of members of a family."""
-    return f"work/{family}/batches/{name}.json"
+    return f"{NOTES}/{family}/batches/{name}{receipts.SUFFIX}"
+
+
+def note_batch(family, name, files):
+    """Note that a batch of members is finished. ``files`` stand for its members."""
+    note_shard(batch(family, name), dict.fromkeys(files))
 
 
 def begun_members(folder, family):
     """Return the members of a family that were begun, in their order, once for each time."""
+    batches = Path(folder, NOTES, family, "batches")
+    paths = {path.with_suffix(receipts.SUFFIX) for path in batches.glob("*.*")}
     return [
         line["member"]
-        for journal in sorted(_journals(folder, f"{family}/batches"))
-        for line in read_json_lines(journal)
+        for path in sorted(paths)
+        for line in receipts.history(path)
         if "began" in line
     ]
 
@@ -336,22 +396,22 @@ def begun_members(folder, family):
 # ---- a storage ------------------------------------------------------------------------------
 
 
-def stored_views(store):
-    """Return the names of the finished views in a storage in a folder."""
-    notes = Path(store).glob("views/keys/*/*.exr@*")
-    return {note.name.split("@")[1].removesuffix(".exr") for note in notes}
+def packed_files(store):
+    """Return the paths of the files that travel in the bundles of a storage in a folder."""
+    names = set()
+    for bundle in Path(store).glob(f"{NOTES}/**/*{bundles.SUFFIX}"):
+        with tarfile.open(bundle) as archive:
+            names.update(archive.getnames())
+    return names
 
 
-def take_stored(store, digest, path):
-    """Copy the file with a SHA-256 from a storage to a path. Return whether the storage has it."""
-    return ViewStore(str(store)).take(digest, path)
-
-
-def bring_stored(store, path):
-    """Copy a declared file from a storage to the same path in the current folder."""
-    ViewStore(store).bring(str(path))
-
-
-def lose_stored(store, digest):
-    """Remove the file with a SHA-256 from a storage in a folder."""
-    Path(store, "views/sums", digest).unlink()
+def damage_packed(store, shard):
+    """Change a byte of the first file in the bundle of a shard's receipt."""
+    bundle = bundles.bundle_of(Path(store, shard))
+    with tarfile.open(bundle) as archive:
+        position = archive.next().offset_data
+    content = bytearray(bundle.read_bytes())
+    content[position + 20] ^= 1
+    status = bundle.stat()
+    bundle.write_bytes(content)
+    os.utime(bundle, ns=(status.st_atime_ns, status.st_mtime_ns))

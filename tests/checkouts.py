@@ -103,7 +103,7 @@ def snakemake(folder, *arguments, env=None):
 
 def planned(folder, *arguments):
     """Return how many jobs of each rule a dry run plans."""
-    result = snakemake(folder, *arguments, "--dry-run", "--quiet", "rules")
+    result = snakemake(folder, *arguments, "--dry-run", "--printshellcmds")
     assert result.returncode == 0, result.stdout + result.stderr
     table = (result.stdout + result.stderr).split("Job stats:")[1].split("total")[0]
     return {name: int(count) for name, count in re.findall(r"^(\w+)\s+(\d+)$", table, re.M)}

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import forks
 import pytest
+import tiny
 from checkouts import checkout, copy_or_link, snakemake
 from playwright.sync_api import sync_playwright
 
@@ -28,7 +29,17 @@ os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 # Fixtures that start programs, a browser, Blender or Snakemake, or that compute for long.
-SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
+SLOW = {
+    "run_program",
+    "smoke",
+    "built_tiny",
+    "blender",
+    "browser",
+    "cycles",
+    "planned",
+    "renders",
+    "simulated",
+}
 
 
 def pytest_sessionstart(session):
@@ -219,6 +230,23 @@ def build_smoke(folder):
 def smoke(tmp_path_factory, request):
     """A checkout in which the smoke dataset has been built. Each file's tests have their own."""
     return built_once(build_smoke, "smoke", request.config, tmp_path_factory)
+
+
+def build_tiny(folder):
+    """Build the scene of tiny.py in a checkout."""
+    tiny.build(tiny.checked_out(folder))
+
+
+@pytest.fixture(scope="module")
+def built_tiny(tmp_path_factory, request):
+    """A checkout in which the scene of tiny.py has been built. Do not change it."""
+    return built_once(build_tiny, "tiny", request.config, tmp_path_factory)
+
+
+@pytest.fixture
+def tiny_build(built_tiny, tmp_path):
+    """A copy of this checkout, which a test may change."""
+    return shutil.copytree(built_tiny, tmp_path / "plenoforge", symlinks=True)
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,7 @@
 Snakemake has nothing to do in it. If a test damages a file, Snakemake must plan it again.
 """
 
+import contextlib
 import json
 import os
 from collections.abc import Iterable
@@ -38,19 +39,20 @@ def build(folder: Path) -> list[Dataset]:
         )
         text = "".join(f"{digest}  {name}\n" for name, digest in sums)
         write_text(folder / dataset.paths.sums, text)
-        write_text(folder / dataset.paths.checksums, text)
     # The plan writes the settings of every job.
     plan = snakemake(folder, "--dry-run", "--forceall", "--logger", "jobs", "--", "smoke")
     assert plan.returncode == 0, plan.stderr
-    inputs = {name: job["input"] for job in jobs_on(plan.stderr) for name in job["output"]}
+    set_times(folder)
+    bookkeeping.note_build(folder, jobs_on(plan.stderr))
+    set_times(folder)
+    return datasets
+
+
+def set_times(folder: Path) -> None:
+    """Give all files of a build the same time."""
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
-    shards = {
-        record: dataset.paths.folder for dataset in datasets for record in dataset.all_records
-    }
-    bookkeeping.note_build(folder, inputs, shards, WHEN)
-    return datasets
 
 
 def planned(folder: Path, *arguments: str) -> set[str]:
@@ -62,7 +64,7 @@ def planned(folder: Path, *arguments: str) -> set[str]:
 
 
 def _views(folder: Path, dataset: Dataset) -> None:
-    """Write the views and their records. The views differ in colour."""
+    """Write the views and their receipts. The views differ in colour."""
     lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin)
     lightfield.write(folder / dataset.paths.lightfield)
     for name, reprojection in dataset.reprojections.items():
@@ -86,8 +88,9 @@ def _views(folder: Path, dataset: Dataset) -> None:
                 else:
                     key = {images.KEY_ATTRIBUTE: stage}
                     images.write_exr(file, {"R": pixels.astype(np.float16)}, key)
-            record = folder / dataset.paths.record(stage, first, end)
-            bookkeeping.note_shard(record, images_folder, files, stage)
+            keys = {file.relative_to(folder): stage for file in files}
+            with contextlib.chdir(folder):
+                bookkeeping.note_shard(dataset.paths.receipt(stage, first, end), keys)
 
 
 def _write(path: Path, number: int) -> None:

@@ -2,7 +2,7 @@
 
 Runs in a process of its own, because bpy keeps one global state. The argument is a folder. It gets
 scene.blend with library.blend beside it, and emitters.json. It also gets a dataset <name>/ with its
-record <name>.json for each lens, a transparent view, a clamp, and the lamp alone.
+receipt receipts/<name>.jsonl for each lens, a transparent view, a clamp, and the lamp alone.
 """
 
 import json
@@ -111,8 +111,8 @@ def main(folder: Path) -> None:
         content = LightField.from_rig(
             RIG, lenses.from_camera(LENSES[lens]), depth=None, frame=1, scene={}, render=block
         )
-        record = folder / f"{name}.json"
-        one_shard.render(content, folder / name, folder / "scene.blend", record=record)
+        receipt = folder / f"receipts/{name}.jsonl"
+        one_shard.render(content, folder / name, folder / "scene.blend", receipt=receipt)
 
     groups = resolved("each", emitters)
     for lens in LENSES:

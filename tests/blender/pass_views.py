@@ -1,7 +1,7 @@
 """Renders a scene with a bit of everything, through several lenses, with all passes.
 
 Runs in a process of its own, because bpy keeps one global state. The argument is a folder. For each
-lens it writes there a dataset <lens>/, its record <lens>.json and its journal <lens>.jsonl. In
+lens it writes there a dataset <lens>/, and its receipt receipts/<lens>.jsonl. In
 objects.npz, <lens> holds the name of the object that Blender's own ray casts hit behind each pixel
 of the first view. "plain" is the perspective without passes, "denoised" the same with some
 passes, "transparent" the fisheye. matte.exr is the wall's matte, which Blender's compositor reads
@@ -227,8 +227,8 @@ def main(folder: Path) -> None:
     blend_file.save_scene(blend)
 
     def render(name, content, views=":"):
-        notes = {"record": folder / f"{name}.json", "journal": folder / f"{name}.jsonl"}
-        one_shard.render(content, folder / name, blend, views=views, **notes)
+        receipt = folder / f"receipts/{name}.jsonl"
+        one_shard.render(content, folder / name, blend, views=views, receipt=receipt)
 
     objects = {}
     for name in LENSES:

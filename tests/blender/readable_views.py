@@ -393,8 +393,8 @@ def main(folder: Path) -> None:
     blend_file.open_scene(blend)
     render_with_blender(folder / "blender.exr")
     for name, choice in CHOICES.items():
-        record = folder / f"{name}.json"
-        one_shard.render(content(**choice), folder / name, blend, record=record)
+        receipt = folder / f"receipts/{name}.jsonl"
+        one_shard.render(content(**choice), folder / name, blend, receipt=receipt)
 
 
 if __name__ == "__main__":

@@ -248,8 +248,8 @@ def main(folder: Path) -> None:
         depth = "z" if made.has_z_depth else "distance"
         block = {**RENDER, **settings}
         content = LightField.from_rig(rig, made, depth=depth, frame=1, scene={}, render=block)
-        record = folder / f"{name}.json"
-        one_shard.render(content, folder / name, folder / "scene.blend", record=record)
+        receipt = folder / f"receipts/{name}.jsonl"
+        one_shard.render(content, folder / name, folder / "scene.blend", receipt=receipt)
 
     for lens in LENSES:
         render(lens, lens)

@@ -121,6 +121,14 @@ def test_a_folder_has_one_path_however_it_is_written(folder, path):
     assert config_file.load_config(content).results == path
 
 
+@pytest.mark.parametrize("storage", ["s3://bucket/a", "/mnt/volume", ""])
+def test_a_storage_is_a_url_or_an_absolute_path(storage):
+    content = {"scenes": "room", "preset": "full", "presets": {"full": {}}}
+    assert config_file.load_config(content | {"storage": storage}).storage == storage
+    with pytest.raises(UserError, match=r"storage: .*must be a URL, or a path from /"):
+        config_file.load_config(content | {"storage": "volume"})
+
+
 def test_a_merged_mapping_may_replace_keys_of_another(tmp_path):
     path = tmp_path / "nested.yaml"
     path.write_text(
@@ -272,7 +280,7 @@ def test_a_single_word_becomes_a_list():
 def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
     plan = forks.run_snakemake(
-        ["--cores", "1", "--dry-run", "--quiet", "host", "--config", *folders, *arguments],
+        ["--cores", "1", "--dry-run", "--printshellcmds", "--config", *folders, *arguments],
         ROOT,
     )
     assert plan.returncode == 0, plan.stderr

@@ -8,7 +8,6 @@ hide all other faults.
 import contextlib
 import copy
 import functools
-import hashlib
 import itertools
 import json
 import os
@@ -29,6 +28,7 @@ from lightfield import export
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Energy, load_config
 from lightfield.configuration.exports import settings_of
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.export.source import SourceDataset
 from lightfield.formats import published
@@ -45,10 +45,12 @@ from lightfield.planning import cost as planning
 from lightfield.planning.cost import cost
 from lightfield.planning.sampling import calibrated
 from lightfield.reprojection import lens_map
+from lightfield.stages.registry import VERSIONS
 from lightfield.validation import splits_check
-from lightfield.workflow import journal, ledger, records, shard_counts, shard_files
+from lightfield.workflow import history
+from lightfield.workflow.check import JobCheck
 from lightfield.workflow.loading import scene_datasets
-from lightfield.workflow.presence import check_external_files, external_changed
+from lightfield.workflow.presence import check_external_files
 
 TIMES = itertools.count(10**18, 10**6)
 # The number of files of each kind. "few" takes seconds, and runs in each run of the tests.
@@ -240,7 +242,6 @@ def inventory(_):
 
 
 def read_scene_inventory(path, dataset):
-    external_changed(dataset, None)
     cost("render", dataset)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
@@ -250,35 +251,15 @@ def read_scene_inventory(path, dataset):
     resolved.rig.camera.make()
 
 
-def record(_):
-    entry = {"bytes": 7, "sha256": "0" * 64}
-    return {"files": {"exr/a.exr": entry, "exr/b.exr": dict(entry)}}
-
-
-def read_record(path, _):
-    shard_files.read_record(path)
-    shard_files.recorded_sizes(path, str(path.parent))
-
-
-def log_of_sums(_):
-    return [{"file": "exr/a.exr", "key": "k", "bytes": 7, "sha256": "0" * 64} for _ in range(3)]
-
-
-def read_log_of_sums(path, _):
-    view = path.parent / "exr/a.exr"
-    view.parent.mkdir(exist_ok=True)
-    view.write_bytes(b"a view!")
-    (path.parent / "a.json").unlink(missing_ok=True)
-    shard = records.ShardRecord(path.parent / "a.json", view.parent)
-    shard.is_finished(view, "k")
-    shard.refuse_changed(view, "another key")
-    shard.add(view, "k")
-
-
-def journal_lines(_):
+def receipt_lines(_):
     view = {"view": "a", "finished": 3.0}
     view |= dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 1.0)
+    made = {"file": "exr/a.exr", "sha256": "0" * 64, "bytes": 7, "modified_ns": 7, "key": "k"}
+    inputs = {"a.json": "0" * 64, "work/receipts/b.jsonl": "0" * 64}
     return [
+        {"stage": "render_shard", "version": 1, "settings": {"a": 1}, "inputs": inputs},
+        made,
+        {**made, "file": "exr/b.exr"},
         {"started": 1.0, "host": "here", "pid": 7},
         {"start_up_seconds": 1.0, "device": "CPU", "threads": 1},
         view,
@@ -286,32 +267,21 @@ def journal_lines(_):
     ]
 
 
-def read_journal(path, _):
-    runs = journal.read(path)
-    for run in runs:
+def read_receipt(path, _):
+    check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+    check.verdict(str(path), {})
+    check.will_run(str(path))
+    if receipt := receipts.read(path):
+        receipt.sum  # noqa: B018
+    # The same lines in the receipt of a job that was killed.
+    path.with_suffix(".part").write_bytes(path.read_bytes())
+    with receipts.opened(path, {}, []) as job:
+        job.is_finished(Path("exr/a.exr"), "k")
+        job.add_input("a.json")
+    for run in history.read(path):
         for key in ("later_views", "last_heard", "wall_seconds", "cpu_seconds"):
             getattr(run, key)
-
-
-def ledger_lines(_):
-    stamp = ["0" * 64, 7, 7, 7]
-    job = {"outputs": ["a.json"], "files": {"a.json": stamp}, "history": {}}
-    return [{**job, "inputs": {"b.json": stamp}}, {**job, "outputs": ["b"], "inputs": {}}]
-
-
-def read_ledger(path, _):
-    jobs = ledger.Ledger(path)
-    jobs.damage  # noqa: B018
-    for name in ("a.json", "b"):
-        if name in jobs:
-            jobs.changed_input(name)
-    jobs.last_read("b.json", "0" * 64)
-    jobs.input_stamps(["a.json"])
-    ledger.read(path)
-    ledger.damaged_lines(path)
-    ledger.forget(path, "c")
-    jobs.refresh()
-    jobs.compact()
+    path.with_suffix(".part").unlink()
 
 
 def transforms(_):
@@ -404,16 +374,6 @@ def read_probe(path, dataset):
     plan.table([("a/b", 1, planning.read_probe(path))], {}, Energy())
 
 
-def shards(_):
-    return {"own/View": {"views": 1, "shards": 1}, "other/View": {"views": 9, "shards": 3}}
-
-
-def read_shards(path, _):
-    shard_counts.noted(str(path.parent), "own/View", 1)
-    shard_counts.note(str(path.parent), {"own/View": (1, 1)})
-    shard_counts.noted(str(path.parent), "own/View", 1)
-
-
 def saved_lens_map(path):
     source = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
     target = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [4, 4]})
@@ -490,16 +450,12 @@ def read_poses(path, _):
 KINDS = {
     "lightfield": ("View/lightfield.json", lightfield, read_lightfield),
     "inventory": ("inventory.json", inventory, read_scene_inventory),
-    "record": ("View/render/0-2.json", record, read_record),
-    "log of sums": ("View/render/a.sums.jsonl", log_of_sums, read_log_of_sums),
-    "journal": ("View/render/0-2.journal.jsonl", journal_lines, read_journal),
-    "ledger": ("ledger.txt", ledger_lines, read_ledger),
+    "receipt": ("../receipts/own/View/render/0-2.jsonl", receipt_lines, read_receipt),
     "transforms": ("View/transforms.json", transforms, read_transforms),
     "export": ("View/exports/export.json", export_list, read_export_list),
     "splits": ("splits.json", splits_of, read_splits),
     "calibration": ("calibration.json", calibration, read_calibration),
     "probe": ("View/probe.json", probe, read_probe),
-    "shards": ("shards.json", shards, read_shards),
     "scene": ("../../other.yaml", scene, read_scene),
     "configuration": ("../../config.yaml", configuration, read_configuration),
     "lock": ("../../own.lock.json", lock, read_lock),
@@ -521,19 +477,10 @@ rigs:
 
 
 def text_of(kind, content):
-    """Return a file's bytes, with correct checksums of itself."""
+    """Return the bytes of a file with this content."""
     # Without checksums NaN is possible: Python writes and reads it.
     text = json.dumps(content)
-    if kind == "ledger":
-        lines = [json.dumps(line) for line in content] if isinstance(content, list) else []
-        return b"".join(
-            hashlib.sha256(line.encode()).hexdigest().encode() + b" " + line.encode() + b"\n"
-            for line in lines
-        )
-    if kind == "shards":
-        sums = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-        return json.dumps({"datasets": content, "sha256": sums}).encode()
-    if kind in ("log of sums", "journal") and isinstance(content, list):
+    if kind == "receipt" and isinstance(content, list):
         return b"".join(json.dumps(line).encode() + b"\n" for line in content)
     return text.encode("utf-8", "surrogatepass")
 

@@ -3,8 +3,6 @@
 import errno
 import os
 import re
-import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,7 +18,6 @@ from sphere import write_views
 
 from lightfield.core import disk_space, files, leftovers
 from lightfield.core.errors import UserError
-from lightfield.workflow import live_runs
 
 Usage = namedtuple("Usage", "free")
 
@@ -42,17 +39,6 @@ rigs:
     type: plane
     cameras: [2, 1]
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
-"""
-
-# Starts a run that lives until it is killed, and one of its jobs.
-RUN = """
-import subprocess, sys, time
-from pathlib import Path
-from lightfield.workflow import live_runs
-live_runs.enter(Path(sys.argv[1]), sys.argv[2] == "cluster", lambda: None)
-job = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-print(job.pid, flush=True)
-time.sleep(60)
 """
 
 KEEPER = """
@@ -131,7 +117,9 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     assert not (folder / "results").exists()
     # The plan writes only the settings of its jobs.
     written = [path for path in (folder / "work").rglob("*") if path.is_file()]
-    assert all("settings" in path.parts for path in written)
+    # A plan writes its mark, and the settings that are missing. A run takes its lock.
+    notes = {"check.txt", "run.lock"}
+    assert all("settings" in path.parts or path.name in notes for path in written)
 
 
 @pytest.mark.parametrize(
@@ -328,132 +316,3 @@ def test_a_temporary_name_without_a_file_is_refused(tmp_path, monkeypatch):
     with pytest.raises(UserError, match="cannot be written"):
         files.write_text("", "text")
     assert not list(tmp_path.iterdir())
-
-
-@pytest.fixture
-def start_run(tmp_path):
-    """Return a function that starts a run noted in a folder. It returns the process and its job."""
-    runs = []
-
-    def start(place="here"):
-        arguments = [sys.executable, "-c", RUN, tmp_path / "locks", place]
-        run = subprocess.Popen(
-            arguments, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
-        )
-        runs.append((run, int(run.stdout.readline())))
-        return runs[-1]
-
-    yield start
-    for run, job in runs:
-        run.kill()
-        run.wait()
-        with suppress(ProcessLookupError):
-            os.kill(job, signal.SIGKILL)
-
-
-ENTER = """
-import sys
-from pathlib import Path
-from lightfield.workflow import live_runs
-others = live_runs.enter(Path(sys.argv[1]), False, lambda: print("locks are removed"))
-print(*[run.pid for run in others])
-print(live_runs.refusal(others))
-"""
-
-
-def start_entering(folder):
-    """Start a process that enters a folder."""
-    return subprocess.Popen(
-        [sys.executable, "-c", ENTER, folder],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={"PYTHONPATH": str(SCRIPTS)},
-    )
-
-
-def outcome(process):
-    """Return the runs that may live, whether locks were removed, and the message."""
-    output, problem = process.communicate()
-    assert process.returncode == 0, problem
-    *removed, pids, refusal = output.splitlines()
-    return list(map(int, pids.split())), removed == ["locks are removed"], refusal
-
-
-def entered(folder):
-    return outcome(start_entering(folder))
-
-
-def test_a_live_run_is_named_and_a_killed_one_leaves_nothing(start_run, tmp_path):
-    folder = tmp_path / "locks"
-    assert entered(folder)[:2] == ([], False)
-    assert not list(folder.iterdir())
-    run, job = start_run()
-    alive, removed, refusal = entered(folder)
-    assert (alive, removed) == ([run.pid], False)
-    assert f"process {run.pid}: wait for it, or end it (kill {run.pid})" in refusal
-    os.kill(job, signal.SIGKILL)
-    run.kill()
-    run.wait()
-    assert entered(folder)[:2] == ([], True)
-    assert not list(folder.iterdir())
-
-
-def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path):
-    (run, _), (killed, job) = start_run(), start_run()
-    os.kill(job, signal.SIGKILL)
-    killed.kill()
-    killed.wait()
-    assert entered(tmp_path / "locks")[:2] == ([run.pid], False)
-
-
-@pytest.mark.parametrize(
-    ("place", "host", "advice"),
-    [
-        (
-            "here",
-            "elsewhere",
-            "on elsewhere: wait for it; if it no longer runs: snakemake",
-        ),
-        (
-            "cluster",
-            None,
-            "jobs on the cluster: wait for them or cancel them, then: snakemake",
-        ),
-    ],
-)
-def test_a_run_that_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
-    run, job = start_run(place)
-    os.kill(job, signal.SIGKILL)
-    run.kill()
-    run.wait()
-    (note,) = (tmp_path / "locks").iterdir()
-    if host:
-        note.rename(note.with_name(note.name.replace(socket.gethostname(), host)))
-    alive, removed, refusal = entered(tmp_path / "locks")
-    assert (alive, removed) == ([run.pid], False)
-    assert advice in refusal
-
-
-def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
-    run, job = start_run()
-    run.kill()
-    run.wait()
-    entering = start_entering(tmp_path / "locks")
-    line = entering.stderr.readline()
-    assert line.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
-    os.kill(job, signal.SIGKILL)
-    assert outcome(entering)[:2] == ([], True)
-
-
-def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
-    def flock(*_):
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr(live_runs.fcntl, "flock", flock)
-    folder = tmp_path / "locks"
-    folder.mkdir()
-    (folder / f"7.0123abcd@{socket.gethostname()}.here").touch()
-    others = live_runs.enter(folder, False, lambda: pytest.fail("removed the locks"))
-    assert others == []
-    assert len(list(folder.iterdir())) == 1

@@ -8,7 +8,6 @@ import pytest
 from lightfield.core import files
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, set_aside
-from lightfield.workflow.ledger import Job, Ledger
 
 
 @pytest.fixture
@@ -38,14 +37,10 @@ def test_a_file_gets_its_name_after_its_bytes_are_on_the_disk(flushed, tmp_path)
 
 
 def test_a_line_of_a_log_is_on_the_disk_before_work_goes_on(flushed, tmp_path):
-    log = tmp_path / "0-6.journal.jsonl"
+    log = tmp_path / "0-6.part"
     for number in range(2):
         files.append_json_line(log, {"view": number})
         assert flushed[-1] == (log.stat().st_size, str(log))
-    ledger = tmp_path / "ledger.txt"
-    for number in range(2):
-        Ledger(ledger).note(Job([f"{number}.json"], {}, {}, {}))
-        assert flushed[-1] == (ledger.stat().st_size, str(ledger))
 
 
 def test_a_program_that_writes_nothing_leaves_the_old_file(tmp_path):

@@ -4,16 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.core import leftovers
+from lightfield.core import bundles, leftovers
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256, write_json
+from lightfield.core.files import write_json
 from lightfield.core.paths import files_below, inside, place_in
 from lightfield.formats.layout import read_sums
 from lightfield.formats.lightfield import LightField
-from lightfield.validation.corpus_integrity import corpus_faults
-from lightfield.workflow import shard_files
 from lightfield.workflow.member_record import read_member
-from lightfield.workflow.view_store import ViewStore
 
 # Each leads to a file beside the folder "home", or to none.
 HOSTILE = ["../x", "a/../../x", "..", "/tmp/x", "//tmp/x", "", ".", "a\0b", "./../x"]
@@ -116,29 +113,13 @@ def sums_file(home, name):
     return read_sums(write(home / "sha256sums.txt", f"{DIGEST}  {name}\n"))
 
 
-def record(home, name):
-    path = home / "0-1.json"
-    write_json(path, {"files": {name: {"bytes": 1, "sha256": DIGEST}}})
-    return shard_files.read_record(path)
-
-
-def log(home, name):
-    path = home / "0-1.sums.jsonl"
-    path.parent.mkdir(exist_ok=True)
-    write_json(path, {})
-    with path.open("a") as file:
-        file.write('{"file": %s, "key": "k", "sha256": "%s"}\n' % (quoted(name), DIGEST))  # noqa: UP031
-    return list(shard_files.logged_lines(path))
-
-
-def note(home, name):
-    class Store(ViewStore):
-        """An object store, where a name may have any letters."""
-
-        def names(self, folder):
-            return [f"{name.replace('/', '@')}@{DIGEST}"]
-
-    return Store(str(home)).listed("key")
+def bundle(home, name):
+    receipt = home / "receipts/0-1.jsonl"
+    header = '{"stage": "s", "version": 1, "settings": {}, "inputs": {}}'
+    line = '{"file": %s, "sha256": "%s", "bytes": 1, "modified_ns": 1}' % (quoted(name), DIGEST)  # noqa: UP031
+    write(receipt, f"{header}\n{line}\n")
+    write(bundles.bundle_of(receipt))
+    return bundles.unpack(receipt)
 
 
 def member(home, name):
@@ -174,18 +155,7 @@ def quoted(name):
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-@pytest.mark.parametrize(
-    "read", [sums_file, record, log, note, member, flow, light_group, view_name]
-)
+@pytest.mark.parametrize("read", [sums_file, bundle, member, flow, light_group, view_name])
 def test_no_reader_takes_a_path_that_leads_out_of_its_folder(read, name, tmp_path):
     with pytest.raises(UserError):
         read(tmp_path / "home", name)
-
-
-def test_a_corpus_has_no_file_outside_its_folder(tmp_path):
-    home = tmp_path / "home"
-    for member, rig in (("..", "x"), ("m", "../../x"), ("/tmp", "x")):
-        write_json(home / "corpus.json", {"members": [{"name": member, "datasets": {rig: {}}}]})
-        write(home / "sha256sums.txt", f"{sha256(home / 'corpus.json')}  corpus.json\n")
-        with pytest.raises(UserError, match=r"corpus.json: members: is .*; must be the path of"):
-            list(corpus_faults(home))

@@ -1,6 +1,7 @@
-"""The terminal during a run: a line that stays in view, warnings, failures, phases."""
+"""The terminal during a run: bars that stay in view, warnings, failures, phases."""
 
 import io
+import re
 import time
 
 import pytest
@@ -16,74 +17,96 @@ class Terminal(io.StringIO):
 
 
 class Run:
-    """Jobs whose states and logs a test writes, and the terminal's output."""
+    """Jobs that a test starts and ends, and whose logs it writes, and the terminal's output."""
 
     def __init__(self, folder, stream):
         self.folder, self.stream, self.now = folder, stream, time.time()
-        self.states = {"running": set(), "finished": set(), "failed": set()}
-        self.display = RunDisplay(lambda: tuple(self.states.values()), self.explain, stream)
+        self.display = RunDisplay(stream=stream)
         self.tasks = {
             "place": self.task("place", "cameras"),
             "a": self.task("a", "views", views=10, seconds=100.0),
             "b": self.task("b", "views", views=10, seconds=100.0),
             "panorama": self.task("panorama", "report", seconds=50.0),
         }
-        self.display.begin(self.tasks, cores=2)
+        self.begin()
+
+    def begin(self):
+        self.display.planned(is_dry_run=False, is_shown=True)
+        self.display.begin({task.log: task for task in self.tasks.values()}, cores=2)
 
     def task(self, name, phase, **more):
-        return Task(name, f"scene/{name}", phase, self.folder / name, **more)
-
-    def explain(self, names):
-        return "".join(f"{name} failed: no room" for name in sorted(names))
+        return Task(f"scene/{name}", phase, self.folder / name, **more)
 
     def log(self, name, *lines):
         with (self.folder / name).open("a") as file:
             file.writelines(f"{line}\n" for line in lines)
 
-    def shown(self, seconds=0, **states):
+    def start(self, *names):
+        for name in names:
+            number = [*self.tasks].index(name)
+            log = str(self.folder / name)
+            self.display.started(number, name, [log], ["output"], self.display.submission())
+
+    def shown(self, seconds=0, running=(), finished=(), failed=()):
         """Return the new lines on the terminal after some seconds."""
         self.now += seconds
-        for state, names in states.items():
-            for others in self.states.values():
-                others -= set(names)
-            self.states[state] |= set(names)
         before = len(self.stream.getvalue())
+        numbers = {name: number for number, name in enumerate(self.tasks)}
+        self.start(*running)
+        for name in finished:
+            self.display.finished(numbers[name])
+        for name in failed:
+            self.display.failed(numbers[name], None)
         self.display.update()
-        text = self.stream.getvalue()[before:].replace(run_display.CLEAR_LINE, "\n")
-        return [line for line in text.splitlines() if line]
+        # Without the sequences that move the cursor and set colours.
+        text = re.sub(r"\x1b\[[?\d;]*\w", "", self.stream.getvalue()[before:])
+        return [line.rstrip() for line in re.split(r"[\r\n]+", text) if line.strip()]
 
 
 @pytest.fixture(params=[Terminal, io.StringIO])
 def run(request, tmp_path, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
     run = Run(tmp_path, request.param())
     run.began = run.now
     monkeypatch.setattr(run_display.time, "time", lambda: run.now)
-    return run
+    yield run
+    run.display.close()
 
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
-def test_one_line_shows_the_progress_of_the_whole_run(run):
+def test_bars_and_one_line_show_the_progress_of_the_whole_run(run):
     # 250 s of renders on two cores.
     assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 05 s left"]
     run.shown(running=["place"])
-    assert run.shown(2, finished=["place"], running=["a", "b"])[0] == "cameras: 1 job in 2 s"
+    assert "cameras: 1 job in 2 s" in run.shown(2, finished=["place"], running=["a", "b"])
     run.log("a", "render scene a: 8 views to do, 2 already done")
     run.log("b", "render scene b: 10 views to do", "render scene b: 2 of 10 views, 20 s each, …")
-    (line,) = run.shown(40)
+    bar, line = run.shown(40)
+    assert bar.startswith("views ") and bar.endswith(" 4 of 20 views")
     assert line.startswith("1 of 4 jobs · 4 of 20 views, 3 a minute · ")
-    assert line.endswith(" left · views")
+    assert line.endswith(" left")
     run.log("a", "render scene a: 8 of 8 views, 20 s each, done in 180 s")
     run.log("b", "render scene b: 10 of 10 views, 20 s each, done in 200 s")
     shown = run.shown(160, finished=["a", "b"], running=["panorama"])
-    assert shown[0] == "views: 18 views in 3 min 20 s"
+    assert "views: 18 views in 3 min 20 s" in shown
     # Views took 20 s instead of 10 s: 50 s become 100 s, of which 1.8 are done in a second.
-    assert run.display.line(run.now) == "3 of 4 jobs · 20 of 20 views · 56 s left · report"
-    assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
+    assert shown[-1] == "3 of 4 jobs · 20 of 20 views · 56 s left"
+    assert "report: 1 job in 50 s" in run.shown(50, finished=["panorama"])
+
+
+@pytest.mark.parametrize("run", [Terminal], indirect=True)
+@pytest.mark.parametrize("columns", [20, 40, 200])
+def test_no_line_of_the_progress_is_wider_than_the_terminal(run, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    run.log("a", "render scene a: 8 views to do, 2 already done")
+    shown = run.shown(running=["a", "place"])
+    assert shown and max(map(len, shown)) <= columns
 
 
 def test_the_end_shows_the_forecast_beside_what_the_run_took(run):
     run.tasks["place"].seconds = 5.0
-    run.shown(running=["a"])
+    run.shown(running=[*run.tasks])
     # An earlier run rendered 2 of 10 views.
     run.log("a", "render scene a: 8 views to do, 2 already done")
     run.shown(100, finished=[*run.tasks])
@@ -107,20 +130,22 @@ def test_a_run_that_ends_early_counts_what_it_did(run):
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
 def test_a_measurement_takes_the_time_that_its_log_tells(run):
     run.tasks = {"error": run.task("error", "measurement")}
-    run.display.begin(run.tasks, cores=2)
+    run.begin()
     run.shown(running=["error"])
     run.log("error", "garden: trials: 50 renders to do")
     run.log("error", "garden: trials: 10 of 50 renders, 3 s each, …")
-    assert run.shown(30) == ["0 of 1 job · 2 min 00 s left · measurement 10 of 50"]
+    bar, line = run.shown(30)
+    assert bar.startswith("measurement ") and bar.endswith(" 10 of 50")
+    assert line == "0 of 1 job · 2 min 00 s left"
     run.log("error", "garden: trials: 50 of 50 renders, 3 s each, done in 150 s")
-    assert run.shown(120, finished=["error"])[-1] == "measurement: 1 job in 2 min 30 s"
+    assert "measurement: 1 job in 2 min 30 s" in run.shown(120, finished=["error"])
 
 
 def test_warnings_are_shown_once_and_other_lines_not(run):
     run.log("a", "warning: coarse", "a detail", "note: so and so")
     run.log("b", "warning: coarse")
     shown = run.shown(running=["a", "b"])
-    assert [line for line in shown if " left" not in line] == [
+    assert [line for line in shown if line.startswith(("warning", "note"))] == [
         "warning: scene/a: coarse",
         "note: so and so",
     ]
@@ -129,22 +154,51 @@ def test_warnings_are_shown_once_and_other_lines_not(run):
 
 def test_a_failure_is_shown_at_once_while_other_jobs_continue(run):
     run.shown(running=["a", "b"])
-    assert run.shown(failed=["a"])[0] == "a failed: no room"
+    run.log("a", "error: no room")
+    assert "a failed: error: no room" in run.shown(failed=["a"])
+    run.log("b", "error: no room either")
+    assert not any("either" in line for line in run.shown(failed=["b"]))
+    assert "b failed: error: no room either" in run.display.failures()
+
+
+def test_a_job_that_succeeds_when_it_is_tried_again_has_not_failed(run):
+    run.log("a", "error: no room")
+    run.shown(running=["a"])
+    run.shown(failed=["a", "a"])
+    run.shown(running=["a"])
+    run.shown(finished=["a"])
+    assert run.display.failures() == ""
+
+
+def test_a_group_names_only_its_job_that_failed(run):
+    names = ["a", "b", "place"]
+    for name in names:
+        run.log(name, f"of {name}")
+    (run.folder / "made").touch()
+    group = run.display.submission("shard")
+    for number, name in enumerate(names):
+        outputs = [str(run.folder / ("made" if name == "a" else "missing"))]
+        run.display.started(number, name, [str(run.folder / name)], outputs, group)
+    (run.folder / "place").unlink()
+    for number in range(3):
+        run.display.failed(number, None)
+    assert run.display.failures() == f"b failed: of b\n  log: {run.folder / 'b'}"
 
 
 @pytest.mark.parametrize("run", [io.StringIO], indirect=True)
 def test_a_log_file_gets_a_line_at_intervals(run):
-    lines = []
+    lines = run.shown(running=["a"])
     for _ in range(3600):
-        lines += run.shown(1, running=["a"])
+        lines += run.shown(1)
     assert 30 < len(lines) < 60
     assert run.shown(10 * 24 * 3600)[0].startswith("0 of 4 jobs · 0 of 20 views · ")
+    assert lines[-1].endswith(" left · views")
 
 
 def test_logs_of_other_runs_are_not_read(run):
     run.log("a", "warning: of old")
     run.now += 60
-    run.display.begin(run.tasks, cores=2)
+    run.begin()
     assert not any("of old" in line for line in run.shown(running=["a"]))
 
 

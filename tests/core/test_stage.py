@@ -114,10 +114,10 @@ def test_a_stage_names_a_function_that_takes_it(stage):
     assert parameter.annotation is stage
 
 
-def test_each_version_of_a_stage_is_in_a_key():
+def test_each_version_in_a_key_is_a_stages_own():
     library = "\n".join(file.read_text() for file in SCRIPTS.glob("lightfield/**/*.py"))
     with_version = {stage.__name__ for stage in STAGES if hasattr(stage, "version")}
-    assert with_version == set(re.findall(r"\b([A-Z]\w+)\.version\b", library))
+    assert with_version >= set(re.findall(r"\b([A-Z]\w+)\.version\b", library))
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)

@@ -17,15 +17,17 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield.configuration.scene_yaml import Scene
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
 from lightfield.formats.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.stages.registry import VERSIONS
+from lightfield.stages.views import ImportViews
+from lightfield.workflow.check import JobCheck
 from lightfield.workflow.loading import scene_datasets
-from lightfield.workflow.presence import outgrown_records
-from lightfield.workflow.records import ShardRecord
 
 RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "center": [0.3, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [48, 48]}
@@ -88,7 +90,8 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     assert content["depth"] == "z"
     # The machine that rendered them is unknown.
     assert "machine" not in content
-    record, views = tmp_path / "0-4.json", dataset / "exr"
+    receipt = tmp_path / "work/receipts/theirs/LFPlane/render/0-4.jsonl"
+    views = dataset / "exr"
     arguments = [
         "--dataset",
         published,
@@ -96,22 +99,16 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
         own_lightfield,
         "--output",
         views,
-        "--record",
-        record,
+        "--receipt",
+        receipt,
     ]
     run("import_views.py", *arguments)
-    files = json.loads(record.read_text())["files"]
-    assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
-    for name, entry in files.items():
-        assert sha256(published / name) == sha256(dataset / name) == entry["sha256"]
-    # Both names are one file, so damage affects both.
-    view = next((published / "exr").iterdir())
-    content = view.read_bytes()
-    view.write_bytes(content[:-1] + b"?")
-    refused = run("import_views.py", *arguments, check=False)
-    assert f"{view.name}: has other bytes than at its import" in refused.stderr
-    view.write_bytes(content)
-    run("import_views.py", *arguments)
+    outputs = receipts.read(receipt).outputs
+    names = {f"exr/{path.name}" for path in (published / "exr").iterdir()}
+    assert outputs.keys() == {f"results/theirs/LFPlane/{name}" for name in names}
+    for name in names:
+        (digest,) = {sha256(published / name), sha256(dataset / name)}
+        assert outputs[f"results/theirs/LFPlane/{name}"].stamp.sha256 == digest
     again = dataset / "perspective"
     camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
     settings = tmp_path / "perspective.json"
@@ -122,8 +119,8 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     )
     arguments = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
     run("export_instant_ngp.py", *arguments, "--output", again / "transforms.json")
-    arguments = [dataset, "--reprojection", "perspective", "--records", record]
-    arguments += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
+    arguments = [dataset, "--reprojection", "perspective", "--receipts", receipt]
+    arguments += ["--output", dataset / "validation.json"]
     run("validate.py", *arguments)
     validation = json.loads((dataset / "validation.json").read_text())
     assert validation["valid"], validation["summary"]
@@ -246,21 +243,32 @@ def test_a_view_replaced_by_an_older_file_of_equal_size_is_imported_again(
     for view in (published / "exr").iterdir():
         os.utime(view, (old_time, old_time))
     (dataset,) = scene_datasets("theirs")
-    (path,) = dataset.records("render")
-    record = ShardRecord(Path(path), Path(dataset.paths.views))
+    (path,) = dataset.receipts("render")
+    # The folder of the views has a path as in a scene YAML.
+    source = published.relative_to(tmp_path)
+    job = ImportViews(
+        dataset=source,
+        lightfield=source / "lightfield.json",
+        output=Path(dataset.paths.views),
+        receipt=Path(path),
+    )
+    job.run()
     views = sorted((published / "exr").iterdir())
-    for view in views:
-        imported = Path(dataset.paths.views, view.name)
-        link_or_copy(view, imported)
-        record.add(imported, view.name)
-    record.write(Path(dataset.paths.views, view.name) for view in views)
-    assert outgrown_records(dataset) == []
+
+    def outdated():
+        check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+        return check.verdict(path, job.settings.as_json()).outdated
+
+    assert outdated() == []
     # As rsync does with --archive.
     new_view = tmp_path / "new.exr"
     new_view.write_bytes(views[0].read_bytes()[:-1] + b"?")
     os.utime(new_view, (old_time - 60, old_time - 60))
     new_view.replace(views[0])
-    assert outgrown_records(dataset) == [path]
+    assert outdated() == [receipts.name_of(views[0])]
+    job.run()
+    assert Path(dataset.paths.views, views[0].name).read_bytes() == views[0].read_bytes()
+    assert outdated() == []
 
 
 @pytest.mark.slow
@@ -303,7 +311,10 @@ def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
     for views_per_shard in (4, 1):
         arguments = [*command, f"views_per_shard={views_per_shard}"]
         subprocess.run(arguments, cwd=tmp_path, capture_output=True, check=True)
-        assert len([*tmp_path.glob("work/theirs/LFPlane/render/*-?.json")]) == 4 / views_per_shard
+        assert (
+            len([*tmp_path.glob("work/receipts/theirs/LFPlane/render/*-?.jsonl")])
+            == 4 / views_per_shard
+        )
         listings = json.loads((tmp_path / "listings.json").read_text())
         roots = ("results", "work")
         own_listings = {

@@ -1,7 +1,6 @@
 """The corpus of a family: its split, its statistics, its page, its shards, and its sums."""
 
 import json
-import os
 import shutil
 import subprocess
 import tarfile
@@ -13,21 +12,24 @@ import pytest
 from faults import CORPUS_KINDS, FAULTS, spoil
 
 from lightfield.configuration.corpus import Shares
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.report import status
 from lightfield.stages.family import Corpus, CorpusSettings
-from lightfield.validation.corpus_integrity import corpus_faults
+from lightfield.validation.verification import faults
 
 CAUSE = "models/broken.glb: is empty; must be a model"
 
 
-def make(folder, cache=None, **settings):
+def make(folder, cache=None, receipt=None, **settings):
     settings = CorpusSettings(family="chairs", **settings)
     cache = cache or folder.parent / "looks.json"
-    return Corpus(settings=settings, folder=folder, cache=cache).run()
+    job = Corpus(settings=settings, folder=folder, cache=cache, receipt=receipt)
+    job.note_settings(settings.as_json())
+    return job.run()
 
 
 def files(folder):
@@ -196,6 +198,22 @@ def test_a_damaged_thumbnail_or_cache_is_made_again(family):
     assert files(family) == before
 
 
+@pytest.mark.parametrize("with_receipt_before", [False, True])
+def test_a_receipt_has_all_files_of_a_corpus_also_if_they_are_kept(
+    family, monkeypatch, with_receipt_before
+):
+    monkeypatch.chdir(family.parent)
+    path = Path("work/receipts/chairs/corpus.jsonl")
+    make(Path("chairs"), Path("looks.json"), path if with_receipt_before else None)
+    make(Path("chairs"), Path("looks.json"), path, splits={"test": 0.5})
+    made = {name for name in receipts.read(path).outputs if name.startswith("chairs/")}
+    assert made == {f"chairs/{name}" for name in files(Path("chairs")) if not in_member(name)}
+
+
+def in_member(name):
+    return name.endswith("member.json") or "/plane/" in name
+
+
 def test_a_cached_member_is_not_read_again(family):
     make(family)
     before = files(family)
@@ -263,7 +281,7 @@ def test_without_shards_there_are_none(built, tmp_path):
     folder = shutil.copytree(built, tmp_path / "chairs")
     make(folder)
     assert not [*folder.glob("shards/*/*")]
-    assert not [*corpus_faults(folder)]
+    assert faults(folder) == {}
 
 
 def test_two_members_with_the_same_key_in_shards_are_named(family):
@@ -273,38 +291,6 @@ def test_two_members_with_the_same_key_in_shards_are_named(family):
         path.write_text(json.dumps(read_json(path) | {"name": name}))
     with pytest.raises(UserError, match="rename the member"):
         make(family, shards=True, splits={"validation": 0, "test": 0})
-
-
-# ---- without a shared folder --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("shards", [False, True])
-def test_members_in_a_storage_become_the_same_corpus(members, tmp_path, monkeypatch, shards):
-    names = sorted(path.parent.name for path in members.glob("*/member.json"))
-    expected = shutil.copytree(members, tmp_path / "shared/results/chairs")
-    make(expected, members=names, shards=shards)
-    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
-    folder = Path("results/chairs")
-    make(folder, members=names, shards=shards)
-    made = ("corpus.json", "index.html", "sha256sums.txt")
-    assert [(folder / name).read_bytes() for name in made] == [
-        (expected / name).read_bytes() for name in made
-    ]
-    # Snakemake stores the files that are outputs, and the program all others.
-    sent = {*files(expected)} - {*files(members)} - {*made}
-    assert sent <= files(stored).keys()
-
-
-def test_a_view_that_the_storage_lacks_is_named(members, tmp_path, monkeypatch):
-    stored = shutil.copytree(members, tmp_path / "storage/results/chairs")
-    (stored / "0003/plane/exr/view_0001f.exr").unlink()
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PLENOFORGE_STORE", str(tmp_path / "storage"))
-    with pytest.raises(UserError, match=r"0003/plane/exr/view_0001f\.exr: is missing"):
-        make(Path("results/chairs"), members=["0003"])
 
 
 # ---- sums ------------------------------------------------------------------------------------
@@ -322,7 +308,7 @@ def test_the_sums_hold_and_cover_everything(built):
         for line in path.read_text().splitlines()
     }
     assert listed | beneath | {"sha256sums.txt"} == files(built).keys()
-    assert not [*corpus_faults(built)]
+    assert faults(built) == {}
 
 
 # Root may read a file without permissions. See `promises/test_damage.py` for these.
@@ -330,9 +316,8 @@ def test_the_sums_hold_and_cover_everything(built):
 @pytest.mark.parametrize("kind", CORPUS_KINDS)
 def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, fault):
     folder = shutil.copytree(built, tmp_path / "chairs")
-    damaged = {folder / name for name in spoil(folder, kind, fault)}
-    named = {folder / os.path.relpath(each.path, folder) for each in corpus_faults(folder)}
-    assert named == damaged
+    damaged = {str(folder / name) for name in spoil(folder, kind, fault)}
+    assert faults(folder).keys() == damaged
 
 
 @pytest.mark.parametrize("fault", ["emptied", "cut short", "deleted", "a folder"])
@@ -349,7 +334,7 @@ def test_a_damaged_shard_and_a_foreign_one_are_found(built, tmp_path):
     first.write_bytes(first.read_bytes()[:-1])
     foreign = first.with_name("foreign.tar")
     foreign.write_bytes(b"foreign")
-    assert {each.path for each in corpus_faults(folder)} == {first, foreign}
+    assert faults(folder).keys() == {str(first), str(foreign)}
 
 
 def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
@@ -357,11 +342,9 @@ def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
     sums = folder / "sha256sums.txt"
     lines = sums.read_text().splitlines(keepends=True)
     sums.write_text("".join(line for line in lines if "0002/plane" not in line))
-    (fault,) = corpus_faults(folder)
-    assert fault.path == folder / "0002/plane/sha256sums.txt"
+    assert faults(folder).keys() == {str(folder / "0002/plane/sha256sums.txt")}
     sums.unlink()
-    (fault,) = corpus_faults(folder)
-    assert fault.path == sums
+    assert faults(folder).keys() == {str(sums)}
 
 
 def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, tmp_path):

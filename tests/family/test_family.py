@@ -1,7 +1,8 @@
 """Families: names, values and batches of their members, and what a run makes of failures."""
 
+import contextlib
+import itertools
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,15 +12,20 @@ import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 
-from lightfield.configuration.family import Family, Member, drawn, member_content, outdated_members
+from lightfield.configuration.family import Family, Member, drawn, member_content
 from lightfield.configuration.scene_yaml import check_member
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import size_and_time
+from lightfield.core.files import read_json, write_json
+from lightfield.family import batch as family_batch
 from lightfield.family.batch import deadly_member, member_at_hand
+from lightfield.family.member import MemberBuild
 from lightfield.imaging.images import write_png
 from lightfield.stages.checks import Validate
-from lightfield.stages.family import BatchSettings
+from lightfield.stages.family import BatchSettings, BuildMembers
+from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import RenderShard
+from lightfield.workflow.check import JobCheck
 
 ROOT = Path(__file__).parents[2]
 
@@ -159,57 +165,11 @@ def test_a_wrong_value_of_a_member_names_the_member_and_the_key():
         check_member(content, "rooms.yaml: member 0007")
 
 
-def record_of(folder, sources):
-    member = folder / "results/0000"
-    (member / "LF").mkdir(parents=True)
-    (member / "member.json").touch()
-    (member / "LF/sha256sums.txt").touch()
-    failed = folder / "results/0001"
-    failed.mkdir()
-    (failed / "member.json").touch()
-    members = {
-        "0000": {"state": "valid", "datasets": {"LF": {"split": None}}},
-        "0001": {"state": "failed"},
-    }
-    path = folder / "record.json"
-    path.write_text(json.dumps({"members": members, "sources": sources}))
-    return path
-
-
-@pytest.mark.parametrize("name", ["0000/member.json", "0000/LF/sha256sums.txt", "0001/member.json"])
-def test_a_missing_file_of_a_member_makes_its_batch_outdated(tmp_path, name):
-    record = record_of(tmp_path, {})
-    assert not outdated_members(record, tmp_path / "results")
-    (tmp_path / "results" / name).unlink()
-    assert outdated_members(record, tmp_path / "results")
-
-
-def test_a_changed_or_added_model_file_makes_its_batch_outdated(tmp_path):
-    model = tmp_path / "model.obj"
-    model.write_text("v 0 0 0")
-    status = model.stat()
-    texture = tmp_path / "texture.png"
-    sources = {str(model): [status.st_size, status.st_mtime_ns], str(texture): None}
-    record = record_of(tmp_path, sources)
-    assert not outdated_members(record, tmp_path / "results")
-    texture.touch()
-    assert outdated_members(record, tmp_path / "results")
-    texture.unlink()
-    os.utime(model, ns=(0, 0))
-    assert outdated_members(record, tmp_path / "results")
-
-
-def test_a_damaged_record_is_outdated(tmp_path):
-    record = record_of(tmp_path, {})
-    record.write_text("{")
-    assert outdated_members(record, tmp_path / "results")
-
-
 DIED = [{"started": 1}, {"member": "0001", "began": 2}, {"member": "0001", "finished": 3}]
 DIED += [{"member": "0002", "began": 3}]
 
 
-def test_the_journal_says_at_which_member_a_run_died():
+def test_the_history_says_at_which_member_a_run_died():
     assert member_at_hand(DIED) == "0002"
     assert member_at_hand(DIED[:3]) is None
     assert member_at_hand([*DIED, {"failed": "0002"}]) is None
@@ -227,18 +187,24 @@ def test_a_member_has_failed_when_three_runs_died_at_it_and_not_before():
 
 
 def count(folder, *states):
-    members = {
-        f"{number:04d}": {"state": state, "failure": {"stage": "render", "cause": "too dark"}}
-        for number, state in enumerate(states)
+    members = [{"name": f"{number:04d}", "state": state} for number, state in enumerate(states)]
+    failures = [
+        {"name": member["name"], "stage": "render", "cause": "too dark"}
+        for member in members
+        if member["state"] == "failed"
+    ]
+    write_json(folder / "corpus.json", {"members": members, "failures": failures})
+    write_json(folder / "settings.json", {"family": "rooms"})
+    paths = {
+        f"--{Path(name).stem}": folder / name
+        for name in ("settings.json", "corpus.json", "failed.txt")
     }
-    (folder / "record.json").write_text(json.dumps({"members": members}))
-    settings = {"family": "rooms", "records": [str(folder / "record.json")]}
-    (folder / "settings.json").write_text(json.dumps(settings))
-    paths = {name: str(folder / name) for name in ("settings.json", "failed.txt", "members.json")}
-    command = [forks.python(), ROOT / "scripts/count_members.py"]
-    command += ["--settings", paths["settings.json"], "--failed", paths["failed.txt"]]
+    command = [forks.python(), ROOT / "scripts/count_members.py", *itertools.chain(*paths.items())]
     return subprocess.run(
-        [*command, "--output", paths["members.json"]], capture_output=True, text=True, check=False
+        [*command, "--output", folder / "members.json"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
@@ -282,18 +248,20 @@ def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(
     (folder / "models").mkdir()
     (folder / "models/face.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
 
-    def batch_settings():
+    def planned_settings():
+        # A plan writes only settings that are missing.
+        shutil.rmtree(folder / "work", ignore_errors=True)
         choice = ("--config", f"scenes=[{','.join(scenes)}]", "rigs=all", "preset=full")
         plan = snakemake(folder, "--dry-run", *choice)
         assert plan.returncode == 0, plan.stderr
         files = {name: folder.glob(f"work/{name}/settings/batches/*.json") for name in scenes}
         return {name: [path.read_text() for path in files[name]] for name in scenes}
 
-    before = batch_settings()
+    before = planned_settings()
     assert all(before.values())
     text = folder / "scripts/lightfield/configuration/keys.py"
     text.write_text(text.read_text().replace('"softboxes": ', '"softboxes": 1000'))
-    after = batch_settings()
+    after = planned_settings()
     assert [name for name in scenes if before[name] != after[name]] == ["boxes", "drawn"]
 
 
@@ -322,27 +290,7 @@ def face(tmp_path):
 
 
 def build_of(settings):
-    from lightfield.family.member import MemberBuild
-
     return MemberBuild(settings, settings.members[0])
-
-
-@pytest.mark.slow
-def test_a_texture_that_was_missing_makes_its_batch_outdated(face, tmp_path, run_program):
-    (tmp_path / "face.obj").write_text(f"mtllib face.mtl\nusemtl red\n{FACE}")
-    (tmp_path / "face.mtl").write_text("newmtl red\nmap_Kd red.png\n")
-    (tmp_path / "settings.json").write_text(json.dumps(face().as_json()))
-    record = tmp_path / "work/faces/batches/models.json"
-    arguments = ("--settings", tmp_path / "settings.json", "--record", record, "--device", "cpu")
-    run_program("build_members.py", *arguments)
-    member = json.loads(record.read_text())["members"]["face"]
-    assert member["state"] == "failed" and "red.png" in member["failure"]["cause"]
-    assert not outdated_members(record, tmp_path / "results/faces")
-    write_png(tmp_path / "red.png", np.zeros((4, 4, 3), np.uint8))
-    assert outdated_members(record, tmp_path / "results/faces")
-    run_program("build_members.py", *arguments)
-    assert json.loads(record.read_text())["members"]["face"]["state"] == "valid"
-    assert not outdated_members(record, tmp_path / "results/faces")
 
 
 @pytest.mark.slow
@@ -358,11 +306,8 @@ def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, mo
     build = build_of(face())
     assert build.build("cpu", 1)["state"] == "valid"
     assert not build.is_finished()
-    # The batch's record must have the time of the content that was read.
-    assert build.source_stamps()[str(path)] != size_and_time(path)
     path.write_text(FACE)
     assert build.is_finished()
-    assert build.source_stamps()[str(path)] == size_and_time(path)
 
 
 @pytest.mark.slow
@@ -384,25 +329,27 @@ def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_pa
 
 
 @pytest.mark.slow
-def test_members_are_kept_without_their_folder_of_work(face, tmp_path):
+def test_views_of_members_are_kept_without_their_folder_of_work(face, tmp_path):
+    """So are the views of members that a version before receipts has built."""
     build = build_of(face())
     assert build.build("cpu", 1)["state"] == "valid"
+    assert rendered_views(build) == ["view_0000f", "view_0001f"]
+    before = files_of(build.folder)
     shutil.rmtree(tmp_path / "work")
-    assert build.is_finished()
-    assert list(build.source_stamps()) == [str(tmp_path / "face.obj")]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("damage", ["{}", None])
-def test_a_member_with_a_damaged_splits_json_is_built_again(face, tmp_path, damage):
-    build = build_of(face(split={"test": ["view_0001f"]}))
-    assert build.build("cpu", 1)["state"] == "valid"
-    assert build.is_finished()
-    splits = tmp_path / "results/faces/face/splits.json"
-    splits.unlink()
-    if damage:
-        splits.write_text(damage)
     assert not build.is_finished()
+    assert build.build("cpu", 1)["state"] == "valid"
+    assert rendered_views(build) == []
+    assert files_of(build.folder) == before
+    assert build.is_finished()
+
+
+def rendered_views(build):
+    """Return the views that processes have rendered of a member, by its receipt."""
+    return [line["view"] for line in receipts.history(build.receipt) if "render_seconds" in line]
+
+
+def files_of(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
@@ -412,6 +359,178 @@ def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
     (tmp_path / "disk/mine.txt").write_text("mine")
     (build.folder / "ring").symlink_to(tmp_path / "disk")
     (build.folder / "half").mkdir()
-    assert build.fail("render", "out of memory")["state"] == "failed"
+    build.note_death("out of memory")
+    record = read_json(build.record)
+    assert record["state"] == "failed"
+    assert record["failure"]["cause"] == "out of memory"
     assert [path.name for path in build.folder.iterdir()] == ["member.json"]
     assert (tmp_path / "disk/mine.txt").read_text() == "mine"
+
+
+# ---- batches, as a run finds them --------------------------------------------------------------
+
+BATCH = Path("work/receipts/faces/batches/models.jsonl")
+RED = f"mtllib face.mtl\nusemtl red\n{FACE}"
+
+
+def batch_settings(samples=1, **split):
+    """Return the settings of a family of two models, a face and a side."""
+    return BatchSettings(
+        family="faces",
+        scene={"scene": {}, "render": {"samples": samples}, "rigs": {"ring": RING | split}},
+        members=[Member(name=name, model=f"{name}.obj") for name in ("face", "side")],
+    )
+
+
+@pytest.fixture(scope="module")
+def run_batch(run_program):
+    """Return a function that runs the job of a batch in the present folder."""
+
+    def run(settings):
+        write_json(Path("settings.json"), settings.as_json())
+        run_program("build_members.py", "--settings", "settings.json", "--receipt", BATCH)
+
+    return run
+
+
+def verdict(settings):
+    """Return what the check before a plan finds about the batch."""
+    check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+    return check.verdict(str(BATCH), settings.as_json())
+
+
+def begun():
+    return [line["member"] for line in receipts.history(BATCH) if "began" in line]
+
+
+SPLIT = {"split": {"test": ["view_0001f"]}}
+
+
+@pytest.fixture(scope="module")
+def finished_batch(tmp_path_factory, run_batch):
+    """A finished batch of two members."""
+    folder = tmp_path_factory.mktemp("batch")
+    with contextlib.chdir(folder):
+        Path("face.obj").write_text(FACE)
+        Path("side.obj").write_text(FACE.replace("0 0 1", "0 1 1"))
+        run_batch(batch_settings(**SPLIT))
+    return folder
+
+
+@pytest.fixture
+def batch(finished_batch, tmp_path, monkeypatch):
+    """A copy of the batch, as the present folder. Returns its settings."""
+    shutil.copytree(finished_batch, tmp_path / "batch")
+    monkeypatch.chdir(tmp_path / "batch")
+    assert verdict(batch_settings(**SPLIT)).is_fine
+    return batch_settings(**SPLIT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "damage"), [("member.json", "{}"), ("splits.json", None), ("ring/sha256sums.txt", "")]
+)
+def test_a_plan_finds_a_damaged_member_and_its_batch_mends_it_alone(run_batch, batch, name, damage):
+    path = Path("results/faces/face", name)
+    before = files_of(Path("results"))
+    times = {each: each.stat().st_mtime_ns for each in before if "side" in each.parts}
+    views = receipts.read(Path("work/receipts/faces/face/member.jsonl")).history
+    path.unlink()
+    if damage is not None:
+        path.write_text(damage)
+    assert verdict(batch).damaged == [str(path)]
+    run_batch(batch)
+    assert verdict(batch).is_fine
+    assert begun() == ["face", "side", "face"]
+    assert files_of(Path("results")) == before
+    assert {each: each.stat().st_mtime_ns for each in times} == times
+    history = receipts.read(Path("work/receipts/faces/face/member.jsonl")).history
+    assert not [line for line in history[len(views) :] if "render_seconds" in line]
+
+
+@pytest.mark.slow
+def test_a_damaged_view_is_mended_when_its_batch_runs(run_batch, batch):
+    view = Path("results/faces/side/ring/exr/view_0000f.exr")
+    content = view.read_bytes()
+    view.write_bytes(content[:-1])
+    # A plan looks at a few files of each member alone.
+    assert verdict(batch).is_fine
+    run_batch(batch)
+    assert begun() == ["face", "side", "side"]
+    assert view.read_bytes() == content
+
+
+@pytest.mark.slow
+def test_a_changed_model_builds_its_member_again(run_batch, batch):
+    Path("side.obj").write_text(FACE.replace("0 0 1", "0 2 1"))
+    assert verdict(batch).outdated == ["side.obj"]
+    run_batch(batch)
+    assert begun() == ["face", "side", "side"]
+    assert verdict(batch).is_fine
+
+
+@pytest.mark.slow
+def test_changed_poses_build_the_members_again(run_batch, batch):
+    Path("poses.csv").write_text("name,x,y,z,rx,ry,rz\na,0,-3,0,1.5,0,0\n")
+    rig = {"type": "poses", "file": "poses.csv", "camera": RING["camera"]}
+    posed = batch.model_copy(update={"scene": batch.scene | {"rigs": {"ring": rig}}})
+    run_batch(posed)
+    assert read_json(Path("results/faces/face/member.json"))["state"] == "valid"
+    assert verdict(posed).is_fine
+    Path("poses.csv").write_text("name,x,y,z,rx,ry,rz\na,0,-4,0,1.5,0,0\n")
+    assert verdict(posed).outdated == ["poses.csv"]
+
+
+@pytest.mark.slow
+def test_a_new_description_builds_no_member_again(run_batch, batch):
+    described = batch.model_copy(update={"scene": batch.scene | {"description": "Two faces."}})
+    assert verdict(described).outdated == ["setting scene"]
+    run_batch(described)
+    assert begun() == ["face", "side"]
+    run_batch(batch_settings(samples=2, **SPLIT))
+    assert begun() == ["face", "side", "face", "side"]
+
+
+@pytest.mark.slow
+def test_a_missing_texture_and_later_its_file_make_a_batch_outdated(run_batch, batch):
+    Path("face.obj").write_text(RED)
+    Path("face.mtl").write_text("newmtl red\nmap_Kd red.png\n")
+    assert verdict(batch).outdated == ["face.obj"]
+    run_batch(batch)
+    member = read_json(Path("results/faces/face/member.json"))
+    assert member["state"] == "failed"
+    assert "red.png" in member["failure"]["cause"]
+    assert verdict(batch).is_fine
+    write_png(Path("red.png"), np.zeros((4, 4, 3), np.uint8))
+    assert verdict(batch).outdated == ["red.png"]
+    run_batch(batch)
+    assert read_json(Path("results/faces/face/member.json"))["state"] == "valid"
+    assert verdict(batch).is_fine
+
+
+@pytest.mark.slow
+def test_a_failed_member_is_tried_again_whenever_its_batch_starts(run_batch, batch):
+    Path("face.obj").write_text("nothing")
+    run_batch(batch)
+    assert verdict(batch).is_fine
+    run_batch(batch)
+    assert begun() == ["face", "side", "face", "face"]
+
+
+@pytest.mark.slow
+def test_a_model_that_changes_while_its_batch_runs_is_named(run_batch, batch, monkeypatch):
+    """The batch is then not finished: the next run builds the member again."""
+    Path("face.obj").write_text(FACE.replace("1 0 0", "2 0 0"))
+
+    def build_and_change(job, *_):
+        for member in job.settings.members:
+            MemberBuild(job.settings, member).build("cpu", 1)
+        Path("face.obj").write_text(FACE.replace("1 0 0", "3 0 0"))
+        return 0
+
+    monkeypatch.setattr(family_batch, "_work", build_and_change)
+    with pytest.raises(UserError, match=r"^face\.obj: has changed since face was built"):
+        BuildMembers(settings=batch, receipt=BATCH).run()
+    assert verdict(batch).outdated == ["face.obj"]
+    run_batch(batch)
+    assert verdict(batch).is_fine

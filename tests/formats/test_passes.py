@@ -16,8 +16,10 @@ from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.configuration.scene_yaml import Scene
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
+from lightfield.core.receipts import made_in
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
@@ -33,6 +35,11 @@ def made(tmp_path_factory, run_program):
     folder = tmp_path_factory.mktemp("passes")
     run_program(BLENDER / "pass_views.py", folder)
     return folder
+
+
+def noted(made, name):
+    """Return the files in the receipt of a dataset, by their paths in it."""
+    return made_in(made / name, [made / f"receipts/{name}.jsonl"], None)
 
 
 def read(folder, name, view="view_0000f"):
@@ -297,14 +304,14 @@ def test_transparent_views_have_alpha_in_place_of_the_world(made):
 
 
 def test_a_view_without_one_of_its_files_is_rendered_again(made):
-    lines = map(json.loads, (made / "perspective.jsonl").read_text().splitlines())
-    rendered = [line["view"] for line in lines if "view" in line]
+    receipt = receipts.read(made / "receipts/perspective.jsonl")
+    rendered = [line["view"] for line in receipt.history if "view" in line]
     assert rendered == ["view_0000f", "view_0001f", "view_0001f"]
     assert set(read_json(made / "again.json").values()) == {True}
-    files = read_json(made / "perspective.json")["files"]
-    assert len(files) == 2 * (1 + len(PASSES)) + 3
-    for name, entry in files.items():
-        assert entry["sha256"] == sha256(made / "perspective" / name)
+    files = noted(made, "perspective")
+    assert len(files) == len(receipt.outputs) == 2 * (1 + len(PASSES)) + 3
+    for name, output in files.items():
+        assert output.stamp.sha256 == sha256(made / "perspective" / name)
 
 
 def shard_arguments(made, folder, views, threads):
@@ -322,16 +329,14 @@ def shard_arguments(made, folder, views, threads):
         str(threads),
         "--output",
         folder / "dataset/exr",
-        "--record",
-        folder / f"{views}.json",
-        "--journal",
-        folder / f"{views}.jsonl",
+        "--receipt",
+        folder / f"receipts/{views.replace(':', '-')}.jsonl",
     ]
 
 
 def test_kills_threads_and_shards_change_no_byte(made, tmp_path, run_program):
     killed, parts = tmp_path / "killed", tmp_path / "parts"
-    whole = shard_arguments(made, killed, ":", 1)
+    whole = shard_arguments(made, killed, "0:2", 1)
     # A fork would live on for a moment after its client is killed.
     command = [sys.executable, SCRIPTS / "render_shard.py", *whole]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
@@ -344,7 +349,7 @@ def test_kills_threads_and_shards_change_no_byte(made, tmp_path, run_program):
     run_program("render_shard.py", *whole)
     for views in ("0:1", "1:2"):
         run_program("render_shard.py", *shard_arguments(made, parts, views, 2))
-    names = [*read_json(made / "perspective.json")["files"]]
+    names = [*noted(made, "perspective")]
     for folder in (killed, parts):
         _, wrong, errors = filecmp.cmpfiles(made / "perspective", folder / "dataset", names, False)
         assert (wrong, errors) == ([], [])
@@ -399,14 +404,14 @@ def test_validation_checks_each_pass(what, made, tmp_path):
     shutil.copytree(made / "perspective", folder)
     spoil, problem = SPOILED[what]
     spoil(folder)
-    result = validate(folder, records=[made / "perspective.json"])
+    result = validate(folder, made=noted(made, "perspective"))
     checks = {check.name: check for check in result.checks}
     assert checks["passes"].problems == ([problem] if problem else [])
     assert checks["checksums"].passed is (problem is None)
     assert checks["files"].passed
     if not problem:
         assert result.valid and set(result.checksums) == {
-            *read_json(made / "perspective.json")["files"],
+            *noted(made, "perspective"),
             "lightfield.json",
         }
 
@@ -417,13 +422,14 @@ def test_reprojected_passes_keep_their_meaning(made, tmp_path, reproject_dataset
     source, target = made / "fisheye", tmp_path / "perspective"
     settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
     settings |= {"formats": ["exr"], "passes": names}
-    records = ("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json")
-    reproject_dataset(source, target, settings, *records)
+    receipt = tmp_path / "receipts/0-2.jsonl"
+    sources = ("--source-receipt", made / "receipts/fisheye.jsonl")
+    reproject_dataset(source, target, settings, *sources, "--receipt", receipt)
     content = LightField.read(target / "lightfield.json")
     assert [render_pass.name for render_pass in content.passes] == names
-    files = read_json(tmp_path / "record.json")["files"]
-    assert len(files) == 2 * (1 + len(names))
-    assert "perspective/normal/view_0000f.exr" in files
+    files = made_in(target, [receipt], None)
+    assert len(files) == 2 * (1 + len(names)) + 1
+    assert {"normal/view_0000f.exr", "lightfield.json"} < set(files)
     numbers = read_json(source / "object" / "names.json")
     ids, truth = (read(folder, "object")[..., 0] for folder in (target, made / "perspective"))
     assert set(np.unique(ids)) <= set(np.unique(read(source, "object")))

@@ -1,18 +1,20 @@
-"""The costs of a dataset: added up from journals and TSVs, and extrapolated to the full one."""
+"""The costs of a dataset: added up from receipts and TSVs, and extrapolated to the full one."""
 
 import json
 import math
 import re
 import statistics
 
+import bookkeeping
 import numpy as np
 import psutil
 import pytest
 
+from lightfield.core import receipts
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.measurement import costs
-from lightfield.workflow import journal
+from lightfield.workflow import history
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 POWER = {"watts": 100, "cores": 4}
@@ -68,7 +70,7 @@ RESUMED = [
 
 @pytest.fixture
 def dataset(tmp_path, run_program):
-    """A dataset of three views of 8 × 4 pixels with the journals and TSVs of its jobs."""
+    """A dataset of three views of 8 × 4 pixels with the receipts and TSVs of its jobs."""
     folder, work = tmp_path / "results", tmp_path / "work"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [8, 4]})
     render = {"samples": 2, "denoise": False}
@@ -82,7 +84,7 @@ def dataset(tmp_path, run_program):
         # The job was too short for Snakemake to measure it.
         "rig/flat/0-3.tsv": "0.4\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\tNA\tNA",
         "rig/flat/lens_map.tsv": "2.0\t0:00:02\t50.0\t0\t0\t0\t0\t0\t50\t1.0",
-        # This TSV has the last run alone, so it does not count. The journal has both runs.
+        # This TSV has the last run alone, so it does not count. The receipt has both runs.
         "rig/render/0-3.tsv": "21.0\t0:00:21\t700.0\t0\t0\t0\t0\t0\t50\t19.0",
     }.items():
         (work / path).parent.mkdir(parents=True, exist_ok=True)
@@ -92,11 +94,10 @@ def dataset(tmp_path, run_program):
         views = [View.placed(name, np.eye(4)) for name in names]
         content = {**lens.to_lightfield(), "render": render}
         LightField(content, views).write(folder / "lightfield.json")
-        journals = work / "journals"
-        journals.mkdir(exist_ok=True)
+        folder_of_receipts = work / "receipts/rig/render"
         # This copy by the user belongs to no shard.
-        (journals / "kept.journal.jsonl").write_text("{}\n")
-        (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
+        for name in ("kept", "0-3"):
+            bookkeeping.note_shard(folder_of_receipts / f"{name}.jsonl", {}, lines)
         arguments = []
         if inventory:
             (work / "inventory.json").write_text(json.dumps(inventory))
@@ -107,8 +108,8 @@ def dataset(tmp_path, run_program):
             "costs.py",
             "--dataset",
             folder,
-            "--journals",
-            journals,
+            "--receipts",
+            folder_of_receipts,
             "--benchmarks",
             work / "rig",
             "--scene-benchmarks",
@@ -215,7 +216,7 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
 
 
 def test_views_of_earlier_settings_do_not_tell_the_cost_of_the_full_dataset(dataset):
-    """The rig once had ten views of fewer samples. Their journal stays."""
+    """The rig once had ten views of fewer samples. Their history stays."""
     of_dataset = [*start(2000.0), *(view(n, 2010.0, 6.0, traced=5.0, cpu=6.0) for n in "abc")]
     expected = dataset(*of_dataset)["extrapolation"]
     earlier = [view(n, 1010.0, 1.5, traced=0.5, cpu=1.5) for n in "abcdefghij"]
@@ -278,13 +279,13 @@ def test_the_full_dataset_defaults_to_the_samples_of_the_blend(dataset):
 def test_other_programs_do_not_count_as_path_tracing():
     # Other programs used the machine too: of 20 s of wall time the process had 10, on one thread.
     lines = [*start(0.0), view("a", 20.0, wall=20.0, traced=16.0, cpu=10.0)]
-    part = journal.Run(lines[0] | lines[1], [lines[2]])
+    part = history.Run(lines[0] | lines[1], [lines[2]])
     (rendering,) = costs.renderings(part)
     assert rendering.path_tracing == pytest.approx(8.0)
     assert rendering.rest == pytest.approx(2.0)
 
 
-def test_views_without_journals_have_no_known_cost(dataset):
+def test_views_without_history_have_no_known_cost(dataset):
     costs_content = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
     assert costs_content["extrapolation"] is None
     assert costs_content["shards"][0]["views_rendered"] == 0
@@ -301,18 +302,21 @@ def test_denoising_counts_as_three_samples(dataset):
 
 
 def test_a_line_that_a_kill_cut_short_is_left_out(tmp_path):
-    file = tmp_path / "0-3.journal.jsonl"
+    file = tmp_path / "0-3.part"
     file.write_text("\n".join(map(json.dumps, KILLED)) + '\n{"view": "c", "fin')
-    (part,) = journal.read(file)
+    (part,) = history.read(file.with_suffix(".jsonl"))
     assert [line["view"] for line in part.views] == ["a", "b"]
     assert part.end is None
 
 
 def test_a_processs_peak_memory_is_in_bytes(tmp_path):
-    file = tmp_path / "0-1.journal.jsonl"
-    log = journal.Journal(file)
-    now = psutil.Process().memory_info().rss
-    log.end()
-    (run,) = journal.read(file)
+    file = tmp_path / "receipts/0-1.jsonl"
+    header = {"stage": "render_shard", "version": None, "settings": {}}
+    with receipts.opened(file, header, []) as receipt:
+        log = history.History()
+        now = psutil.Process().memory_info().rss
+        log.end()
+        receipt.seal()
+    (run,) = history.read(file)
     # The system's figure lags a little. A peak is never below the memory in use now.
     assert 0.9 * now < run.peak_memory_bytes < psutil.virtual_memory().total

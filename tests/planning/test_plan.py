@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,8 @@ import pytest
 from checkouts import checkout, planned
 
 from lightfield.configuration.config_file import Energy
-from lightfield.configuration.dataset import Cluster
+from lightfield.configuration.dataset import Cluster, shard_bounds
+from lightfield.core import receipts
 from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
@@ -17,8 +19,8 @@ from lightfield.measurement import plan
 from lightfield.planning.cost import ProbedViews, cost, read_probe
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Probe, ProbeSettings
-from lightfield.workflow import shard_counts
-from lightfield.workflow.journal import Journal
+from lightfield.workflow import shard_log
+from lightfield.workflow.history import History
 from lightfield.workflow.loading import scene_datasets
 
 SILVR = ("garden", "lone_monk", "barbershop")
@@ -110,20 +112,32 @@ def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
         assert ten_views.disk_bytes == pytest.approx(1e8)
 
 
+def begin(work, dataset, shards):
+    """Leave unfinished receipts of shards, as a kill does."""
+    folder = Path(work, receipts.FOLDER, dataset, "render")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for first, end in shards:
+        # What is in them does not matter.
+        (folder / f"{first}-{end}{receipts.PART_SUFFIX}").write_text("{")
+
+
 def test_a_dataset_in_progress_keeps_its_shards(sphere):
-    shard_counts.note(sphere.work_root, {sphere.name: (642, 400), "other/rig": (10, 3)})
     begun = replace(sphere, cluster=Cluster(jobs=100, cores=1000))
+    begin(sphere.work_root, "other/rig", [(0, 3), (3, 6), (6, 10)])
+    assert len(begun.shards) == 100
+    begun = replace(begun)
+    # A hundred jobs were at work.
+    begin(sphere.work_root, sphere.name, shard_bounds(642, 400)[:100])
     assert len(begun.shards) == 400
     assert begun.shards[0][0] == 0 and begun.shards[-1][1] == 642
     assert len(replace(begun, views_per_shard=321).shards) == 2
-    shard_counts.note(sphere.work_root, {sphere.name: (641, 400)})
-    assert len(replace(begun).shards) == 100
-    notes = Path(sphere.work_root, shard_counts.NAME)
-    # One digit differs at the same size, and one file is not JSON.
-    for damaged in (notes.read_text().replace("641", "642"), "{"):
-        notes.write_text(damaged)
+    # The rig had more views before, or these are no bounds.
+    for shards in ([(640, 650)], [(3, 1)], [(4, 4)], [("a", "b")]):
+        begin(sphere.work_root, sphere.name, shards)
         assert len(replace(begun).shards) == 100
-    shard_counts.note(sphere.work_root, {sphere.name: (642, 7)})
+    # A shard of an earlier number was left.
+    begin(sphere.work_root, sphere.name, [(3, 4), *shard_bounds(642, 7)])
     assert len(replace(begun).shards) == 7
 
 
@@ -135,8 +149,9 @@ def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     arguments = (target, "--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
     cluster = ("--executor", "cluster-generic", "--cluster-generic-submit-cmd", "sh")
     # One core each for 20 minutes is less than a view takes.
-    assert planned(folder, "--jobs", "100", *cluster, *arguments)["render"] == 642
-    shard_counts.note(str(folder / "work"), {"garden/LFSphere_e100cm_d170cm": (642, 300)})
+    on_cluster = planned(folder, "--jobs", "100", *cluster, *arguments, "cluster_jobs=100")
+    assert on_cluster["render"] == 642
+    begin(folder / "work", "garden/LFSphere_e100cm_d170cm", shard_bounds(642, 300)[:100])
     assert planned(folder, *arguments)["render"] == 300
 
 
@@ -235,12 +250,12 @@ def test_a_probe_estimates_the_size_of_the_views(run_program, room, tmp_path):
 def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
     def render(job):
         job.output.mkdir()
-        log = Journal(job.journal)
-        log.append({"start_up_seconds": 1.0, "device": "CPU", "threads": 1})
+        History()
+        shard_log.log({"start_up_seconds": 1.0, "device": "CPU", "threads": 1})
         for view in LightField.read(job.lightfield).views:
             (job.output / f"{view.name}.exr").write_bytes(b"1000")
             seconds = dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 2.0)
-            log.append({"view": view.name, "finished": 3.0, **seconds})
+            shard_log.log({"view": view.name, "finished": 3.0, **seconds})
 
     monkeypatch.setattr(shard, "render", render)
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [128, 128]})

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from lightfield.planning.phases import KINDS
+
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "scripts" / "lightfield"
 PAGE = ROOT / "docs/explanation/architecture.md"
-PACKAGES = re.findall(r"^\| (\w+) \|", PAGE.read_text(), re.M)[1:]
+PACKAGES = re.findall(r"^\| (\w+) \|", PAGE.read_text().split("## Where to look")[0], re.M)[1:]
 
 
 def imported(file):
@@ -75,19 +77,17 @@ def test_reading_the_rules_imports_nothing_heavy():
 
 # The modules by which the workflow knows what is finished, outdated or damaged.
 MECHANISMS = [
-    "lightfield.workflow.ledger",
-    "lightfield.workflow.records",
-    "lightfield.workflow.presence",
-    "lightfield.workflow.journal",
-    "lightfield.workflow.shard_counts",
-    "lightfield.workflow.shard_files",
-    "lightfield.workflow.view_store",
+    "lightfield.core.receipts",
+    "lightfield.workflow.check",
+    "lightfield.workflow.history",
     "lightfield.workflow.member_record",
-    "lightfield.validation.integrity",
-    "lightfield.validation.corpus_integrity",
+    "lightfield.workflow.presence",
+    "lightfield.workflow.shard_counts",
+    "lightfield.workflow.shard_log",
+    "lightfield.validation.verification",
 ]
 # The names of their files.
-NOTES = re.compile(r"ledger\.txt|\.(sums|journal)\.jsonl|shards\.json|/checksums\.txt")
+NOTES = re.compile(r"work/receipts|\.part\b|\bcheck\.txt|\bsums\.json|\.sums\.jsonl")
 
 
 def test_promises_are_tested_without_the_mechanisms_that_keep_them():
@@ -123,17 +123,25 @@ def test_one_module_writes_times_and_sizes():
     assert {file for file in files if UNITS.search(file.read_text())} == WRITES_UNITS
 
 
+def test_each_job_with_a_receipt_has_a_phase_and_a_log_of_its_name():
+    rules = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
+    jobs = set(re.findall(r'receipt_of\(\s*"(.+?)"', rules))
+    assert jobs == set(KINDS)
+    assert jobs <= set(re.findall(r'log_of\(\s*"(.+?)"', rules))
+
+
 # Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 MODULES = r"\b(?:from|import) snakemake\b(?!\.utils import min_version)"
 INSIDE = re.compile(
     rf"(?!{PUBLIC})(?<!lightfield\.)\bworkflow\.\w+|__signature__|{MODULES}|\bhosted_repo\b|\brepo_path\b"
+    r"|getLogger|addHandler|addFilter"
 )
-# What has no public interface, with its reasons.
-MAY_REACH_INSIDE = {ROOT / "rules/internals.smk", ROOT / "workflow/Snakefile"}
+# Nothing public names the repository from which Snakemake has read a module.
+MAY_REACH_INSIDE = {ROOT / "workflow/Snakefile"}
 
 
-def test_only_two_files_reach_inside_snakemake():
+def test_only_the_module_for_the_catalog_reaches_inside_snakemake():
     files = [*ROOT.glob("Snakefile"), *ROOT.glob("workflow/*"), *(ROOT / "rules").rglob("*.smk")]
     reaching = {file for file in files if INSIDE.search(file.read_text())}
     assert reaching == MAY_REACH_INSIDE

@@ -14,6 +14,7 @@ case "$1" in
 esac
 for word; do command=$word; done
 echo "$@" | grep -q "plenoforge.sif" || exit 1
+export APPTAINER_CONTAINER=plenoforge.sif
 PATH={image}:/usr/bin:/bin exec bash -c "$command"
 """
 PYTHON = """#!/bin/sh

@@ -161,7 +161,7 @@ def test_make_does_not_replace_the_environment_of_another_checkout(name, tmp_pat
     if name != ".venv":
         # The others are made by this one's Python.
         (tmp_path / ".venv").mkdir()
-        (tmp_path / ".venv/complete").touch()
+        (tmp_path / ".venv/packages").touch()
     other = tmp_path / "other"
     other.mkdir()
     (other / "installed").touch()

@@ -40,10 +40,10 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
         file.write("def obstacle(path): raise TypeError('mistaken')\n")
     (line,) = (n for n, text in enumerate(lines, 1) if "obstacle(Path(" in text)
     error = f'TypeError in file "{snakefile}", line {line}:\nmistaken'
-    assert error in snakemake(folder, "--dry-run").stdout
-    snakefile.write_text("\n".join(["assert GIVEN", *lines]))
+    assert error in snakemake(folder, "--dry-run").stderr
+    snakefile.write_text("\n".join(["assert GIVEN_KEYS", *lines]))
     error = f'NameError in file "{snakefile}", line 1:'
-    assert error in snakemake(folder, "--dry-run").stdout
+    assert error in snakemake(folder, "--dry-run").stderr
 
 
 WITH_BLENDER = """

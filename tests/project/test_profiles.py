@@ -104,6 +104,15 @@ def test_the_profiles_differ_only_in_their_executor():
     assert {key: slurm[key] for key in shared} == {key: generic[key] for key in shared}
 
 
+@pytest.mark.parametrize("profile", [*PROFILES, "kubernetes"])
+def test_the_build_knows_how_many_jobs_run_at_once_and_where_the_storage_is(profile):
+    keys = yaml.safe_load(
+        (ROOT / "profiles" / profile / settings(profile)["configfile"]).read_text()
+    )
+    assert keys["cluster_jobs"] == settings(profile)["jobs"]
+    assert keys.get("storage") == settings(profile).get("default-storage-prefix")
+
+
 def test_kubernetes_pods_share_a_volume_and_request_a_gpu_on_demand():
     kubernetes, slurm = settings("kubernetes"), settings("slurm")
     shared = {key for key in kubernetes.keys() & slurm.keys() if "default" not in key}
@@ -123,13 +132,29 @@ def test_the_submit_command_requests_all_four_resources():
 
 
 @pytest.mark.slow
-def test_nodes_without_a_shared_folder_are_refused_before_the_first_job(tmp_path):
-    run = snakemake(ROOT, "--directory", tmp_path, "--shared-fs-usage", "none", "--", "smoke")
+@pytest.mark.parametrize(
+    ("options", "keys", "expected"),
+    [
+        (
+            ["--default-storage-provider", "fs", "--default-storage-prefix", "STORE"],
+            [],
+            "add --config",
+        ),
+        ([], ["storage=STORE"], "add --default-storage-provider"),
+    ],
+)
+def test_a_storage_is_refused_unless_snakemake_and_the_configuration_have_it(
+    tmp_path, options, keys, expected
+):
+    def filled(words):
+        return [word.replace("STORE", str(tmp_path / "store")) for word in words]
+
+    config = ["--config", *filled(keys), "preset=tiny"]
+    run = snakemake(ROOT, "-n", "--directory", tmp_path, *filled(options), *config, "--", "smoke")
     assert run.returncode == 1
     assert "Traceback" not in run.stderr
     last = (run.stdout + run.stderr).splitlines()[-1]
-    assert last.startswith("error: shared-fs-usage: is without input-output")
-    assert "--default-storage-prefix" in last
+    assert last.startswith("error: storage: ") and expected in last
 
 
 @pytest.mark.parametrize(

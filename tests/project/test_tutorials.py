@@ -57,7 +57,9 @@ def folder(tmp_path_factory):
         (programs / name).symlink_to(forks.python().with_name(name))
     (programs / "activate").unlink()
     (programs / "activate").write_text(f"export PATH={programs}:$PATH\n")
-    (folder / ".venv/complete").touch()
+    # This order, so that make sets up nothing.
+    for stamp in ("packages", "complete"):
+        (folder / ".venv" / stamp).touch()
     return folder
 
 

@@ -29,6 +29,12 @@ module plenoforge:
 
 use rule * from plenoforge
 """
+# As config/README.md says.
+HANDLERS = """
+onstart: plenoforge.onstart()
+onsuccess: plenoforge.onsuccess()
+onerror: plenoforge.onerror()
+"""
 
 
 def test_the_catalog_finds_what_standardized_usage_needs():
@@ -73,7 +79,7 @@ def test_a_deployed_workflow_builds_datasets_with_the_programs_of_the_repository
 
     folder = tmp_path / "project"
     for name, text in {
-        "workflow/Snakefile": DEPLOYED,
+        "workflow/Snakefile": DEPLOYED + HANDLERS,
         "config/config.yaml": "scenes: [mine]\nrigs: all\npreset: full\n",
         "configs/scenes/mine.yaml": SCENE,
         "poses/mine.csv": "name,x,y,z,rx,ry,rz\none,0,0,1.3,1.6,0,0\n",

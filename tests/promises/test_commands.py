@@ -50,7 +50,8 @@ def test_new_times_alone_run_nothing(folder):
 
 def states(folder):
     """Return the time and the bytes of each file of a build. Each plan may write settings."""
-    paths = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
+    paths = {path for name in ("results", "work") for path in (folder / name).rglob("*")}
+    paths -= {folder / name for name in bookkeeping.OF_PLANS}
     return {
         path: (path.stat().st_mtime_ns, path.read_bytes())
         for path in paths

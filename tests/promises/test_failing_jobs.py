@@ -174,6 +174,7 @@ class Failing:
             *options,
             *CHOSEN,
             *config,
+            *(["cluster_jobs=1"] if "--executor" in options else []),
             "--force",
             *targets,
             work=work,

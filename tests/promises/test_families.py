@@ -77,7 +77,7 @@ def assert_two_members_failed(run, folder):
 def assert_a_plan_finds_damaged_records(folder, choice):
     """Damage what jobs have recorded of all members. Check that a plan names it."""
     fault_of_record = {
-        bookkeeping.batch("rooms", "seeds_0000_0031"): "a digit",
+        "results/rooms/0002/member.json": "a digit",
         "work/rooms/members.json": "cut short",
         "results/rooms/corpus.json": "a bit",
     }

@@ -12,12 +12,6 @@ from waiting import wait_until
 pytestmark = pytest.mark.slow
 
 
-def times_of_finished_files(folder):
-    """Return the time of each file that a finished job has made."""
-    files = {name for job in bookkeeping.noted(folder).values() for name in job.files}
-    return {name: (folder / name).stat().st_mtime_ns for name in files}
-
-
 @pytest.mark.usefixtures("in_forks")
 def test_after_a_kill_at_each_kind_of_file_the_next_run_goes_on(smoke, tmp_path):
     """Each run is killed as soon as a kind of file is there for the first time."""
@@ -33,12 +27,12 @@ def test_after_a_kill_at_each_kind_of_file_the_next_run_goes_on(smoke, tmp_path)
         run.wait()
         kills += 1
         expected = {kind: path for kind, path in expected.items() if not path.exists()}
-        finished |= times_of_finished_files(folder)
+        finished |= bookkeeping.times_of_making(folder)
     assert kills > 15
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
     assert_same_bytes(smoke, folder)
     assert max(bookkeeping.rendered(folder).values()) == 1
-    assert finished.items() <= times_of_finished_files(folder).items()
+    assert finished.items() <= bookkeeping.times_of_making(folder).items()
     plan = snakemake(folder, "--dry-run", "smoke")
     assert "Nothing to be done" in plan.stdout + plan.stderr

@@ -86,6 +86,6 @@ def test_as_a_module_of_the_users_own_workflow(folder):
     assert (code, "no fault in lightfields/mine/LFOwn" in said) == (0, True), said
     # The last message of a failure appears here too.
     (folder / "poses/mine.csv").write_text("name,x,y,z,rx,ry,rz\none,0,0,0,0,0,0\n")
-    code, said = snakemake("--cores", "1", cwd=folder)
+    code, said = snakemake("--cores", "1", "--logger", "plenoforge", cwd=folder)
     assert code == 1
     assert "\nplenoforge_check_cameras failed: error: lightfields/mine/LFOwn/lightfield.j" in said

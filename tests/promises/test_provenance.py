@@ -4,7 +4,6 @@ That metadata lies in .snakemake. A fresh clone beside an old build does not hav
 """
 
 import csv
-import json
 import os
 import shutil
 import subprocess
@@ -106,9 +105,13 @@ def test_every_file_that_a_job_reads_is_noted(smoke):
         for row in csv.DictReader(summary, delimiter="\t")
     }
     noted = bookkeeping.noted(smoke)
-    assert len(noted) > 30
-    for output, job in noted.items():
-        assert not read_by_snakemake[output] - job.inputs.keys() - {"-", ""}, output
+    assert len(noted.keys() & read_by_snakemake.keys()) > 100
+    # The summary has the declared outputs.
+    for output in noted.keys() & read_by_snakemake.keys():
+        job = noted[output]
+        read = read_by_snakemake[output] - {"-", ""}
+        unnoted = {name for name in read - job.inputs.keys() if bookkeeping.is_content(name)}
+        assert not unnoted, output
 
 
 def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
@@ -122,7 +125,7 @@ def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
 
 
 def test_damage_is_found_before_its_checksum_is_published(folder):
-    """After the plan a digit changes at the same size. It is found before checksums are made."""
+    """After the plan a digit changes at the same size. The job that reads the file refuses it."""
     dataset = folder / f"results/smoke/{CUBOID}"
     plan = ("--dry-run", "--forcerun", "validate", "--logger", "jobs", "--")
     planned_jobs = jobs_on(
@@ -133,8 +136,8 @@ def test_damage_is_found_before_its_checksum_is_published(folder):
     transforms.write_text(transforms.read_text().replace("0.", "1.", 1))
     path = f"{forks.python().parent}:{os.environ['PATH']}"
     command = ["bash", "-c", validate["command"]]
-    subprocess.run(command, cwd=folder, env=os.environ | {"PATH": path}, check=True)
-    result = json.loads((dataset / "validation.json").read_text())
-    (failed,) = [check for check in result["checks"] if check["name"] == "checksums"]
-    assert not result["valid"]
-    assert failed["problems"][0].startswith("perspective/transforms.json: has the sha256 ")
+    result = subprocess.run(command, cwd=folder, env=os.environ | {"PATH": path}, check=False)
+    assert result.returncode == 1
+    log = (folder / validate["log"][0]).read_text()
+    name = transforms.relative_to(folder)
+    assert log == f"error: {name}: is not as its job made it; the next run makes it again\n"

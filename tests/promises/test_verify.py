@@ -151,10 +151,10 @@ def test_repaired_files_are_planned_and_no_others(copy, run_program):
     picture = next(Path(second.paths.folder, "perspective").glob("*.png"))
     (lens_map,) = second.lens_maps("perspective")
     picture_of_report = f"{first.paths.folder}/report/rig.svg"
-    record = second.records("render")[0]
+    record = second.receipts("render")[0]
     spoilt = {
-        str(view): first.records("render")[0],
-        str(picture): second.records("perspective")[0],
+        str(view): first.receipts("render")[0],
+        str(picture): second.receipts("perspective")[0],
         lens_map: lens_map,
         picture_of_report: picture_of_report,
         record: record,
@@ -191,10 +191,10 @@ def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
     scene.unlink()
     scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
     planned = simulated.planned(Path(), "smoke")
-    assert {f"{second.paths.folder}/lightfield.json", *second.all_records} <= planned
+    assert {f"{second.paths.folder}/lightfield.json", *second.all_receipts} <= planned
     others = {name for name in planned if name.startswith((first.paths.folder, third.paths.folder))}
     # A page shows the scene YAML.
     assert others == {first.paths.page, third.paths.page}
     scene.write_text(text.replace("samples: 4", "samples: 2"))
     planned = simulated.planned(Path(), "smoke")
-    assert all({f"{d.paths.folder}/lightfield.json", *d.all_records} <= planned for d in copy)
+    assert all({f"{d.paths.folder}/lightfield.json", *d.all_receipts} <= planned for d in copy)

@@ -44,7 +44,8 @@ def failing(folder, *arguments):
 
 def files(folder):
     """Return the time of each file. A dry run must not change them."""
-    paths = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
+    paths = {path for name in ("results", "work") for path in (folder / name).rglob("*")}
+    paths -= {folder / name for name in bookkeeping.OF_PLANS}
     return {path: path.stat().st_mtime_ns for path in paths if path.is_file()}
 
 

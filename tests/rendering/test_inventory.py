@@ -9,9 +9,9 @@ import pytest
 from checkouts import checkout, planned
 from conftest import BLENDER
 
+from lightfield.core.bundles import VARIABLE
 from lightfield.core.files import sha256
 from lightfield.rendering import pruning
-from lightfield.workflow.view_store import VARIABLE
 
 NOTHING = {
     "hidden": [],

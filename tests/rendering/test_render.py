@@ -2,17 +2,22 @@
 
 import json
 from importlib.metadata import version
+from operator import itemgetter
+from pathlib import Path
 
+import bookkeeping
 import numpy as np
 import OpenEXR
 import pytest
 from conftest import BLENDER
 
+from lightfield.core import receipts
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard as shards
+from lightfield.workflow import history
 
 RENDER = {
     "samples": 1,
@@ -115,9 +120,13 @@ def shard(tmp_path, run_program, room):
     content = lightfield(camera, RENDER | {"samples": 2}, rig).to_json()
     file = tmp_path / "lightfield.json"
     file.write_text(json.dumps(content))
-    views, journal, record = tmp_path / "exr", tmp_path / "journal", tmp_path / "record.json"
+    folder = tmp_path / "receipts"
 
-    def render(*extra, **options):
+    def receipt(views=":"):
+        first, end = views.split(":")
+        return folder / f"{first or 0}-{end or 4}.jsonl"
+
+    def render(*extra, views=":", **options):
         return run_program(
             "render_shard.py",
             "--blend",
@@ -125,25 +134,32 @@ def shard(tmp_path, run_program, room):
             "--lightfield",
             file,
             "--output",
-            views,
+            tmp_path / "exr",
             "--device",
             "cpu",
             "--threads",
             "1",
-            "--journal",
-            journal,
-            "--record",
-            record,
+            "--views",
+            views,
+            "--receipt",
+            receipt(views),
             *extra,
             **options,
         )
 
-    def journalled():
-        lines = [json.loads(line) for line in journal.read_text().splitlines()]
-        return [line["view"] for line in lines if "view" in line]
+    def rendered():
+        """Return the names of the views in the order in which they were rendered."""
+        lines = [line for path in history.shards(folder) for line in receipts.history(path)]
+        renderings = [line for line in lines if "view" in line]
+        return [line["view"] for line in sorted(renderings, key=itemgetter("finished"))]
 
-    render.content, render.file, render.views = content, file, views
-    render.journalled, render.record = journalled, record
+    def noted(views=":"):
+        """Return the SHA-256 of each file in the receipt of a shard, by its name."""
+        made = receipts.read(receipt(views))
+        return {Path(path).name: output.stamp.sha256 for path, output in made.outputs.items()}
+
+    render.content, render.file, render.views = content, file, tmp_path / "exr"
+    render.rendered, render.receipt, render.noted = rendered, receipt, noted
     return render
 
 
@@ -152,25 +168,25 @@ def test_a_view_is_rendered_again_only_if_necessary(shard):
     shard()
     first = {path.name: sha256(path) for path in shard.views.iterdir()}
     assert sorted(first) == [f"{name}.exr" for name in names]
-    assert shard.journalled() == names
+    assert shard.rendered() == names
 
     shard()
-    assert shard.journalled() == names
+    assert shard.rendered() == names
 
     (shard.views / f"{names[1]}.exr").unlink()
     half = shard.views / f"{names[2]}.exr"
     half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
     shard()
-    assert shard.journalled() == [*names, names[1], names[2]]
+    assert shard.rendered() == [*names, names[1], names[2]]
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == first
 
     # Another number of samples makes another dataset.
     shard.content["render"]["samples"] = 3
     shard.file.write_text(json.dumps(shard.content))
-    shard("--views", "0:1")
-    assert shard.journalled()[-1] == names[0]
+    shard(views="0:1")
+    assert shard.rendered()[-1] == names[0]
     assert sha256(shard.views / f"{names[0]}.exr") != first[f"{names[0]}.exr"]
-    assert list(json.loads(shard.record.read_text())["files"]) == [f"exr/{names[0]}.exr"]
+    assert list(shard.noted("0:1")) == [f"{names[0]}.exr"]
 
 
 def test_damaged_views_are_rendered_again(shard):
@@ -187,35 +203,37 @@ def test_damaged_views_are_rendered_again(shard):
     content = bytearray(flipped.read_bytes())
     content[len(content) // 2] ^= 1
     flipped.write_bytes(content)
-    shard.record.unlink()
     shard()
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == made
-    assert shard.journalled() == [*names, *names[:3]]
-    files = json.loads(shard.record.read_text())["files"]
-    assert {f"exr/{name}": sha256(shard.views / name) for name in made} == {
-        name: file["sha256"] for name, file in files.items()
-    }
+    assert shard.rendered() == [*names, *names[:3]]
+    assert shard.noted() == made
 
 
 def test_a_view_without_a_logged_checksum_is_rendered_again(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
-    log = shard.record.with_name("record.sums.jsonl")
-    lines = log.read_text().splitlines(keepends=True)
-    assert len(lines) == len(names)
+    receipt = shard.receipt()
+    _, *lines = receipt.read_text().splitlines(keepends=True)
+    files = [line for line in lines if "file" in json.loads(line)]
+    assert len(files) == len(names)
+    history_lines = [line for line in lines if line not in files]
     # The kill came while the last line was being written.
-    log.write_text("".join(lines)[:-20])
+    part = receipt.with_suffix(receipts.PART_SUFFIX)
+    part.write_text("".join([*history_lines, *files])[:-20])
+    receipt.unlink()
     shard()
-    assert shard.journalled() == [*names, names[-1]]
+    assert shard.rendered() == [*names, names[-1]]
     shard()
-    assert shard.journalled() == [*names, names[-1]]
+    assert shard.rendered() == [*names, names[-1]]
 
 
 def test_shards_with_other_bounds_keep_finished_views(shard):
     names = [frame["name"] for frame in shard.content["frames"]]
     shard()
-    shard("--views", "1:3", "--record", shard.record.with_name("1-3.json"))
-    assert shard.journalled() == names
+    shard(views="1:3")
+    assert shard.rendered() == names
+    assert shard.noted("1:3").items() < shard.noted().items()
+    assert len(shard.noted("1:3")) == 2
 
 
 def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
@@ -224,12 +242,12 @@ def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
     for path in shard.views.iterdir():
         path.unlink()
     for views in ("3:4", "1:3", "0:1"):
-        shard("--views", views, "--threads", "2")
+        shard("--threads", "2", views=views)
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == together
 
 
 def test_views_of_another_bpy_are_rendered_again_and_reported(shard):
-    shard("--views", "0:2")
+    shard(views="0:2")
     first, second = sorted(shard.views.iterdir())
     right = sha256(first)
     image = images.read_image(first)
@@ -239,7 +257,8 @@ def test_views_of_another_bpy_are_rendered_again_and_reported(shard):
     image = images.read_image(second)
     others[images.BPY_ATTRIBUTE] = version("bpy")
     images.write_exr(second, image.channels, others)
-    lines = shard("--views", "0:2").stderr.splitlines()
+    bookkeeping.note_shard(shard.receipt("0:2"), dict.fromkeys((first, second), "another"))
+    lines = shard(views="0:2").stderr.splitlines()
     assert [line for line in lines if line.startswith("warning: ")] == [
         f"warning: views rendered by bpy 4.2.0, which bpy {version('bpy')} renders again: 1"
     ]
@@ -249,7 +268,7 @@ def test_views_of_another_bpy_are_rendered_again_and_reported(shard):
 def test_views_have_the_documented_content(shard):
     render = shard.content["render"] | {"compression": "htj2k", "depth_precision": "rounded"}
     shard.file.write_text(json.dumps(shard.content | {"render": render}))
-    shard("--views", "0:1")
+    shard(views="0:1")
     (path,) = shard.views.iterdir()
     image = images.read_image(path)
     header = OpenEXR.File(str(path), header_only=True).header()

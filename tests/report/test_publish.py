@@ -15,12 +15,12 @@ from sphere import LENSES, write_views
 
 from lightfield.configuration.publication import DOCUMENTS
 from lightfield.configuration.scene_yaml import Credits
+from lightfield.core.bundles import VARIABLE
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.report.publish import publish
-from lightfield.workflow.view_store import VARIABLE
 
 NAME = "smoke_LFPlane"
 RIG = {"type": "plane", "cameras": [3, 2], "size": 0.4, "split": {"every": 3}}
@@ -280,31 +280,30 @@ def test_the_frames_of_a_sequence_are_samples_of_their_own(folder, tmp_path):
 def test_shards_and_parts_of_an_archive_come_back_from_a_storage(
     run_program, folder, tmp_path, monkeypatch
 ):
-    store, home = tmp_path / "store", tmp_path / "home"
-    results = store / "results/smoke"
-    results.mkdir(parents=True)
+    store, home, job = tmp_path / "store", tmp_path / "home", tmp_path / "job"
     home.mkdir()
+    job.mkdir()
     monkeypatch.setenv(VARIABLE, str(store))
     settings = tmp_path / "settings.json"
     write_json(settings, {"scene": SCENE, "gigabytes": 3e-5})
-    output, archive = tmp_path / "job" / NAME, tmp_path / "job" / f"{NAME}.tar"
-    for program, target in (("publish.py", output), ("package.py", archive)):
+    output, archive = Path("results/smoke/published", NAME), Path(f"results/smoke/{NAME}.tar")
+    for program, target in (("publish", output), ("package", archive)):
         arguments = ["--settings", settings, "--folder", folder, "--output", target]
-        run_program(program, *arguments)
+        arguments += ["--receipt", f"work/receipts/smoke/LFPlane/{program}.jsonl"]
+        run_program(f"{program}.py", *arguments, cwd=job)
     # Snakemake stores what the rules declare.
-    for name in DOCUMENTS:
-        (results / "published" / NAME).mkdir(parents=True, exist_ok=True)
-        shutil.copy(output / name, results / "published" / NAME)
-    for file in (archive, archive.with_suffix(".json")):
-        shutil.copy(file, results)
+    shutil.copytree(job / "work/receipts", store / "work/receipts")
+    (store / output).mkdir(parents=True)
+    for file in (*(output / name for name in DOCUMENTS), archive, archive.with_suffix(".json")):
+        shutil.copy(job / file, store / file)
     for name in (f"published/{NAME}", f"{NAME}.json"):
         path = f"results/smoke/{name}"
         run_program("take_dataset.py", "--store", store, path, cwd=home)
     taken = home / "results/smoke"
-    made = {path.name: path.read_bytes() for path in output.iterdir()}
+    made = {path.name: path.read_bytes() for path in (job / output).iterdir()}
     assert len([name for name in made if name.endswith(".tar")]) > 3
     assert {p.name: p.read_bytes() for p in (taken / "published" / NAME).iterdir()} == made
-    parts = sorted(archive.parent.glob("*.tar"))
+    parts = sorted((job / archive).parent.glob("*.tar"))
     assert len(parts) > 1
     assert [(taken / part.name).read_bytes() for part in parts] == [p.read_bytes() for p in parts]
 

@@ -8,12 +8,14 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import bookkeeping
 import cv2
 import forks
 import numpy as np
 import pytest
 from conftest import BLENDER, SCRIPTS
 
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.flags import parsed
@@ -241,16 +243,16 @@ def test_an_unreadable_file_is_named_and_the_others_are_done(dataset, run, capsy
     (dataset / "exr" / "broken.exr").write_bytes(b"no image")
     content = (dataset / "exr" / "view_0001f.exr").read_bytes()
     (dataset / "exr" / "view_0001f.exr").write_bytes(content[: len(content) // 2])
-    record = dataset / "record.json"
+    receipt = dataset / "receipts/0-3.jsonl"
     with pytest.raises(
         UserError, match=r"2 of 4 views could not be reprojected, such as .*broken\.exr"
     ):
-        run(*PERSPECTIVE, "--png", "--record", str(record))
+        run(*PERSPECTIVE, "--png", "--receipt", str(receipt))
     message = capsys.readouterr().err
     assert "broken.exr" in message and "view_0001f.exr" in message
     out = dataset / "out"
     assert names(out) == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
-    assert not record.exists()
+    assert not receipt.exists()
 
 
 def test_a_wrong_size_is_refused(dataset, run, capsys):
@@ -260,35 +262,30 @@ def test_a_wrong_size_is_refused(dataset, run, capsys):
     assert "small.png: has 7 × 5 pixels; the lens expects 48 × 48" in capsys.readouterr().err
 
 
-def test_views_of_one_shard_and_their_record(dataset, run):
-    record = dataset / "record.json"
-    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--record", str(record))
+def test_views_of_one_shard_and_their_receipt(dataset, run):
+    receipt = dataset / "receipts/1-3.jsonl"
+    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--receipt", str(receipt))
     files = ["view_0001f.exr", "view_0001f.png", "view_0002f.exr", "view_0002f.png"]
     out = dataset / "out"
     assert names(out) == ["lightfield.json", *files]
-    content = json.loads(record.read_text())
-    assert content["counts"] == {"views": 2, "files": 4}
-    assert content["files"] == {
-        f"out/{name}": {
-            "bytes": (out / name).stat().st_size,
-            "sha256": sha256(out / name),
-        }
-        for name in files
+    stamps = {path: made.stamp for path, made in receipts.read(receipt).outputs.items()}
+    assert {path: (stamp.bytes, stamp.sha256) for path, stamp in stamps.items()} == {
+        str(out / name): ((out / name).stat().st_size, sha256(out / name))
+        for name in ("lightfield.json", *files)
     }
-    first = record.read_bytes()
-    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--record", str(record))
-    assert record.read_bytes() == first
+    first = receipt.read_bytes()
+    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--receipt", str(receipt))
+    assert receipt.read_bytes() == first
 
 
 def test_a_damaged_source_is_not_used(dataset, run, capsys):
     sources = sorted((dataset / "exr").iterdir())
-    record = dataset / "source.json"
-    sums = {f"exr/{path.name}": {"bytes": 1, "sha256": sha256(path)} for path in sources}
-    record.write_text(json.dumps({"files": sums}))
+    receipt = dataset / "receipts/0-3.jsonl"
+    bookkeeping.note_shard(receipt, {path: f"key {i}" for i, path in enumerate(sources)})
     write_exr(sources[1], view_channels(FISHEYE, 0.5), {"plenoforge:key": "key 1"})
     with pytest.raises(UserError, match="1 of 3 views could not be reprojected"):
-        run(*PERSPECTIVE, "--png", "--source-record", str(record))
-    assert f"{sources[1]}: is not as it was written" in capsys.readouterr().err
+        run(*PERSPECTIVE, "--png", "--source-receipt", str(receipt))
+    assert f"{sources[1]}: is not as its job made it" in capsys.readouterr().err
     assert names(dataset / "out") == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
 
 
@@ -332,11 +329,11 @@ def test_only_missing_or_outdated_files_are_made_again(dataset, run):
 
 
 def test_damaged_outputs_are_made_again(dataset, run):
-    out, record = dataset / "out", dataset / "record.json"
-    flags = (*PERSPECTIVE, "--png", "--exr", "--record", str(record))
+    out, receipt = dataset / "out", dataset / "receipts/0-3.jsonl"
+    flags = (*PERSPECTIVE, "--png", "--exr", "--receipt", str(receipt))
     run(*flags)
     made = {path.name: path.read_bytes() for path in out.glob("view*")}
-    first = record.read_bytes()
+    first = receipts.read(receipt)
     before = {path.name: path.stat().st_mtime_ns for path in out.glob("view*")}
     turned = out / "view_0000f.png"
     pixels = read_image(turned).channels
@@ -346,10 +343,14 @@ def test_damaged_outputs_are_made_again(dataset, run):
     flipped = bytearray(made["view_0001f.exr"])
     flipped[-5] ^= 1
     (out / "view_0001f.exr").write_bytes(flipped)
-    record.unlink()
     run(*flags)
     assert {path.name: path.read_bytes() for path in out.glob("view*")} == made
-    assert record.read_bytes() == first
+    second = receipts.read(receipt)
+    assert (second.settings, second.inputs, second.sum) == (
+        first.settings,
+        first.inputs,
+        first.sum,
+    )
     kept = {name for name, stamp in before.items() if (out / name).stat().st_mtime_ns == stamp}
     assert kept == {"view_0002f.png", "view_0002f.exr"}
 

@@ -8,12 +8,14 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 FILES = ("input", "output", "log")
+# Snakemake adds this to the name of an output that is not deleted before its job.
+UPDATED = " (update)"
 
 
 class LogHandler(LogHandlerBase):
     writes_to_stream = True
     writes_to_file = False
-    # The profile's --quiet does not apply.
+    # It shows all events, whatever --quiet says.
     has_filter = True
     has_formatter = False
     needs_rulegraph = False
@@ -22,7 +24,8 @@ class LogHandler(LogHandlerBase):
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         job = {"rule": record.rule_name, "reason": record.reason, "cpus": record.threads}
-        job |= {name: [str(file) for file in getattr(record, name)] for name in FILES}
+        for name in FILES:
+            job[name] = [str(file).removesuffix(UPDATED) for file in getattr(record, name)]
         job["command"] = record.shellcmd
         for name in ("mem_mb", "runtime", "gpu", "slurm_extra"):
             job[name] = record.resources.get(name)

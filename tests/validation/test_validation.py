@@ -24,7 +24,8 @@ from conftest import BLENDER
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import Stamp, read_json, sha256, write_json, write_text
+from lightfield.core.receipts import made_in
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.passes import NAMES, PASSES, matte_header
 from lightfield.geometry import lenses, rotations
@@ -817,28 +818,30 @@ def test_an_unpacked_dataset_is_valid_with_its_packages_files(small_dataset: Pat
 # ---- records, clearance, exports ------------------------------------------------------------
 
 
-def record_of(dataset: Path) -> dict[str, Any]:
-    return {
-        "files": {
-            f"exr/{path.name}": {"bytes": path.stat().st_size, "sha256": sha256(path)}
-            for path in sorted((dataset / "exr").iterdir())
-        }
-    }
+def write_receipt(dataset: Path) -> Path:
+    """Write a receipt of the views, which have a key, and of lightfield.json. Return its path."""
+    lines: list[dict[str, Any]] = [{"stage": "", "version": None, "settings": {}, "inputs": {}}]
+    for path in sorted((dataset / "exr").glob("view_*")):
+        lines.append({"file": str(path), **Stamp.of(path)._asdict(), "key": "key"})
+    lines.append({"file": str(dataset / NAME), **Stamp.of(dataset / NAME)._asdict()})
+    receipt = dataset.parent / "work/receipts/room/sphere/render/0-12.jsonl"
+    write_text(receipt, "".join(json.dumps(line) + "\n" for line in lines))
+    return receipt
 
 
-def test_records_must_agree(small_dataset: Path, tmp_path: Path) -> None:
-    record = record_of(small_dataset)
-    write_json(tmp_path / "record.json", record)
+def test_receipts_must_agree(small_dataset: Path) -> None:
+    made = made_in(small_dataset, [write_receipt(small_dataset)], None)
+    assert check(validate(small_dataset, made=made), "checksums").passed
     on_file(flip_byte)(small_dataset)
-    del record["files"]["exr/view_0000f.exr"]
-    record["files"]["exr/view_0001f.exr"]["bytes"] += 1
-    record["files"]["exr/gone.exr"] = record["files"]["exr/view_0001f.exr"]
-    write_json(tmp_path / "changed.json", record)
-    first = validate(small_dataset, records=[tmp_path / "record.json"])
+    first = validate(small_dataset, made=made)
     assert check(first, "checksums").views == [names(small_dataset)[BAD]]
-    second = check(validate(small_dataset, records=[tmp_path / "changed.json"]), "checksums")
+    del made["exr/view_0000f.exr"]
+    made["exr/gone.exr"] = made["exr/view_0001f.exr"]
+    lightfield = small_dataset / NAME
+    lightfield.write_text(lightfield.read_text() + " ")
+    second = check(validate(small_dataset, made=made), "checksums")
     assert second.passed is False
-    assert second.views == ["gone", "view_0000f", "view_0001f", names(small_dataset)[BAD]]
+    assert second.views == ["gone", "lightfield", "view_0000f", names(small_dataset)[BAD]]
 
 
 def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> None:
@@ -888,12 +891,12 @@ def test_misses_are_counted_in_a_scene_with_volumes(small_dataset: Path, tmp_pat
     assert check(clear, "depth").warnings == []
 
 
-@pytest.mark.parametrize("name", ["records", "clearance", "splits"])
+@pytest.mark.parametrize("name", ["clearance", "splits"])
 def test_a_wrong_list_is_named_before_images_are_read(small_dataset, capsys, name) -> None:
     path = small_dataset.parent / "list.json"
     write_json(path, [])
     with pytest.raises(UserError, match=r"list\.json: "):
-        validate(small_dataset, **{name: [path] if name == "records" else path})
+        validate(small_dataset, **{name: path})
     assert not capsys.readouterr().err
 
 
@@ -1394,13 +1397,17 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 
 
 def run(run_program: Any, dataset: Path, *more: Any) -> Any:
-    arguments = (dataset, "--output", dataset / "validation.json")
-    return run_program("validate.py", *arguments, "--sums", dataset.with_suffix(".sums"), *more)
+    receipt = dataset.parent / "work/receipts/room/sphere/validate.jsonl"
+    arguments = (dataset, "--output", dataset / "validation.json", "--receipt", receipt)
+    return run_program("validate.py", *arguments, *more)
 
 
-def publish(run_program: Any, dataset: Path) -> Any:
+def publish(run_program: Any, dataset: Path, *inputs: Path) -> Any:
+    receipts = dataset.parent / "work/receipts/room/sphere"
+    write_json(receipts / "settings.json", {"inputs": [*map(str, inputs)]})
     arguments = ("--validation", dataset / "validation.json", "--page", "the page")
-    arguments += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
+    arguments += ("--settings", receipts / "settings.json", "--output", dataset / "sha256sums.txt")
+    arguments += ("--receipt", receipts / "checksums.jsonl")
     return run_program("publish_checksums.py", *arguments, check=False)
 
 
@@ -1421,15 +1428,15 @@ def test_the_program_needs_only_the_dataset(small_dataset: Path, run_program: An
 def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     dataset: Path, tmp_path: Path, run_program: Any
 ) -> None:
-    write_json(tmp_path / "record.json", record_of(dataset))
     leftover = dataset / "exr" / ".view_0000f.123.tmp.exr"
     leftover.write_bytes(b"half a view")
     of_report = dataset / "report" / ".page.123.tmp.html"
     of_report.parent.mkdir()
     of_report.write_bytes(b"half a page, which another job may be writing")
     other = Path(shutil.copytree(dataset, tmp_path / "elsewhere" / "room" / "sphere"))
-    first = run(run_program, dataset, "--records", tmp_path / "record.json")
-    second = run(run_program, other, "--records", tmp_path / "record.json")
+    receipts = {folder: write_receipt(folder) for folder in (dataset, other)}
+    first = run(run_program, dataset, "--receipts", receipts[dataset])
+    second = run(run_program, other, "--receipts", receipts[other])
     assert first.stdout == second.stdout
     assert re.fullmatch(
         r"room/sphere: valid: 12 views; 12 views × [\d.]+ neighbours agree 9\d.\d % .*\n",
@@ -1438,7 +1445,7 @@ def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     assert not leftover.exists()
     assert of_report.exists()
     for folder in (dataset, other):
-        published = publish(run_program, folder)
+        published = publish(run_program, folder, receipts[folder])
         assert published.returncode == 0, published.stderr
     for name in ("validation.json", "sha256sums.txt"):
         assert (dataset / name).read_bytes() == (other / name).read_bytes()
@@ -1616,8 +1623,6 @@ def test_the_program_names_faults_and_publishes_no_checksums(
         published.stderr,
     )
     assert not (dataset / "sha256sums.txt").exists()
-    # A run that misses them validates again.
-    assert not dataset.with_suffix(".sums").exists()
 
 
 # ---- Cycles ---------------------------------------------------------------------------------

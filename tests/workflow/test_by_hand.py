@@ -1,5 +1,6 @@
 """Programs run by hand: each refuses a mistake with one plain line."""
 
+import json
 import runpy
 import sys
 from pathlib import Path
@@ -9,12 +10,11 @@ import pytest
 from conftest import ROOT, SCRIPTS
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, read_json, write_json, write_text
+from lightfield.core.files import Stamp, absolute_path, read_json, write_json, write_text
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.report import tables
-from lightfield.validation.integrity import Integrity
 
 
 @pytest.fixture
@@ -51,10 +51,10 @@ RIG = {
     "size": 1,
     "camera": {"lens": "equidistant", "fov": 180, "resolution": [8, 8]},
 }
-COSTS = ["--dataset", ".", "--journals", ".", "--benchmarks", ".", "--scene-benchmarks", "."]
+COSTS = ["--dataset", ".", "--receipts", ".", "--benchmarks", ".", "--scene-benchmarks", "."]
 FULL = {"views": 6, "resolution": [64, 64], "samples": "file"}
 VIEWS = ["--scene", "smoke", "--calibration"]
-SUMS = ["--page", "page", "--sums", "sums", "--validation"]
+SUMS = ["--page", "page", "--output", "sums", "--validation"]
 
 
 @pytest.mark.parametrize("content", [[1, 2], 5, {}, {"frames": []}, None], ids=repr)
@@ -132,7 +132,7 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
         ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
         ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
         ("publish.py", PUBLISH, {"scene": {"publish": {}}}, "scene.publish: is missing creators"),
-        ("validate.py", ["."], {"records": {}}, "records: is {}; must be a list"),
+        ("validate.py", ["."], {"inputs": {}}, "inputs: is {}; must be a list"),
         (
             "validate_sequence.py",
             ["."],
@@ -332,45 +332,26 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
 
 
 @pytest.mark.parametrize("within", [True, False])
-def test_views_are_compared_with_their_record_for_any_path(refused, lightfield, tmp_path, within):
+def test_views_are_compared_with_their_receipt_for_any_path(refused, lightfield, tmp_path, within):
     view = tmp_path / "dataset/exr/view_0000f.exr"
     images.write_exr(view, dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
-    sums = {"bytes": view.stat().st_size, "sha256": "0" * 64}
-    write_json(tmp_path / "record.json", {"files": {"exr/view_0000f.exr": sums}})
-    arguments = ["--input-cfg", lightfield, "--source-record", tmp_path / "record.json", "--exr"]
+    header = {"stage": "render_shard", "version": None, "settings": {}, "inputs": {}}
+    line = {"file": view.name, **Stamp.of(view)._asdict(), "sha256": "0" * 64, "key": "0"}
+    receipt = tmp_path / "0-1.jsonl"
+    receipt.write_text("".join(json.dumps(each) + "\n" for each in (header, line)))
+    arguments = ["--input-cfg", lightfield, "--source-receipt", receipt, "--exr"]
     arguments += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
     place = "." if within else view.parent
     said = refused("reproject.py", "-i", place, *arguments, folder=view.parent)
-    assert "view_0000f.exr: is not as it was written" in said
+    assert "view_0000f.exr: is not as its job made it" in said
 
 
-def test_a_record_of_another_kind_is_named_once(refused, lightfield, tmp_path, capsys):
-    write_json(tmp_path / "record.json", [])
-    arguments = [
-        "-i",
-        tmp_path,
-        "--input-cfg",
-        lightfield,
-        "--source-record",
-        tmp_path / "record.json",
-    ]
+def test_a_receipt_of_another_kind_is_named(refused, lightfield, tmp_path):
+    path = tmp_path / "0-1.jsonl"
+    write_json(path, [])
+    arguments = ["-i", tmp_path, "--input-cfg", lightfield, "--source-receipt", path]
     said = refused("reproject.py", *arguments, "--no-reproject", "--exr", "-o", tmp_path / "made")
-    assert said == f"{tmp_path}/record.json: files: must map paths to bytes and sha256"
-    assert not capsys.readouterr().err
-
-
-def test_a_list_outside_its_folder_is_refused(refused, tmp_path):
-    write_json(tmp_path / "0-6.json", {"files": {}})
-    arguments = [
-        "--store",
-        tmp_path,
-        "--results",
-        tmp_path / "results",
-        "--work",
-        tmp_path / "work",
-    ]
-    said = refused("take_views.py", tmp_path / "0-6.json", *arguments)
-    assert said == f"{tmp_path}/0-6.json: must be in {tmp_path}/work"
+    assert said == f"{path}: is missing, or is no receipt"
 
 
 def test_the_current_folder_has_its_own_name(tmp_path, monkeypatch):
@@ -378,7 +359,6 @@ def test_the_current_folder_has_its_own_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "scene/rig/exr")
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
         assert absolute_path(path).parts[-2:] == ("scene", "rig")
-        assert Integrity(path, tmp_path)._name == "scene/rig"
 
 
 def test_an_image_is_refused_as_text(refused, tmp_path):

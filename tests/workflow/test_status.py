@@ -14,10 +14,10 @@ from checkouts import ROOT, snakemake
 
 from lightfield.configuration import keys
 from lightfield.core import files, progress
+from lightfield.core.files import Stamp
 from lightfield.core.flags import parsed
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
-from lightfield.imaging import images
 from lightfield.stages.checks import Status
 
 NAMES = ["a", "b", "c", "d"]
@@ -25,8 +25,8 @@ NAMES = ["a", "b", "c", "d"]
 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch, capsys):
-    """A dataset of four views. Functions render some of them, and print its status."""
-    folder, made = tmp_path / "results/scene/rig", tmp_path / "work/scene/rig"
+    """A dataset of four views. Functions note some of them as made, and print its status."""
+    folder, receipts = tmp_path / "results/scene/rig", tmp_path / "work/receipts/scene/rig"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [2, 1]})
     content = LightField(lens.to_lightfield(), [View.placed(name, np.eye(4)) for name in NAMES])
 
@@ -36,24 +36,31 @@ def dataset(tmp_path, monkeypatch, capsys):
         parsed(Status, None, [*map(str, arguments)]).run()
         return capsys.readouterr().out.splitlines()
 
+    def make(path, key, receipt):
+        """Make a file, and note it in the unfinished receipt of a shard."""
+        files.write_text(folder / path, path)
+        note(receipt, {"file": str(folder / path), **Stamp.of(folder / path)._asdict(), "key": key})
+
+    def note(receipt, *lines):
+        for line in lines:
+            files.append_json_line(receipts / f"{receipt}.part", line)
+
     def render(*names, settings=content):
-        (folder / "exr").mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         content.write(folder / "lightfield.json")
         for view in settings.views:
             if view.name in names:
-                key = {images.KEY_ATTRIBUTE: keys.render_key(settings, view)}
-                colour = np.zeros((1, 2), np.float16)
-                images.write_exr(folder / f"exr/{view.name}.exr", {"R": colour}, key)
+                make(f"exr/{view.name}.exr", keys.render_key(settings, view), "render/0-4")
 
-    def journal(name, *lines):
-        (made / "render").mkdir(parents=True, exist_ok=True)
-        text = "".join(json.dumps(line) + "\n" for line in lines)
-        (made / f"render/{name}.journal.jsonl").write_text(text)
-        # This copy by the user belongs to no shard.
-        (made / "render/kept.journal.jsonl").write_text(text)
+    def seal(receipt):
+        """Make the receipt of a shard a finished one."""
+        part = receipts / f"{receipt}.part"
+        header = {"stage": "render_shard", "version": None, "settings": {}, "inputs": {}}
+        files.write_text(part.with_suffix(".jsonl"), json.dumps(header) + "\n" + part.read_text())
+        part.unlink()
 
-    lines.folder, lines.made, lines.content = folder, made, content
-    lines.render, lines.journal = render, journal
+    lines.folder, lines.content = folder, content
+    lines.render, lines.make, lines.note, lines.seal = render, make, note, seal
     return lines
 
 
@@ -79,8 +86,20 @@ def test_a_build_that_was_never_started_has_no_views(dataset):
 def test_views_of_other_settings_are_not_counted(dataset):
     dataset.render("a", "b")
     dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
-    (dataset.folder / "exr/d.exr").write_bytes(b"no image")
+    (dataset.folder / "exr/d.exr").write_bytes(b"of nobody")
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
+
+
+def test_a_view_counts_while_its_file_is_as_its_receipt_says(dataset):
+    dataset.render("a", "b")
+    dataset.seal("render/0-4")
+    dataset.render("c")
+    # The names that a pass numbers are not a view.
+    dataset.make("object/d.json", "0", "render/0-4")
+    assert dataset()[1].startswith("  rendered: 3 of 4")
+    (dataset.folder / "exr/a.exr").write_bytes(b"cut short")
+    (dataset.folder / "exr/c.exr").unlink()
+    assert dataset()[1].startswith("  rendered: 1 of 4")
 
 
 def test_the_time_left_follows_from_the_rate_of_the_shards_at_work(dataset, monkeypatch):
@@ -89,7 +108,7 @@ def test_the_time_left_follows_from_the_rate_of_the_shards_at_work(dataset, monk
     now = time.time() + 1000
     monkeypatch.setattr(time, "time", lambda: now)
     start = started(1000, pid=os.getpid())
-    dataset.journal("0-4", start, *(finished("a", ago) for ago in (900, 500, 1)))
+    dataset.note("render/0-4", start, *(finished("a", ago) for ago in (900, 500, 1)))
     lines = dataset()
     # Two views were finished in the last ten minutes, and two are left.
     assert lines[1] == (
@@ -103,7 +122,7 @@ def test_a_killed_shard_is_listed_until_its_views_are_finished(dataset):
     dataset.render("a")
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    dataset.journal("0-4", started(100, gone.pid), finished("a", 50))
+    dataset.note("render/0-4", started(100, gone.pid), finished("a", 50))
     lines = dataset()
     assert lines[1] == "  rendered: 1 of 4, no rate yet"
     assert "  shards killed, the next run goes on with them: 0:4" in lines
@@ -114,8 +133,8 @@ def test_a_killed_shard_is_listed_until_its_views_are_finished(dataset):
 def test_a_process_on_another_machine_is_at_work_if_it_wrote_lately(dataset):
     dataset.render("a", "c")
     elsewhere = started(5000, pid=1) | {"host": "another-node"}
-    dataset.journal("0-2", elsewhere, finished("a", 30))
-    dataset.journal("2-4", elsewhere, finished("c", 4000))
+    dataset.note("render/0-2", elsewhere, finished("a", 30))
+    dataset.note("render/2-4", elsewhere, finished("c", 4000))
     lines = dataset()
     assert any(
         re.fullmatch(r"  shards at work: 0:2 on another-node \(heard of 3\d s ago\)", line)
@@ -125,11 +144,13 @@ def test_a_process_on_another_machine_is_at_work_if_it_wrote_lately(dataset):
 
 
 def test_a_reprojected_view_older_than_its_source_is_not_counted(dataset):
+    dataset.make("flat/a.png", "0", "flat/0-4")
     dataset.render(*NAMES)
-    (dataset.folder / "flat").mkdir()
-    for name in "abc":
-        (dataset.folder / f"flat/{name}.png").touch()
-    os.utime(dataset.folder / "flat/c.png", (1, 1))
+    for name in "bc":
+        dataset.make(f"flat/{name}.png", "0", "flat/0-4")
+    # The last face of a cube map.
+    dataset.make("flat/d_d.png", "0", "flat/0-4")
+    (dataset.folder / "flat/c.png").write_bytes(b"cut short")
     assert "  flat: 2 of 4" in dataset()
 
 
@@ -147,7 +168,7 @@ def test_a_validation_counts_only_for_the_present_views(dataset):
 def test_a_clock_that_is_ahead_gives_no_rate(dataset):
     dataset.render("a")
     elsewhere = started(-5, pid=1) | {"host": "another-node"}
-    dataset.journal("0-4", elsewhere, finished("a", -7))
+    dataset.note("render/0-4", elsewhere, finished("a", -7))
     assert dataset()[1] == "  rendered: 1 of 4, no rate yet"
 
 
@@ -202,27 +223,6 @@ def test_progress_works_while_nothing_is_finished(capsys, monkeypatch):
         "places: 10 cameras to do",
         "places: 4 of 10 cameras, 30 s each, 3 min 00 s left",
     ]
-
-
-def test_a_record_lists_finished_views_until_a_file_is_lost(dataset):
-    dataset.render("a", settings=dataset.content)
-    dataset.render("b", "c", settings=dataset.content.changed(resolution=[4, 1]))
-    record = dataset.made / "render/1-3.json"
-    # The names that a pass numbers are not a view.
-    files.write_json(dataset.folder / "object/names.json", {"cube": 1})
-    sizes = {
-        name: (dataset.folder / name).stat().st_size
-        for name in ("exr/b.exr", "exr/c.exr", "object/names.json")
-    }
-    entries = {name: {"bytes": size, "sha256": ""} for name, size in sizes.items()}
-    files.write_json(record, {"files": entries})
-    assert dataset()[1].startswith("  rendered: 3 of 4")
-    (dataset.folder / "exr/c.exr").write_bytes(b"cut short")
-    assert dataset()[1].startswith("  rendered: 1 of 4")
-    # If lightfield.json is newer than the record, only files with its key count.
-    dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
-    os.utime(record, (1, 1))
-    assert dataset()[1].startswith("  rendered: 1 of 4")
 
 
 def test_a_familys_members_are_counted_by_their_state(tmp_path, monkeypatch, capsys):

@@ -42,6 +42,13 @@ def _listed(value: Any) -> Any:
 
 
 # A single word on the command line is a list of one name.
+def _place(value: str) -> str:
+    """Refuse a storage that jobs in other folders could not find."""
+    if value and "://" not in value and not Path(value).is_absolute():
+        raise ValueError("must be a URL, or a path from /")
+    return value
+
+
 Names = Annotated[
     list[Name],
     BeforeValidator(_listed),
@@ -153,9 +160,20 @@ class Configuration(Settings):
     views_per_shard: Auto | AtLeastOne = Field(
         "auto",
         description="How many views one render job makes. auto: chosen from the expected time of a "
-        "view, and on a cluster also from the number of simultaneous jobs (--jobs). A dataset that "
+        "view, and on a cluster also from cluster_jobs. A dataset that "
         "was begun with auto keeps its jobs.",
         json_schema_extra={"unit": "views"},
+    )
+    storage: Annotated[str, AfterValidator(_place)] = Field(
+        "",
+        description="URL, or path from /, of the storage for machines without a common folder. "
+        "Empty: all jobs see results and work.",
+    )
+    cluster_jobs: AtLeastOne | None = Field(
+        None,
+        description="How many jobs a cluster runs at once, as --jobs says. Profiles of clusters "
+        "set it. Without this key, this machine renders.",
+        json_schema_extra={"unit": "jobs"},
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,

@@ -195,9 +195,7 @@ class Dataset(Capture):
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
         """The views in runs (first, end) of nearly equal length."""
-        count = self.shard_count(self)
-        bounds = [self.view_count * number // count for number in range(count + 1)]
-        return list(pairwise(bounds))
+        return shard_bounds(self.view_count, self.shard_count(self))
 
     @property
     def stages(self) -> list[str]:
@@ -207,14 +205,14 @@ class Dataset(Capture):
             stages.append(passes.FLOW.name)
         return stages
 
-    def records(self, stage: str) -> list[str]:
-        """Return the records of all shards at one of the ``stages``."""
-        return [self.paths.record(stage, first, end) for first, end in self.shards]
+    def receipts(self, stage: str) -> list[str]:
+        """Return the receipts of all shards at one of the ``stages``."""
+        return [self.paths.receipt(stage, first, end) for first, end in self.shards]
 
     @property
-    def all_records(self) -> list[str]:
-        """The records of all stages."""
-        return [file for stage in self.stages for file in self.records(stage)]
+    def all_receipts(self) -> list[str]:
+        """The receipts of all stages."""
+        return [file for stage in self.stages for file in self.receipts(stage)]
 
     def testing_rigs(self, export: Export) -> tuple[str, ...]:
         """Return the folders of the rigs whose views go into an ``export``, to test with."""
@@ -293,7 +291,7 @@ class Dataset(Capture):
     def files(self) -> list[str]:
         """All files of the finished dataset, as a target rule names them.
 
-        The records are among them, although other files depend on them: Snakemake makes a missing
+        The receipts are among them, although other files depend on them: Snakemake makes a missing
         file again only if a target rule names it.
         """
         paths = self.paths
@@ -307,7 +305,7 @@ class Dataset(Capture):
             *paths.pictures,
             paths.costs,
             paths.page,
-            *self.all_records,
+            *self.all_receipts,
         ]
 
     @property
@@ -321,7 +319,6 @@ class Dataset(Capture):
             self.places,
             self.cameras,
         )
-        files.append(self.paths.checksums)
         if self.panorama:
             files += [self.paths.panorama_lightfield, self.panorama]
         for name in self.reprojections:
@@ -346,6 +343,11 @@ class Dataset(Capture):
         """The frames of a rig of the .blend's camera. None is the file's own frame."""
         rig = self.placed_rig
         return rig.path if isinstance(rig, BlendCamera) else []
+
+
+def shard_bounds(views: int, count: int) -> list[tuple[int, int]]:
+    """Return the views in ``count`` runs (first, end) of nearly equal length."""
+    return list(pairwise(views * number // count for number in range(count + 1)))
 
 
 def _present(*paths: str | None) -> list[str]:

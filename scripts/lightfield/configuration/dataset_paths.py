@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.core.names import MESH, SPLITS, VIEWS
+from lightfield.core.receipts import FOLDER, SUFFIX
 from lightfield.formats.export_lists import MANIFEST
 
 # The pictures of a report.
@@ -132,11 +133,11 @@ class Paths:
         """The times and sizes of a few views."""
         return f"{self.work}/probe.json"
 
-    def record(
+    def receipt(
         self, stage: str = "{reprojection}", first: int | str = "{first}", end: int | str = "{end}"
     ) -> str:
-        """Return the record of a shard at one of the stages."""
-        return f"{self.work}/{stage}/{first}-{end}.json"
+        """Return the receipt of a shard at one of the stages."""
+        return f"{self.work_root}/{FOLDER}/{self.scene}/{self.rig}/{stage}/{first}-{end}{SUFFIX}"
 
     @property
     def mesh_list(self) -> str:
@@ -176,11 +177,6 @@ class Paths:
     def sums(self) -> str:
         """The published checksums."""
         return f"{self.folder}/sha256sums.txt"
-
-    @property
-    def checksums(self) -> str:
-        """The checksums before they are published."""
-        return f"{self.work}/checksums.txt"
 
     @property
     def panorama_lightfield(self) -> str:

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.setting_types import Stops, White
-from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.core.settings import ReaderSettings, Settings, Vector, as_list
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -509,7 +509,7 @@ def _centred_pinhole(lens: Lens) -> str | None:
 Options = TypeVar("Options", bound=Export)
 
 
-class ExportSettings(Settings, Generic[Options]):
+class ExportSettings(ReaderSettings, Generic[Options]):
     """The settings of one job, which exports the views of one source."""
 
     options: Options = Field(

@@ -20,8 +20,7 @@ from pydantic import Field, model_validator
 
 from lightfield.configuration.corpus import CorpusOptions, evenly_spread
 from lightfield.core.errors import UserError
-from lightfield.core.files import is_outdated, size_and_time
-from lightfield.core.names import MODELS, SPLITS
+from lightfield.core.names import MODELS
 from lightfield.core.settings import Settings, as_list, pattern
 
 # Planning more members would take minutes.
@@ -29,8 +28,6 @@ _MOST_MEMBERS = 100_000
 # The record of a member, in its folder.
 RECORD = "member.json"
 FORMAT = "plenoforge member"
-# The files that a member's model was read from, in the member's folder of work.
-SOURCES = "sources.json"
 
 _Bounds = Annotated[tuple[float, float], as_list(2)]
 
@@ -271,27 +268,3 @@ def summary(family: str, built: int, failures: Sequence[tuple[str, str]], listin
     first = "; ".join(f"{name}: {cause}" for name, cause in failures[:3])
     more = f"; and {len(failures) - 3:,} more" if failures[3:] else ""
     return f"{line}, {len(failures):,} failed: {listing}: {first}{more}"
-
-
-def outdated_members(record: Path, folder: Path) -> bool:
-    """Return whether a file of a batch's members is missing or has changed since its ``record``.
-
-    ``folder`` holds the members. Compares sizes and times of the models' files. Of the members'
-    own files it only looks for each record, splits.json and sha256sums.txt: there may be a million
-    views.
-    """
-
-    def differs(content: Mapping[str, Any]) -> bool:
-        for path, stamp in content["sources"].items():
-            if size_and_time(path) != (stamp and tuple(stamp)):
-                return True
-        for name, member in content["members"].items():
-            datasets = member.get("datasets", {})
-            paths = [RECORD, *(f"{rig}/sha256sums.txt" for rig in datasets)]
-            if any(entry["split"] is not None for entry in datasets.values()):
-                paths.append(SPLITS)
-            if not all(os.path.isfile(f"{folder}/{name}/{path}") for path in paths):  # noqa: PTH113
-                return True
-        return False
-
-    return is_outdated(record, differs)

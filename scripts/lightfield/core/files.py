@@ -11,10 +11,34 @@ import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 from lightfield.core.disk_space import write_problem
 from lightfield.core.errors import UserError
+
+
+class Stamp(NamedTuple):
+    """A file's SHA-256, size, and time of change in nanoseconds."""
+
+    sha256: str
+    bytes: int
+    modified_ns: int
+
+    @classmethod
+    def of(cls, path: str | Path) -> Self:
+        """Return the stamp of a file. Reads it. Raises OSError if it is missing, or no file."""
+        with Path(path).open("rb") as file:
+            status = os.fstat(file.fileno())
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return cls(digest, status.st_size, status.st_mtime_ns)
+
+    def matches(self, path: str | Path) -> bool:
+        """Return whether a file has this size and time."""
+        return size_and_time(path) == (self.bytes, self.modified_ns)
+
+
+# Called with the path and the stamp of each file that `atomic_path` writes: the last of them.
+file_watchers: list[Callable[[Path, Stamp], None]] = []
 
 
 @contextmanager
@@ -66,7 +90,11 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
                 if not file.seek(0, os.SEEK_END):
                     raise OSError("the file is empty")
                 os.fsync(file.fileno())
+            # Nobody else has seen the file yet, so these are the bytes that were written.
+            stamp = Stamp.of(temporary) if file_watchers else None
             temporary.replace(target)
+            if stamp:
+                file_watchers[-1](target, stamp)
         finally:
             temporary.unlink(missing_ok=True)
 
@@ -97,7 +125,8 @@ def size_and_time(path: Path | str) -> tuple[int, int] | None:
     try:
         # A `Path` is slow for many files.
         status = os.stat(path)  # noqa: PTH116
-    except OSError:
+    except (OSError, ValueError):
+        # No file has a name with such letters.
         return None
     return (status.st_size, status.st_mtime_ns) if stat.S_ISREG(status.st_mode) else None
 
@@ -311,19 +340,6 @@ def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
 
 # The exceptions that a program may raise when it uses the content of a damaged file.
 DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
-
-
-def is_outdated(record: Path, differs: Callable[[dict[str, Any]], bool]) -> bool:
-    """Return whether a JSON record is damaged, or ``differs`` from the files that it lists.
-
-    False if there is no record, because Snakemake detects that.
-    """
-    try:
-        return differs(json.loads(record.read_bytes()))
-    except FileNotFoundError:
-        return False
-    except (OSError, *DAMAGE):
-        return True
 
 
 @contextmanager

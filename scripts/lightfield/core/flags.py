@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 
 from lightfield.core import cli
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
 from lightfield.core.settings import checked, read_settings
 from lightfield.core.stage import ByHand, NoSettings, Stage
 
@@ -38,8 +39,12 @@ def parsed(
     """
     given = vars(parser_of(stage, description).parse_args(words))
     own = {name: given.pop(name) for name in stage.model_fields if name in given}
+    settings_file = own.get("settings")
     own["settings"] = _settings(stage, own, given)
-    return checked_flags(stage, own)
+    job = checked_flags(stage, own)
+    if settings_file:
+        job.note_settings(read_json(settings_file))
+    return job
 
 
 def parser_of(stage: type[Stage[Any]], description: str | None) -> argparse.ArgumentParser:

@@ -69,6 +69,16 @@ class Settings(BaseModel):
         return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 
+class ReaderSettings(Settings):
+    """The settings of a stage that reads files which no flag of its program names."""
+
+    inputs: list[str] = Field(
+        [],
+        description="Paths of the files that the job reads, for its receipt. The receipts of "
+        "shards stand for their views.",
+    )
+
+
 def as_list(count: int) -> BeforeValidator:
     """Return a validator that makes a tuple of a YAML list of ``count`` values."""
 

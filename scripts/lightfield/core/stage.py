@@ -17,12 +17,15 @@ member.
 
 import importlib
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
-from lightfield.core.settings import Settings
+from lightfield.core import bundles, receipts
+from lightfield.core.errors import UserError
+from lightfield.core.settings import ReaderSettings, Settings
 
 
 class NoSettings(Settings):
@@ -58,15 +61,97 @@ class Stage(BaseModel, Generic[StageSettings]):
     # Part of the keys of what the stage writes. Raise it if equal settings give other results:
     # everybody's jobs then run again.
     version: ClassVar[int]
+    # Whether what it makes depends on more than its receipt lists, such as times. It then works at
+    # each start.
+    reads_history: ClassVar[bool] = False
     # The model whose fields are flags in place of a settings file.
     by_hand: ClassVar[type[Settings] | type[ByHand] | None] = None
 
     settings: StageSettings
+    receipt: Path | None = Field(
+        None,
+        description="receipt to write last: the checksums of what was read and made",
+        json_schema_extra={"role": "receipt", "metavar": "JSONL"},
+    )
+    # The content of the settings file, if there is one.
+    _settings_file: dict[str, Any] | None = PrivateAttr(None)
 
     def run(self) -> Any:
-        """Do the work. Raises `UserError` if it cannot be done."""
+        """Do the work, and write the receipt. Raises `UserError` if it cannot be done.
+
+        Does nothing if the present receipt holds still.
+        """
+        if self.receipt is None:
+            return self._do_work()
+        header = {
+            "stage": self.name,
+            "version": getattr(self, "version", None),
+            # Without a settings file, a rule takes the defaults.
+            "settings": self._settings_file or {},
+        }
+        self._unpack_inputs()
+        with receipts.opened(self.receipt, header, self.made()) as receipt:
+            for path in self.inputs():
+                receipt.add_input(path)
+            if not self.reads_history and receipt.still_holds():
+                print(f"{self.receipt}: still holds; there is nothing to do", flush=True)
+                receipt.keep()
+                result = None
+            else:
+                try:
+                    result = self._do_work()
+                except UserError:
+                    # Damaged views may be the cause. The next run makes them again.
+                    receipts.check_files(self.inputs())
+                    raise
+                receipt.check_inputs()
+                receipt.seal()
+        bundles.pack(self.receipt, self.made(), self.shared())
+        return result
+
+    def _unpack_inputs(self) -> None:
+        """Unpack the bundles of the jobs that made the inputs, if jobs share no folder."""
+        assert self.work_folder
+        for path in self.inputs() if bundles.are_used() else ():
+            if receipts.is_receipt(path):
+                bundles.unpack(Path(path))
+            elif found := receipts.find_output(receipts.name_of(path), self.work_folder):
+                bundles.unpack(found[0])
+
+    def note_settings(self, content: dict[str, Any]) -> None:
+        """Note the content of the settings file, for the receipt."""
+        self._settings_file = content
+
+    @property
+    def work_folder(self) -> Path | None:
+        """The workflow's folder of intermediate files. None by hand, without a receipt."""
+        return receipts.work_of(self.receipt) if self.receipt else None
+
+    def _do_work(self) -> Any:
         module, _, name = self.function.partition(":")
         return getattr(importlib.import_module(module), name)(self)
+
+    def inputs(self) -> Iterator[str | Path]:
+        """Yield the files that the job reads. It may find more while it works."""
+        yield from (path for path in self._paths("read") if not path.is_dir())
+        if isinstance(self.settings, ReaderSettings):
+            yield from self.settings.inputs
+
+    def made(self) -> Iterator[Path]:
+        """Yield the files that the job makes, and the folders in which it makes files."""
+        yield from self._paths("written")
+
+    def shared(self) -> Iterator[Path]:
+        """Yield files that other jobs need, also on other machines, beside those of the receipt."""
+        yield from ()
+
+    def _paths(self, role: str) -> Iterator[Path]:
+        """Yield the paths in the fields of a role."""
+        for name, field in type(self).model_fields.items():
+            extra = field.json_schema_extra
+            if isinstance(extra, dict) and extra.get("role") == role:
+                value = getattr(self, name)
+                yield from value if isinstance(value, list) else [value] if value else []
 
     @classmethod
     def settings_model(cls, **_: Any) -> type[Settings]:

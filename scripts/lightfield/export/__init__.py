@@ -21,7 +21,6 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats.export_lists import FOLDER, MANIFEST, files_of
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.exports import ExportViews
-from lightfield.workflow.view_store import ViewStore
 
 Source = SourceDataset | SourceSequence
 
@@ -93,9 +92,6 @@ def replace_folder(
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
     write_json(folder / MANIFEST, {"format": name, "options": options, "files": files})
-    store = ViewStore.configured()
-    if store:
-        store.put_list(folder / MANIFEST, paths)
     return files
 
 

@@ -15,7 +15,7 @@ from lightfield.formats.passes import FLOW
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
 from lightfield.stages.views import ComputeFlow
-from lightfield.workflow.records import ShardRecord
+from lightfield.workflow import shard_log
 
 
 def write_flow(job: ComputeFlow) -> None:
@@ -24,9 +24,7 @@ def write_flow(job: ComputeFlow) -> None:
     source = SourceDataset(lightfield.folder, "", ".exr")
     views = lightfield.views[view_slice(job.views, len(lightfield.views))]
     view_of_name = {view.name: view for view in lightfield.views}
-    record = ShardRecord(job.record, job.output)
     progress = Progress(len(views), f"flow {lightfield.folder} {job.views}".rstrip(": "))
-    paths = []
     for view in views:
         neighbour = view_of_name.get(view.others.get("flow", ""))
         if neighbour is None:
@@ -34,12 +32,10 @@ def write_flow(job: ComputeFlow) -> None:
         path = job.output / f"{view.flow}.exr"
         sums = [sha256(source.path(view)), sha256(source.path(neighbour))]
         key = keys.flow_key(lightfield, view, neighbour, sums)
-        if not record.is_finished(path, key):
+        if not shard_log.is_finished(path, key):
             _write(path, source, view, neighbour, key)
-            record.add(path, key)
-        paths.append(path)
+            shard_log.add(path, key)
         progress.done()
-    record.write(paths)
 
 
 def _write(path: Path, source: SourceDataset, view: View, neighbour: View, key: str) -> None:

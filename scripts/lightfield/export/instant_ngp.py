@@ -37,7 +37,6 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.stages.exports import ExportInstantNgp
-from lightfield.workflow.view_store import ViewStore
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The rotation from world to NeRF coordinates in SILVR's generate_NERF_transforms.py."""
@@ -73,9 +72,6 @@ def write(job: ExportInstantNgp) -> None:
     for path, names in view_names.items():
         write_json(path, common | {"frames": [frames[name] for name in names]})
         print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
-    store = ViewStore.configured()
-    if store:
-        store.put_list(job.output, [*writer.pictures, *list(view_names)[1:]])
 
 
 class _TransformsWriter:

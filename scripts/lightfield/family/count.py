@@ -1,8 +1,5 @@
 """Counts the members of a family that are built, and lists those that failed."""
 
-from collections.abc import Sequence
-from typing import Any
-
 from lightfield.configuration.family import summary
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json, write_text
@@ -14,30 +11,18 @@ def count(job: CountMembers) -> None:
 
     Raises `UserError` if any has failed, and lists those in a file.
     """
-    settings = job.settings
-    members = _members(settings.records)
-    failures = [
-        (name, member["failure"]["stage"], member["failure"]["cause"])
-        for name, member in sorted(members.items())
-        if member["state"] == "failed"
-    ]
+    corpus = read_keys(job.corpus, "corpus.py", "members", "failures")
+    failures = corpus["failures"]
     text = summary(
-        settings.family,
-        len(members) - len(failures),
-        [(name, cause) for name, _, cause in failures],
+        job.settings.family,
+        len(corpus["members"]) - len(failures),
+        [(failure["name"], failure["cause"]) for failure in failures],
         str(job.failed),
     )
     if failures:
-        write_text(job.failed, "".join(f"{': '.join(row)}\n" for row in failures))
+        rows = (f"{each['name']}: {each['stage']}: {each['cause']}\n" for each in failures)
+        write_text(job.failed, "".join(rows))
         raise UserError(text)
     job.failed.unlink(missing_ok=True)
-    write_json(job.output, {"members": len(members)})
+    write_json(job.output, {"members": len(corpus["members"])})
     print(text)
-
-
-def _members(records: Sequence[str]) -> dict[str, Any]:
-    """Return the members of some batches' records, by their names."""
-    members: dict[str, Any] = {}
-    for path in records:
-        members |= read_keys(path, "build_members.py", "members")["members"]
-    return members

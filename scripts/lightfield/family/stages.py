@@ -1,7 +1,8 @@
 """The stages that make the datasets of one member: those of the rules, with the same settings.
 
 All stages of a member run in this process, so that Blender is loaded once for many members. Each
-stage that needs the scene opens its .blend anew, as the stages of other scenes do.
+stage that needs the scene opens its .blend anew, as the stages of other scenes do. The stages have
+no receipts of their own: what they read and make is in the member's receipt.
 """
 
 import time
@@ -14,7 +15,6 @@ from pydantic import InstanceOf
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import prefix_of
 from lightfield.configuration.exports import InstantNgp
-from lightfield.configuration.family import SOURCES
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.names import VIEWS
 from lightfield.core.stage import Stage
@@ -26,7 +26,6 @@ from lightfield.stages.publishing import PublishChecksums
 from lightfield.stages.rig import CheckCameras, FreePlaces, MakeLightfield
 from lightfield.stages.scene import BuildScene, ImportModel, ImportSettings, Inventory
 from lightfield.stages.views import Device, ListSplits, RenderShard
-from lightfield.workflow.shard_files import JOURNAL_SUFFIX
 
 # The names of stages in a member's log and record. Other stages have the names of their programs.
 NAMES: dict[type[Stage[Any]], str] = {
@@ -56,7 +55,7 @@ class MemberInventory(Inventory):
         )
 
 
-class Run:
+class StageRun:
     """A run of stages. ``stage`` is the name of the one at work, or of the last one.
 
     ``seconds`` are the CPU seconds of each stage.
@@ -111,12 +110,10 @@ def _scene_jobs(datasets: Sequence[Dataset], written: Scene) -> Iterator[Stage[A
     first = datasets[0]
     blend = _blend(first)
     if first.model_record:
-        record = Path(first.model_record)
         yield ImportModel(
             settings=ImportSettings.of_source(written.scene),
             output=blend,
-            record=record,
-            sources=record.with_name(SOURCES),
+            record=Path(first.model_record),
         )
     else:
         yield BuildScene(settings=job_settings.build_scene(first), output=blend)
@@ -147,28 +144,21 @@ def _camera_jobs(dataset: Dataset, scene: str) -> Iterator[Stage[Any]]:
 
 def _view_jobs(dataset: Dataset, device: Device, threads: int) -> Iterator[Stage[Any]]:
     lightfield, views = Path(dataset.paths.lightfield), Path(dataset.paths.views)
-    # One shard has all views.
-    (rendered,) = map(Path, dataset.records("render"))
     yield RenderShard(
         blend=_blend(dataset),
         lightfield=lightfield,
         inventory=Path(dataset.paths.inventory),
         output=views,
-        record=rendered,
-        journal=rendered.with_suffix(JOURNAL_SUFFIX),
         device=device,
         threads=threads,
     )
     for name, settings in dataset.reprojections.items():
-        (record,) = map(Path, dataset.records(name))
         yield Reproject(
             settings=settings,
             input_cfg=lightfield,
             input_dir=views,
             output_dir=Path(dataset.paths.reprojected(name)),
             output_cfg=Path(dataset.paths.source_lightfield(prefix_of(name))),
-            source_record=rendered,
-            record=record,
             views=f"0:{dataset.view_count}",
         )
 
@@ -196,21 +186,18 @@ def _export_jobs(dataset: Dataset) -> Iterator[Stage[Any]]:
 
 def _check_jobs(dataset: Dataset, removed: Path) -> Iterator[Stage[Any]]:
     paths = dataset.paths
-    validation, sums = Path(paths.validation), Path(paths.checksums)
+    validation = Path(paths.validation)
     yield Validate(
         settings=job_settings.validate(dataset),
         dataset=Path(paths.folder),
         output=validation,
-        sums=sums,
         clearance=Path(paths.cameras),
         inventory=Path(paths.inventory),
         splits=_path(dataset.splits),
         removed=removed,
     )
     # A member has no page.
-    yield PublishChecksums(
-        validation=validation, page=validation, sums=sums, output=Path(paths.sums)
-    )
+    yield PublishChecksums(validation=validation, page=validation, output=Path(paths.sums))
 
 
 def _blend(dataset: Dataset) -> Path:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from lightfield.core.files import sha256, write_text
-from lightfield.core.paths import inside, place_in
+from lightfield.core.files import write_text
+from lightfield.core.paths import inside
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
 from lightfield.formats.sensors import SensorSettings, parameter_file, settings_in
@@ -214,9 +214,6 @@ def read_sums(path: Path) -> dict[str, str]:
     return sums
 
 
-def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
-    """Write ``checksums`` as sha256sum does, and the sum of ``result`` if the dataset holds it."""
-    sums = dict(checksums)
-    if place := place_in(dataset, result):
-        sums[place.as_posix()] = sha256(result)
+def write_sums(path: Path, sums: Mapping[str, str]) -> None:
+    """Write the SHA-256 of files by their paths, as sha256sum does."""
     write_text(path, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))

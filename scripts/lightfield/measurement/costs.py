@@ -21,8 +21,7 @@ from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples, kwh
 from lightfield.planning.sampling import standard_error
 from lightfield.stages import measurement
-from lightfield.workflow import journal
-from lightfield.workflow.shard_files import JOURNAL_SUFFIX
+from lightfield.workflow import history
 
 # The stages that every dataset has, in the order of the work. Other stages come between.
 _FIRST_STAGES = ("scene", "cameras", "render")
@@ -51,7 +50,7 @@ class StageCost:
     peak_memory_bytes: int = 0
 
 
-def _shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
+def _shard_costs(name: str, runs: Sequence[history.Run]) -> dict[str, Any]:
     """Add up all processes that worked on one shard."""
     first, end = map(int, name.split("-"))
     views = [view for run in runs for view in run.views]
@@ -168,7 +167,7 @@ class RenderedView:
     first: bool
 
 
-def renderings(run: journal.Run) -> Iterator[RenderedView]:
+def renderings(run: history.Run) -> Iterator[RenderedView]:
     """Split the time of each view that a process rendered.
 
     While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
@@ -184,17 +183,17 @@ def renderings(run: journal.Run) -> Iterator[RenderedView]:
         yield RenderedView(view["view"], view["finished"], traced, rest, first=index == 0)
 
 
-def _on_processor(run: journal.Run) -> bool:
+def _on_processor(run: history.Run) -> bool:
     """Return whether a process rendered on the processor's cores."""
     return bool(run.start["device"] == "CPU")
 
 
-def on_card(run: journal.Run) -> bool:
+def on_card(run: history.Run) -> bool:
     """Return whether a process rendered views on a graphics card."""
     return bool(run.views) and not _on_processor(run)
 
 
-def _latest_device(runs: Sequence[journal.Run]) -> str | None:
+def _latest_device(runs: Sequence[history.Run]) -> str | None:
     """Return the device that rendered the latest view. None without a rendered view."""
     rendered = [run for run in runs if run.views]
     if not rendered:
@@ -223,10 +222,9 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
     """Return the content of a dataset's costs.json."""
     energy = job.settings.energy
     full = _full_size(job)
-    by_shard = {
-        path.name.removesuffix(JOURNAL_SUFFIX): journal.read(path)
-        for path in sorted(job.journals.glob(journal.JOURNALS))
-    }
+    histories = {path.stem: history.read(path) for path in history.shards(job.receipts)}
+    # Imported views have none.
+    by_shard = {name: runs for name, runs in histories.items() if runs}
     runs = [run for runs_of_shard in by_shard.values() for run in runs_of_shard]
     shards = [_shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
@@ -282,7 +280,7 @@ def in_order(stages: Mapping[str, StageCost]) -> dict[str, StageCost]:
 
 
 def _machine_seconds(
-    stages: Mapping[str, StageCost], runs: Sequence[journal.Run], cores: int
+    stages: Mapping[str, StageCost], runs: Sequence[history.Run], cores: int
 ) -> float:
     """Return the seconds of the whole machine that the work took.
 
@@ -327,7 +325,7 @@ class Scale:
 
 
 def extrapolation(
-    runs: Sequence[journal.Run],
+    runs: Sequence[history.Run],
     stages: Mapping[str, StageCost],
     view_bytes: int,
     lightfield: LightField,
@@ -342,7 +340,7 @@ def extrapolation(
     """
     by_processor = _latest_device(runs) == "CPU"
     runs = [run for run in runs if not run.views or _on_processor(run) == by_processor]
-    # Journals may have views that the dataset had under earlier settings.
+    # Receipts may have views that the dataset had under earlier settings.
     names = {view.name for view in lightfield.views}
     all_renderings = [
         rendering for run in runs for rendering in renderings(run) if rendering.view in names

@@ -491,4 +491,3 @@ _STAGES: dict[str, Callable[[Dataset, int, str], Cost]] = {
     "figures": lambda dataset, views, name: _JOB + _pictures(dataset),
     "page": lambda dataset, views, name: _JOB + _pictures(dataset),
 }
-STAGES = (*_BLENDER_STAGES, *_STAGES)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from lightfield.core import units
 from lightfield.planning import cost
 from lightfield.planning.cost import Cost
+from lightfield.planning.phases import SENSOR_PHASE
 
-# The phase of the jobs that develop views as a sensor sees them, and their part of the formulas.
-SENSOR_PHASE = "sensor"
+# The part of the formulas for the phase of sensors.
 _SENSOR_FORMULA = f"""\
 A sensor adds {1e6 * cost.SENSOR_SECONDS:g} µs a pixel, or {1e6 * cost.BRACKET_SECONDS:g} µs for \
 a bracket with its mask and weights."""

@@ -13,7 +13,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.rendering import animation
 from lightfield.rendering.quiet import quiet
-from lightfield.workflow.view_store import ViewStore
 
 
 def new_scene() -> None:
@@ -65,13 +64,11 @@ def open_scene(
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
     ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
-    choose the scene and its view layers. A view store, if there is one, provides the external files
-    in ``inventory``.
+    choose the scene and its view layers.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
     """
-    _take_files(path, inventory or {})
     this_version = bpy.app.version_string
     try:
         with quiet():
@@ -93,19 +90,6 @@ def open_scene(
         return _choose(scene_block.get("scene_name"), scene_block.get("view_layers"))
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
-
-
-def _take_files(path: Path, inventory: Mapping[str, Any]) -> None:
-    """Fetch the files that the .blend at ``path`` reads from the view store, if there is one."""
-    store = ViewStore.configured()
-    if store is None:
-        return
-    for file in inventory.get("external_files", ()):
-        if file["bytes"] and not store.take(file["sha256"], path.parent / file["path"]):
-            raise UserError(
-                f"{path}: reads {file['path']}, which is not in the view store {store.url}; "
-                "the next run puts it there"
-            )
 
 
 def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> list[str]:

@@ -4,7 +4,7 @@ from importlib.metadata import version
 
 from lightfield.configuration import blend_lock
 from lightfield.configuration.scene_yaml import load_scene
-from lightfield.core import download
+from lightfield.core import download, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.stages.scene import CheckBlend, FetchBlend
@@ -21,12 +21,17 @@ def fetch(job: FetchBlend) -> None:
 
 def check(job: CheckBlend) -> None:
     """Check the .blend's SHA-256, and record it on first use. Write what is known of the file."""
-    if load_scene(job.scene).scene.blend is None:
+    source = load_scene(job.scene).scene
+    if source.blend is None:
         raise UserError(f"--scene {job.scene}: does not use a .blend")
     status = job.blend.stat()
     digest = sha256(job.blend)
     if lock := blend_lock.expected_blend(job.scene, job.blend, digest):
         blend_lock.record_blend(job.blend, digest, lock)
+    if not source.sha256:
+        # Without its lock file, the .blend is checked again.
+        _, lock = blend_lock.blend_sha256(job.scene, source)
+        receipts.note_inputs([lock])
     content = {
         "sha256": digest,
         "bytes": status.st_size,

@@ -15,7 +15,6 @@ from lightfield.core.paths import files_below
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
-from lightfield.workflow.view_store import ViewStore
 
 # The kind of a file by the type of the data-block that reads it. Sounds, texts (scripts) and movie
 # clips affect no pixel.
@@ -82,16 +81,15 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     return sorted(problem_entries, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
 
 
-def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> None:
-    """Put the ``files`` of `external_files` into a view store.
+def check_reachable(blend: Path, files: Iterable[Mapping[str, Any]]) -> None:
+    """Check that jobs on other machines find the ``files`` of `external_files`.
 
-    Other jobs open a copy of ``blend``, and fetch the files from there. A copy lies in another
-    folder, at the same relative path. Raises `UserError` if the copy would not find a file: its
-    path in the .blend is absolute, or it lies outside this folder.
+    They open a copy of ``blend`` in another folder, at the same relative path. Raises `UserError`
+    if the copy would not find a file: its path in the .blend is absolute, or it lies outside this
+    folder.
     """
-    existing_files = [file for file in files if file["bytes"]]
     unreachable = [path for block, path in _blocks_and_paths() if _is_absolute(block, path)]
-    paths = (os.path.normpath(blend.parent / file["path"]) for file in existing_files)
+    paths = (os.path.normpath(blend.parent / file["path"]) for file in files if file["bytes"])
     unreachable += [path for path in paths if path.startswith("..")]
     if unreachable:
         count = f" and {len(unreachable) - 1} more" if unreachable[1:] else ""
@@ -100,8 +98,6 @@ def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> No
             "storage, what a .blend reads must lie in this folder and be named from the .blend (in "
             "Blender: File, External Data, Make Paths Relative), or be packed into it"
         )
-    for file in existing_files:
-        store.put(blend.parent / file["path"], file["sha256"])
 
 
 def _is_absolute(block: Any, path: str) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.scene_source import FILE
+from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.formats import blend
@@ -29,7 +30,6 @@ from lightfield.rendering import (
 from lightfield.rendering.inventory import FEATURES, inventory
 from lightfield.stages.scene import Inventory
 from lightfield.workflow.loading import rendered_frames, scene_datasets
-from lightfield.workflow.view_store import ViewStore
 
 
 def make(job: Inventory) -> None:
@@ -82,8 +82,11 @@ def write_of_datasets(
         contents["emitters"] = light.emitters()
         # A wrong name is known before anything is rendered.
         resolved(written.render.light_groups, contents["emitters"])
-    if store := ViewStore.configured():
-        external_files.put(path, contents["external_files"], store)
+    if bundles.are_used():
+        external_files.check_reachable(path, contents["external_files"])
+    if receipt := receipts.current():
+        for file in contents["external_files"]:
+            receipt.add_input(path.parent / file["path"])
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out

@@ -14,6 +14,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from lightfield.configuration.keys import model_fingerprint
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, keep_apart, listed, write_json
 from lightfield.core.names import UP
@@ -62,7 +63,7 @@ def import_model(job: ImportModel) -> None:
     """
     model = job.settings.model
     keep_apart("--record", job.record, Path(model))
-    content = make_scene(job.settings, job.output.parent, job.sources)
+    content = make_scene(job.settings, job.output.parent)
     with atomic_path(job.output) as temporary:
         blend_file.save_scene(temporary)
     write_json(job.record, content)
@@ -71,13 +72,10 @@ def import_model(job: ImportModel) -> None:
     print(f"{model}: {summary(content)}")
 
 
-def make_scene(
-    settings: ImportSettings, folder: Path, sources: Path | None = None
-) -> dict[str, Any]:
+def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     """Make a scene of a model in the open file. Return the record of the import.
 
-    ``folder`` is where the .blend will be. ``sources`` is a JSON with the files that the model
-    names. It is written even if the model is then refused, for example because a file is missing.
+    ``folder`` is where the .blend will be.
 
     The record has the ``fingerprint``, the files that the model was read from as
     ``external_files``, the parts that are ``left_out``, and its ``box`` in metres.
@@ -86,9 +84,11 @@ def make_scene(
     outside its folder.
     """
     path = Path(settings.model)
+    receipts.note_inputs([path])
     model_files.check(path)
     references, left_out = model_files.survey(path)
     refuse_outside(path, references, settings.shared_folder)
+    receipts.note_inputs(reference.path for reference in references)
     if not settings.allow_missing:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
@@ -97,9 +97,8 @@ def make_scene(
     _remove_cameras_and_lamps()
     refuse_outside(path, _textures(path, references), settings.shared_folder)
     files = _read_files(path, references)
+    receipts.note_inputs(files)
     entries = [listed(file, path.parent) for file in files]
-    if sources:
-        write_json(sources, {"files": entries})
     unread_textures = _unread_textures()
     if not settings.allow_missing:
         _refuse_missing(path, files)

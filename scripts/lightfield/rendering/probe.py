@@ -13,7 +13,7 @@ from lightfield.core.leftovers import temporary_folder
 from lightfield.formats.lightfield import LightField
 from lightfield.stages.measurement import Probe
 from lightfield.stages.views import RenderShard
-from lightfield.workflow import journal
+from lightfield.workflow import history
 
 
 def write(job: Probe) -> None:
@@ -56,19 +56,19 @@ def _measured(job: Probe) -> dict[str, Any]:
 
 def rendered(
     lightfield: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
-) -> journal.Run:
-    """Render a dataset into a new ``folder``. Return its run from the journal."""
+) -> history.Run:
+    """Render a dataset into a new ``folder``. Return its run."""
     path = folder / "lightfield.json"
     lightfield.write(path)
-    log = folder / "journal.jsonl"
+    receipt = folder / "receipts/probe.jsonl"
     RenderShard(
         blend=blend,
         lightfield=path,
         inventory=inventory,
         output=folder / "exr",
-        journal=log,
+        receipt=receipt,
         device=device,
         threads=threads,
     ).run()
-    (run,) = journal.read(log)
+    (run,) = history.read(receipt)
     return run

@@ -15,7 +15,7 @@ from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses.equirectangular import Equirectangular
-from lightfield.workflow import journal
+from lightfield.workflow import history
 
 PROGRAM = Path(__file__).resolve().parents[2] / "render_shard.py"
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
@@ -38,7 +38,7 @@ def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str,
             "render": {**RENDER, "depth_precision": "float"},
         }
         LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
-        # The .blend's files are in their places, so there is nothing to fetch from a view store.
+        # The .blend's files are in their places.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
         command: list[Any] = [
             "--blend",
@@ -47,8 +47,8 @@ def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str,
             folder / "lightfield.json",
             "--inventory",
             folder / "inventory.json",
-            "--journal",
-            folder / "journal.jsonl",
+            "--receipt",
+            folder / "receipts/0-1.jsonl",
             "--output",
             folder / "exr",
             "--device",
@@ -69,5 +69,5 @@ def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str,
             )
         if result.returncode:
             raise UserError(f"{blend}: {result.stderr.splitlines()[-1].removeprefix('error: ')}")
-        (run,) = journal.read(folder / "journal.jsonl")
+        (run,) = history.read(folder / "receipts/0-1.jsonl")
     return run.peak_memory_bytes

@@ -1,10 +1,10 @@
 """Renders a shard: some views of a dataset, in one process.
 
-It writes each view as soon as the view is rendered. It logs the checksums of the view's files
-beside the shard's record. A view has one file, and one for each pass. A view is finished if its
-files have the bytes that the log has for the view's current render key. Finished views are kept: a
-killed shard renders only the missing views. The journal gets one JSON line for each rendered view:
-when it was finished, and how long it took.
+It writes each view as soon as the view is rendered, and notes the checksums of its files in the
+shard's receipt. A view has one file, and one for each pass. A view is finished if its files have
+the bytes that the receipt has for the view's current render key. Finished views are kept: a killed
+shard renders only the missing views. The receipt's history gets a line for each rendered view: when
+it was finished, and how long it took.
 """
 
 import signal
@@ -38,8 +38,8 @@ from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.planning.cost import rendering_memory
 from lightfield.stages.views import RenderShard
-from lightfield.workflow.journal import Journal, is_suspect
-from lightfield.workflow.records import ShardRecord
+from lightfield.workflow import shard_log
+from lightfield.workflow.history import History, is_suspect
 
 if TYPE_CHECKING:
     from lightfield.rendering.colour_pass import Colour
@@ -62,34 +62,29 @@ def render(job: RenderShard) -> None:
     images.check_codec(lightfield.render.compression or "zip")
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
-    journal = Journal(job.journal)
-    record = ShardRecord(job.record, folder)
+    history = History()
     chosen_views = lightfield.views[view_slice(job.views, len(lightfield.views))]
-    missing_views = [
-        view for view in chosen_views if not _is_finished(view, lightfield, folder, record)
-    ]
+    missing_views = [view for view in chosen_views if not _is_finished(view, lightfield, folder)]
     name_files = _name_files(lightfield, folder)
     names_key = keys.names_key(lightfield)
-    missing_name_files = [path for path in name_files if not record.is_finished(path, names_key)]
+    missing_name_files = [path for path in name_files if not shard_log.is_finished(path, names_key)]
     _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing_views)
     # The dataset's folder names the scene and the rig, and the frame of a sequence.
     label = f"render {folder.parent}" + (f" {job.views}" if job.views != ":" else "")
     progress = Progress(len(missing_views), label, already=len(chosen_views) - len(missing_views))
     if missing_views or missing_name_files:
-        _open_scene(job, lightfield, journal)
+        _open_scene(job, lightfield, history)
         for path in missing_name_files:
             write_json(path, _names(path.parent.name))
-            record.add(path, names_key)
-        _render_views(missing_views, lightfield, folder, record, journal, progress, job.stall)
-    view_files = [path for view in chosen_views for path in _files(folder, view, lightfield.passes)]
-    record.write([*name_files, *view_files])
-    journal.end()
+            shard_log.add(path, names_key)
+        _render_views(missing_views, lightfield, folder, progress, job.stall)
+    history.end()
 
 
-def _is_finished(view: View, lightfield: LightField, folder: Path, record: ShardRecord) -> bool:
-    """Return whether all files of a view match its render key and the record."""
+def _is_finished(view: View, lightfield: LightField, folder: Path) -> bool:
+    """Return whether all files of a view are finished, with its render key."""
     key = keys.render_key(lightfield, view)
-    return all(record.is_finished(path, key) for path in _files(folder, view, lightfield.passes))
+    return all(shard_log.is_finished(path, key) for path in _files(folder, view, lightfield.passes))
 
 
 def _files(folder: Path, view: View, view_passes: Iterable[Pass]) -> list[Path]:
@@ -116,8 +111,8 @@ def _names(kind: str) -> dict[str, int]:
     return instances.shown().names if kind == "instance" else ids.names(kind)
 
 
-def _open_scene(job: RenderShard, lightfield: LightField, journal: Journal) -> None:
-    """Open the scene in Blender, set Cycles up, and journal how long that took."""
+def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> None:
+    """Open the scene in Blender, set Cycles up, and note how long that took."""
     contents = read_inventory(job.inventory, "left_out") if job.inventory else None
     _check_memory(job.blend, contents or {}, lightfield)
     threads = job.threads or processors.available()
@@ -125,9 +120,9 @@ def _open_scene(job: RenderShard, lightfield: LightField, journal: Journal) -> N
     with processors.only(threads):
         from lightfield.rendering import cycles
     used_device = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
-    journal.append(
+    shard_log.log(
         {
-            "start_up_seconds": round(time.time() - journal.started, 4),
+            "start_up_seconds": round(time.time() - history.started, 4),
             "start_up_cpu_seconds": round(time.process_time(), 4),
             "device": used_device,
             "threads": threads,
@@ -168,13 +163,11 @@ def _render_views(
     views: Sequence[View],
     lightfield: LightField,
     folder: Path,
-    record: ShardRecord,
-    journal: Journal,
     progress: Progress,
     stall: int,
 ) -> None:
-    """Render ``views`` one after the other in the open scene. Write, record and journal each."""
-    files = _ViewFiles(lightfield, folder, record)
+    """Render ``views`` one after the other in the open scene. Write and note each."""
+    files = _ViewFiles(lightfield, folder)
     process = psutil.Process()
     earlier_seconds: list[float] = []
     visible = _visible_places(lightfield)
@@ -186,7 +179,7 @@ def _render_views(
         began_cpu = time.process_time()
         rendered = _render_view(view, lightfield, visible)
         files.write(view, rendered)
-        journal.append(
+        shard_log.log(
             {
                 "view": view.name,
                 "finished": round(time.time(), 3),
@@ -223,7 +216,7 @@ class _Rendered:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """The journal's figures, in seconds."""
+        """The figures of the history, in seconds."""
         parts = [part for part in (self.geometry, self.colour) if part]
         return {
             "render_seconds": round(sum(part.render_seconds for part in parts), 4),
@@ -277,14 +270,13 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
 
 
 class _ViewFiles:
-    """Writes the files of rendered views into ``folder`` and beside it, and records them."""
+    """Writes the files of rendered views into ``folder`` and beside it, and notes them."""
 
-    def __init__(self, lightfield: LightField, folder: Path, record: ShardRecord) -> None:
+    def __init__(self, lightfield: LightField, folder: Path) -> None:
         from lightfield.rendering.cycles import machine
 
         self.lightfield = lightfield
         self.folder = folder
-        self.record = record
         self.depth_rays = depth_rays(lightfield)
         if lightfield.transparent:
             self.pixels_without_ray = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0])
@@ -295,7 +287,7 @@ class _ViewFiles:
         }
 
     def write(self, view: View, rendered: _Rendered) -> None:
-        """Write and record the view's own file, and one for each pass."""
+        """Write and note the view's own file, and one for each pass."""
         lightfield = self.lightfield
         colour = rendered.colour
         geometry = rendered.geometry
@@ -318,7 +310,7 @@ class _ViewFiles:
         paths = _files(self.folder, view, lightfield.passes)
         for path, (channels, attributes) in zip(paths, contents, strict=True):
             images.write_exr(path, channels, attributes | view_attributes, self.compression)
-            self.record.add(path, key)
+            shard_log.add(path, key)
 
 
 def depth_rays(lightfield: LightField) -> Array | None:

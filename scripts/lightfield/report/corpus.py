@@ -13,11 +13,10 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
 from lightfield.core.names import PARTS
 from lightfield.formats.layout import SUMS
-from lightfield.report import corpus_looks, corpus_page, corpus_shards, corpus_store
+from lightfield.report import corpus_looks, corpus_page, corpus_shards
 from lightfield.report.corpus_looks import Look
 from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.workflow.member_record import MemberRecord, read_members
-from lightfield.workflow.view_store import ViewStore
 
 FORMAT = "plenoforge corpus"
 # Bins of a histogram.
@@ -33,9 +32,6 @@ def write(job: Corpus) -> dict[str, Any]:
     folder = job.folder
     settings = job.settings
     (folder / SUMS).unlink(missing_ok=True)
-    store = ViewStore.configured()
-    if store:
-        corpus_store.bring(folder, settings, store)
     members = read_members(folder, settings.members)
     looks = corpus_looks.looks(folder, members, job.cache)
     content = describe(settings, members, looks)
@@ -43,8 +39,6 @@ def write(job: Corpus) -> dict[str, Any]:
     corpus_page.write(folder, content)
     corpus_shards.write(folder, settings, members)
     write_sums(folder, members, looks)
-    if store:
-        corpus_store.send(folder, store)
     print(summary(content, folder))
     return content
 

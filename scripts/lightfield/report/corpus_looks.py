@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightfield.configuration.corpus import THUMBNAILS
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
@@ -47,6 +48,9 @@ def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[st
     looks_by_member = {
         member.name: cached[member.name] for member in valid if _holds(folder, member, cached)
     }
+    if receipt := receipts.current():
+        for name in looks_by_member:
+            receipt.note_kept(thumbnail(folder, name))
     new = [member for member in valid if member.name not in looks_by_member]
     if new:
         progress = Progress(len(new), "thumbnails", "members", len(looks_by_member))

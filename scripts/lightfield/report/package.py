@@ -29,7 +29,6 @@ from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
 from lightfield.stages.publishing import Package
-from lightfield.workflow.view_store import ViewStore
 
 SILVR = (
     "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "
@@ -75,10 +74,6 @@ def write(job: Package) -> None:
     parts = listed(written)
     card_path = job.output.with_suffix(".json")
     write_json(card_path, {**content, "parts": parts})
-    store = ViewStore.configured()
-    if store:
-        # The job declares the first part alone.
-        store.put_list(card_path, written[1:])
     size = sum(part["bytes"] for part in parts)
     print(f"{job.output}: {units.count(len(parts), 'part')}, {units.size(size)}")
 

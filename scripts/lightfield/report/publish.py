@@ -16,7 +16,6 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import croissant, hugging_face, package, shards
 from lightfield.report.published import Published
 from lightfield.stages.publishing import Publish
-from lightfield.workflow.view_store import ViewStore
 
 
 def write(job: Publish) -> None:
@@ -64,8 +63,4 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
     entries = [*published.files, *package.listed([output / CARD, output / CROISSANT])]
     sums = sorted(f"{entry['sha256']}  {entry['file']}\n" for entry in entries)
     write_text(output / SUMS, "".join(sums))
-    store = ViewStore.configured()
-    if store:
-        # The job declares the descriptions. Nobody knows before how many shards there will be.
-        store.put_list(output / SUMS, [output / entry["file"] for entry in published.files])
     return published

@@ -1,10 +1,9 @@
-"""Tells the progress of a dataset from its files alone, also during a build.
+"""Tells the progress of a dataset from the receipts of its shards, also during a build.
 
-A rendered view counts if its shard's record lists it, or if its file has the key of the settings in
-lightfield.json. A reprojected view counts if it is no older than its source.
+A rendered view counts if a receipt has it with the key of the settings in lightfield.json, and if
+its file is as the job left it. A reprojected view counts if it is also no older than its source.
 """
 
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -14,14 +13,16 @@ from pathlib import Path
 
 from lightfield.configuration import keys
 from lightfield.configuration.family import RECORD
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
+from lightfield.core.receipts import FOLDER, Output
 from lightfield.core.units import duration
 from lightfield.formats.layout import IMAGES
-from lightfield.formats.lightfield import NAME, LightField, View
-from lightfield.imaging import images
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
-from lightfield.workflow import journal, shard_files
+from lightfield.workflow import history
+from lightfield.workflow.build import RENDER
 from lightfield.workflow.member_record import read_member
 
 # The rate is measured over this many seconds.
@@ -43,9 +44,10 @@ def _show_datasets(job: Status) -> None:
     renderings = []
     for name, views, reprojection_list in job.dataset:
         folder = job.results / name
-        rendering = look(folder, job.work / name, views, now)
+        shards = job.work / FOLDER / name
+        rendering = look(folder, shards, now)
         reprojections = reprojection_list.split(",") if reprojection_list else []
-        print("\n".join(lines(name, folder, views, reprojections, rendering)))
+        print("\n".join(lines(name, folder, shards, views, reprojections, rendering)))
         renderings.append(rendering)
     total = sum(views for _, views, _ in job.dataset)
     done = sum(len(rendering.finished) for rendering in renderings)
@@ -70,12 +72,12 @@ def of_family(name: str, folder: Path, count: int) -> str:
 class RenderProgress:
     """The rendering of one dataset.
 
-    - ``finished``: the names of the rendered views.
+    - ``finished``: when each rendered view was made, in nanoseconds since 1970, by its name.
     - ``recent``: the number of views finished in the last ``seconds``, at most `WINDOW`.
     - ``running``, ``silent``, ``killed``: the shards by the state of their processes.
     """
 
-    finished: set[str] = field(default_factory=set)
+    finished: dict[str, int] = field(default_factory=dict)
     recent: int = 0
     seconds: float = 0.0
     running: list[str] = field(default_factory=list)
@@ -83,59 +85,51 @@ class RenderProgress:
     killed: list[str] = field(default_factory=list)
 
 
-def look(folder: Path, work: Path, count: int, now: float) -> RenderProgress:
-    """Return the progress of the rendering of ``count`` views at ``now``, in seconds since 1970."""
+def look(folder: Path, shards: Path, now: float) -> RenderProgress:
+    """Return the progress of the rendering of a dataset at ``now``, in seconds since 1970.
+
+    ``shards`` is the folder of its receipts.
+    """
     rendering = RenderProgress()
-    views: Sequence[View] = ()
+    names: list[str] = []
     try:
         if (folder / NAME).exists():
-            rendering.finished = _recorded(folder, work)
-            # A finished dataset does not need the views.
-            if len(rendering.finished) < count:
-                lightfield = LightField.read(folder / NAME)
-                views = lightfield.views
-                rendering.finished |= _keyed(folder, lightfield, rendering.finished)
+            lightfield = LightField.read(folder / NAME)
+            outputs = _outputs(shards / RENDER, folder / IMAGES)
+            for view in lightfield.views:
+                names.append(view.name)
+                output = outputs.get(view.name)
+                if output and output.key == keys.render_key(lightfield, view):
+                    rendering.finished[view.name] = output.stamp.modified_ns
     except UserError as error:
         print(f"{error}; it is made anew", file=sys.stderr)
-    journals = filter(Path.is_file, (work / "render").glob(journal.JOURNALS))
-    for bounds, path in sorted((_bounds(path), path) for path in journals):
-        runs = journal.read(path)
-        if runs:
-            first, end = bounds
-            missing = any(view.name not in rendering.finished for view in views[first:end])
+    for path in history.shards(shards / RENDER):
+        if runs := history.read(path):
+            first, end = map(int, path.stem.split("-"))
+            missing = any(name not in rendering.finished for name in names[first:end])
             _add_shard(rendering, f"{first}:{end}", runs, missing, now)
     if not rendering.running:
         rendering.recent = 0
     return rendering
 
 
-def _recorded(folder: Path, work: Path) -> set[str]:
-    """Return the views in the records that are no older than lightfield.json."""
-    written = (folder / NAME).stat().st_mtime_ns
-    views = set()
-    for record in (work / "render").glob("*-*.json"):
-        if record.stat().st_mtime_ns < written:
-            continue
-        # A record also lists passes, and the files with the names of their numbers.
-        for name in shard_files.recorded_sizes(record, str(folder)) or ():
-            if name.startswith(f"{IMAGES}/"):
-                views.add(_stem(name))
-    return views
-
-
-def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]:
-    """Return the views without a record whose files have the key of their settings."""
-    present = {path.stem for path in _file(folder, "").parent.glob("*.exr")} - recorded
-    return {
-        view.name
-        for view in lightfield.views
-        if view.name in present
-        and images.has_key(_file(folder, view.name), keys.render_key(lightfield, view))
-    }
+def _outputs(shards: Path, folder: Path) -> dict[str, Output]:
+    """Return the images in a folder that are as the shards made them, by the names of the views."""
+    beginning = f"{receipts.name_of(folder)}/"
+    outputs = {}
+    for path in history.shards(shards):
+        receipt = receipts.read(path)
+        made = [*(receipt.outputs.items() if receipt else ()), *receipts.read_part(path)[0].items()]
+        for name, output in made:
+            view, _, suffix = name.removeprefix(beginning).rpartition(".")
+            is_image = name == f"{beginning}{view}.{suffix}" and suffix in ("exr", "png")
+            if is_image and output.stamp.matches(name):
+                outputs[view] = output
+    return outputs
 
 
 def _add_shard(
-    rendering: RenderProgress, name: str, runs: Sequence[journal.Run], missing: bool, now: float
+    rendering: RenderProgress, name: str, runs: Sequence[history.Run], missing: bool, now: float
 ) -> None:
     """Add the state of a shard's processes. ``missing`` says whether it lacks views."""
     last = runs[-1]
@@ -162,23 +156,28 @@ def _add_shard(
 
 
 def lines(
-    name: str, folder: Path, count: int, reprojections: Sequence[str], rendering: RenderProgress
+    name: str,
+    folder: Path,
+    shards: Path,
+    count: int,
+    reprojections: Sequence[str],
+    rendering: RenderProgress,
 ) -> list[str]:
     """Return lines about the progress of a dataset of ``count`` views."""
     rendered = len(rendering.finished)
     rate = outlook(count - rendered, rendering.recent, rendering.seconds)
     parts = [name, f"  rendered: {rendered} of {count}{rate}"]
     for reprojection in reprojections:
-        reprojected = _reprojected(folder, reprojection, rendering.finished)
+        reprojected = _reprojected(shards / reprojection, folder / reprojection, rendering)
         parts.append(f"  {reprojection}: {reprojected} of {count}")
-    parts.append(f"  validated: {_validated(folder, count, rendering.finished)}")
-    for title, shards in (
+    parts.append(f"  validated: {_validated(folder, count, rendering)}")
+    for title, names in (
         ("shards at work", rendering.running),
         ("shards killed, the next run goes on with them", rendering.killed),
         ("shards not heard of for an hour", rendering.silent),
     ):
-        if shards:
-            parts.append(f"  {title}: {', '.join(shards)}")
+        if names:
+            parts.append(f"  {title}: {', '.join(names)}")
     return parts
 
 
@@ -195,46 +194,25 @@ def outlook(remaining: int, recent: int, seconds: float) -> str:
     )
 
 
-def _reprojected(folder: Path, reprojection: str, finished: set[str]) -> int:
+def _reprojected(shards: Path, folder: Path, rendering: RenderProgress) -> int:
     """Count the finished views that are reprojected too."""
-    times = {}
-    for path in (folder / reprojection).glob("*"):
-        if path.suffix in (".png", ".exr"):
-            times[path.stem] = path.stat().st_mtime
-    # A cube map is finished with its last face.
-    last_faces = times.keys() & {f"{name}_d" for name in finished}
-    times |= {face.removesuffix("_d"): times[face] for face in last_faces}
-    return sum(times.get(name, -1) >= _file(folder, name).stat().st_mtime for name in finished)
+    outputs = _outputs(shards, folder)
+    count = 0
+    for name, rendered_ns in rendering.finished.items():
+        # A cube map is finished with its last face.
+        output = outputs.get(name) or outputs.get(f"{name}_d")
+        count += output is not None and output.stamp.modified_ns >= rendered_ns
+    return count
 
 
-def _validated(folder: Path, count: int, finished: set[str]) -> str:
+def _validated(folder: Path, count: int, rendering: RenderProgress) -> str:
     """Return whether a dataset's current views were validated, and the result."""
     path = folder / "validation.json"
-    if len(finished) < count or not path.exists():
+    if len(rendering.finished) < count or not path.exists():
         return "no"
-    images_folder = folder / IMAGES
-    views = os.scandir(images_folder) if images_folder.exists() else ()
-    newest = max(
-        (view.stat().st_mtime for view in views if _stem(view.name) in finished), default=0
-    )
-    if path.stat().st_mtime < newest:
+    if path.stat().st_mtime_ns < max(rendering.finished.values()):
         return "not since its views were made"
     problem = broken(path)
     if problem:
         return f"no: {path} {problem}, and is made anew"
     return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
-
-
-def _bounds(path: Path) -> tuple[int, int]:
-    """Return the first view of a journal's shard, and the view after its last."""
-    first, end = path.name.partition(".")[0].split("-")
-    return int(first), int(end)
-
-
-def _stem(path: str) -> str:
-    """Return a file's name without its suffix. Faster than `Path` for many files."""
-    return path.rpartition("/")[2].rpartition(".")[0]
-
-
-def _file(folder: Path, name: str) -> Path:
-    return folder / IMAGES / f"{name}.exr"

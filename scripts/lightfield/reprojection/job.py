@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.configuration.reprojections import LIGHT_GROUPS
+from lightfield.core import receipts
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.formats import light_groups, lightfield, passes
@@ -27,8 +28,6 @@ from lightfield.reprojection.geometry import ReprojectionGeometry, Target
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.sensor import parameters_of
 from lightfield.stages.lenses import Reproject
-from lightfield.workflow import shard_files
-from lightfield.workflow.records import ShardRecord
 
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
@@ -74,14 +73,16 @@ class ReprojectionJob:
             raise UserError("sensor: does not go with transparent views")
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
-        self.record = ShardRecord(stage.record, stage.output_dir)
         # For each 16-bit depth map, the number of depths that no step of it can hold.
         self.lost_depths: list[int] = []
-        # The SHA-256 of each image, by its path in the dataset.
+        # The SHA-256 of each image, by its path.
         self.source_sums: dict[str, str] = {}
-        if stage.source_record:
-            for path, (_, digest) in shard_files.read_record(stage.source_record).items():
-                self.source_sums[path] = digest
+        if stage.source_receipt:
+            receipt = receipts.read(stage.source_receipt)
+            if receipt is None:
+                raise UserError(f"{stage.source_receipt}: is missing, or is no receipt")
+            for path, output in receipt.outputs.items():
+                self.source_sums[path] = output.stamp.sha256
 
     def _chosen_passes(self) -> list[Pass]:
         """Return the passes to reproject. Raises `UserError` for a pass that the views lack."""

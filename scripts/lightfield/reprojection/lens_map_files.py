@@ -1,10 +1,9 @@
 """Writes the lens map of a rig, or the lens maps of a cube map's faces."""
 
 from lightfield.core.files import write_text
-from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import ReprojectionGeometry
-from lightfield.stages.lenses import ComputeLensMap
+from lightfield.stages.lenses import ComputeLensMap, lens_map_files
 
 _UNSEEN = "The source does not see this face.\n"
 
@@ -16,9 +15,7 @@ def write(job: ComputeLensMap) -> None:
     maps = {target.suffix: geometry.compute(target) for target in geometry.targets}
     lens_map.report(list(maps.values()))
     # The workflow cannot tell which faces are seen, so it expects a file for each.
-    suffixes = [f"_{face}" for face in CUBE_FACES] if job.settings.cube_map else [""]
-    for suffix in suffixes:
-        file = job.file.with_name(job.file.stem + suffix + job.file.suffix)
+    for suffix, file in lens_map_files(job.file, job.settings).items():
         if suffix in maps:
             lens_map.save(file, maps[suffix])
         else:

@@ -18,6 +18,7 @@ from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.job import ReprojectionJob, SourceView
 from lightfield.reprojection.lens_map import LensMap
 from lightfield.reprojection.pixels import SourcePixels
+from lightfield.workflow import shard_log
 
 
 def write_passes(
@@ -49,7 +50,7 @@ def write_passes(
             if name.startswith("cryptomatte/")
         }
         write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
-        job.record.add(path, key)
+        shard_log.add(path, key)
 
 
 def _read(job: ReprojectionJob, view_pass: Pass, view: SourceView) -> Image:

@@ -1,4 +1,4 @@
-"""Runs a reprojection: makes the missing views, and writes a record of all views."""
+"""Runs a reprojection: makes the missing views."""
 
 import itertools
 import os
@@ -9,8 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, keep_apart, sha256
+from lightfield.core.files import keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.geometry.depth import LARGEST_STEP
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
@@ -20,6 +21,7 @@ from lightfield.reprojection.job import Light, ReprojectionJob, SourceView
 from lightfield.reprojection.passes import write_passes
 from lightfield.reprojection.pixels import SourcePixels, write
 from lightfield.stages.lenses import Reproject
+from lightfield.workflow import shard_log
 
 
 def run(stage: Reproject) -> None:
@@ -60,7 +62,6 @@ def run(stage: Reproject) -> None:
             f"note: {stage.output_dir}: {lost} depths are 0, unknown, in 16-bit depth maps, "
             f"which hold only {1 / steps:g} to {LARGEST_STEP / steps:g} m"
         )
-    job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
 
 def _check_apart(job: ReprojectionJob, views: list[SourceView]) -> None:
@@ -103,7 +104,7 @@ def _reproject_view(job: ReprojectionJob, view: SourceView) -> list[Path]:
             continue
         identity = identity or _identity(view)
         key = job.key(view, target, light, identity)
-        if not all(job.record.is_finished(path, key) for path in paths):
+        if not all(shard_log.is_finished(path, key) for path in paths):
             todo.append((index, target, light, key))
     if todo:
         _check(job, view)
@@ -117,14 +118,11 @@ def _reproject_view(job: ReprojectionJob, view: SourceView) -> list[Path]:
 
 
 def _check(job: ReprojectionJob, view: SourceView) -> None:
-    """Raise `UserError` for a source whose bytes differ from its record."""
+    """Raise `UserError` for a source whose bytes differ from its receipt."""
     for path in job.sources(view):
-        expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
+        expected = job.source_sums.get(receipts.name_of(path))
         if expected and sha256(path) != expected:
-            raise UserError(
-                f"{path}: is not as it was written (see {job.stage.source_record}); "
-                "scripts/verify.py --mend makes it again"
-            )
+            raise receipts.damaged(path)
 
 
 def _identity(view: SourceView) -> str:

@@ -32,6 +32,7 @@ from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Light, ReprojectionJob, SourceView
 from lightfield.reprojection.lens_map import LensMap
+from lightfield.workflow import shard_log
 
 Attributes = Mapping[str, Attribute]
 
@@ -197,7 +198,7 @@ def write(
             case _:
                 assert parameters and image.sensed
                 _write_of_sensor(kind, path, image.sensed, parameters, key)
-        job.record.add(path, key)
+        shard_log.add(path, key)
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from pydantic import Field
 
 from lightfield.core.names import INVENTORY
 from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import Settings
+from lightfield.core.settings import ReaderSettings
 from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 
 
-class ValidationSettings(Settings):
+class ValidationSettings(ReaderSettings):
     """The settings of scripts/validate.py. Paths are relative to the working folder."""
 
     reprojections: list[str] = Field(
@@ -23,20 +23,13 @@ class ValidationSettings(Settings):
         description="Paths of the export.json or transforms.json of each export that the dataset "
         "must have. Without this key, any exports are allowed.",
     )
-    records: list[str] = Field(
-        [],
-        description="Paths of records, which hold the sizes and checksums with which images were "
-        "written.",
-    )
 
 
 class ValidationByHand(ByHand):
     """The parts that a dataset must have, from flags instead of a settings file."""
 
-    records: list[str] = option(
-        "records with the sizes and checksums with which images were written",
-        [],
-        may_be_empty=True,
+    receipts: list[str] = option(
+        "receipts with the checksums with which images were written", [], may_be_empty=True
     )
     reprojection: list[str] = option(
         "reprojections, by their folders in the dataset (default without --output: all)", []
@@ -49,7 +42,7 @@ class ValidationByHand(ByHand):
 
     def settings(self, given: Mapping[str, Any]) -> ValidationSettings:
         return ValidationSettings.of(
-            reprojections=self.reprojection, exports=self.exports, records=self.records
+            reprojections=self.reprojection, exports=self.exports, inputs=self.receipts
         )
 
 
@@ -61,19 +54,17 @@ class Validate(Stage[ValidationSettings]):
     by_hand = ValidationByHand
 
     dataset: Path = reads("folder of the dataset", positional=True)
-    output: Path | None = writes("validation.json to write, with --sums", None)
-    sums: Path | None = writes("list of checksums to write, with --output", None)
+    output: Path | None = writes("validation.json to write", None)
     clearance: Path | None = reads("JSON that scripts/check_cameras.py wrote for the dataset", None)
     inventory: Path | None = reads(INVENTORY, None)
     splits: Path | None = reads("splits.json of the scene", None)
-    ledger: Path | None = option("the workflow's ledger, which lists what its jobs made", None)
     removed: Path | None = option(
         "folder to which files that do not belong to the dataset are moved", None
     )
     processes: AtLeastOne = option("number of worker processes", 1)
 
 
-class SequenceValidationSettings(Settings):
+class SequenceValidationSettings(ReaderSettings):
     """The settings of scripts/validate_sequence.py. Paths are relative to the working folder."""
 
     frames: list[str] | None = Field(
@@ -136,7 +127,7 @@ class Status(PlainStage):
     function = "lightfield.report.status:show"
 
     results: Path = option("folder of the datasets")
-    work: Path = option("folder of intermediate files, with the journals of the shards")
+    work: Path = option("folder of intermediate files, with the receipts of the shards")
     dataset: list[tuple[str, AtLeastOne, str]] = option(
         "a dataset: scene/rig, its number of views, and the names of its reprojections, separated "
         "by commas",

@@ -1,6 +1,6 @@
 """The stages that write finished views, and the scene's surface, in other formats."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -126,6 +126,11 @@ class ExportInstantNgp(Stage[ExportSettings[InstantNgp]]):
         "instant_ngp/depth beside --output)",
         None,
     )
+
+    def made(self) -> Iterator[Path]:
+        # Masks lie beside the views, and the lists of a split beside the output.
+        yield from super().made()
+        yield self.output.parent
 
 
 class MeshSettings(Settings):

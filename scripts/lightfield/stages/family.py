@@ -1,5 +1,6 @@
 """The stages that build the members of a family, collect them, and count them."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,11 @@ from pydantic import Field
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.corpus import CorpusOptions
 from lightfield.configuration.family import Draw, Member
+from lightfield.core.paths import files_below
+from lightfield.core.receipts import FOLDER
 from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import Settings
-from lightfield.core.stage import Stage, cause, option, writes
+from lightfield.core.settings import ReaderSettings, Settings
+from lightfield.core.stage import Stage, cause, option, reads, writes
 from lightfield.stages.views import Device
 
 
@@ -43,13 +46,25 @@ class BuildMembers(Stage[BatchSettings]):
     name = "build_members"
     function = "lightfield.family.batch:run"
     version = 1
+    # Each start retries the members that failed.
+    reads_history = True
 
     device: Device = option("device on which Cycles renders", "auto")
     threads: AtLeastOne = option("CPU threads", 1)
-    record: Path = writes("JSON to write: the state of each member")
+
+    def shared(self) -> Iterator[Path]:
+        settings = self.settings
+        family = settings.family
+        if settings.preset != "full":
+            family = f"{family}_{settings.preset}"
+        for member in settings.members:
+            place = f"{family}/{member.name}"
+            yield from files_below(Path(settings.results, place))
+            yield from files_below(Path(settings.work, FOLDER, place))
+            yield Path(settings.work, place, "member.log")
 
 
-class CorpusSettings(CorpusOptions):
+class CorpusSettings(CorpusOptions, ReaderSettings):
     """The settings of scripts/corpus.py."""
 
     family: str = Field(description="Name of the corpus: the name of the family's scene YAML.")
@@ -79,9 +94,6 @@ class CountSettings(Settings):
     """The settings of scripts/count_members.py."""
 
     family: str = Field(description="Name of the family's scene YAML.")
-    records: list[str] = Field(
-        min_length=1, description="Paths of the records of the family's batches."
-    )
 
 
 class CountMembers(Stage[CountSettings]):
@@ -90,5 +102,6 @@ class CountMembers(Stage[CountSettings]):
     name = "count_members"
     function = "lightfield.family.count:count"
 
+    corpus: Path = reads("corpus.json of the family")
     failed: Path = writes("text file to write: the failed members, with their errors")
     output: Path = writes("JSON to write if no member failed")

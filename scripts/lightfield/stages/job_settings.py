@@ -25,7 +25,7 @@ from lightfield.configuration.scene_yaml import load_scene, scene_content, scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
-from lightfield.core.settings import Settings
+from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
@@ -39,7 +39,12 @@ from lightfield.stages.measurement import (
 from lightfield.stages.publishing import PackSettings
 from lightfield.stages.report import FiguresSettings, MeasurementFile, PageSettings
 from lightfield.stages.rig import FreePlacesSettings
-from lightfield.stages.scene import BuildSettings, ImportSettings, Inventory
+from lightfield.stages.scene import (
+    BuildSettings,
+    CheckBlendSettings,
+    ImportSettings,
+    InventorySettings,
+)
 from lightfield.workflow.build import Build, Wildcards, full_datasets, source_of
 from lightfield.workflow.loading import rendered_frames, scene_datasets
 
@@ -97,39 +102,32 @@ def _import_model(dataset: Dataset) -> ImportSettings:
     return ImportSettings.of_source(source)
 
 
-def _check_blend(dataset: Dataset) -> Content:
-    return {
-        # The scene YAML's checksum. Without it the job itself records the file's.
-        "sha256": load_scene(dataset.scene_name).scene.sha256,
-        # Another bpy makes everything of the file again.
-        "bpy": version("bpy"),
-    }
+def _check_blend(dataset: Dataset) -> CheckBlendSettings:
+    return CheckBlendSettings.of(
+        sha256=load_scene(dataset.scene_name).scene.sha256, bpy=version("bpy")
+    )
 
 
-def _inventory(dataset: Dataset) -> Content:
+def _inventory(dataset: Dataset) -> InventorySettings:
     """Return what an inventory depends on in the scene YAML."""
     written = load_scene(dataset.scene_name)
     datasets = scene_datasets(dataset.scene_name)
     source = written.scene
     assert written.render
-    content: Content = {
-        "version": Inventory.version,
-        "scene_name": source.scene_name,
-        "view_layers": source.view_layers,
-        "allow_missing": source.allow_missing,
-        "motion_blur": written.render.motion_blur,
-        "rendered_frames": rendered_frames(datasets),
-        # Like the program, leave out rigs without frames.
-        "camera_frames": [frame for each in datasets for frame in each.camera_frames],
-    }
-    if content["camera_frames"]:
+    # Like the program, leave out rigs without frames.
+    camera_frames = [frame for each in datasets for frame in each.camera_frames]
+    return InventorySettings.of(
+        scene_name=source.scene_name,
+        view_layers=source.view_layers,
+        allow_missing=source.allow_missing,
+        motion_blur=written.render.motion_blur,
+        rendered_frames=rendered_frames(datasets),
+        camera_frames=camera_frames,
         # Raise this number when the program takes or refuses other cameras.
-        content["camera_version"] = 1
-    if source.followed_camera:
-        content["followed_camera"] = source.followed_camera
-    if written.render.light_groups:
-        content["light_groups"] = written.render.light_groups
-    return content
+        camera_version=1 if camera_frames else None,
+        followed_camera=source.followed_camera,
+        light_groups=written.render.light_groups or None,
+    )
 
 
 _OF_SCENE: Mapping[str, Callable[[Dataset], Settings | Content]] = {
@@ -196,7 +194,6 @@ def validate(dataset: Dataset) -> ValidationSettings:
     return ValidationSettings(
         reprojections=[*dataset.reprojections],
         exports=dataset.export_lists,
-        records=dataset.all_records,
     )
 
 
@@ -209,7 +206,9 @@ _OF_DATASET: Mapping[str, Callable[[Dataset], Settings]] = {
     "lightfield": lightfield,
     "panorama": _panorama,
     "mesh": _mesh,
+    "flow": lambda dataset: ReaderSettings(),
     "validate": validate,
+    "checksums": lambda dataset: ReaderSettings(),
     "figures": _figures,
 }
 
@@ -241,7 +240,7 @@ def _full_size(dataset: Dataset) -> FullSize:
 
 def _page(build: Build, dataset: Dataset) -> PageSettings:
     measured = [
-        MeasurementFile(file=str(path), modified_ns=path.stat().st_mtime_ns)
+        MeasurementFile(file=str(path), sha256=sha256(path))
         for path in _measurements(build, dataset)
     ]
     return PageSettings.of(
@@ -385,10 +384,6 @@ def _gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "gpu_check", GpuCheckSettings(full=sizes)
 
 
-def _splits(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    return "splits", {"lightfields": build.split_lightfields(wildcards)}
-
-
 def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     datasets = build.rig(wildcards)
     settings = PackSettings.of(
@@ -399,8 +394,8 @@ def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "pack", settings
 
 
-def _index(build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    return "index", {"pages": [dataset.paths.page for dataset in build.chosen]}
+def _index(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    return "index", ReaderSettings()
 
 
 def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
@@ -447,11 +442,7 @@ def _source_fingerprint(source: SceneSource, has_drawn_light: bool) -> str | Non
 
 
 def _members(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    folder = wildcards["family"]
-    settings = CountSettings(
-        family=build.family_names[folder], records=build.batch_records(wildcards)
-    )
-    return "members", settings
+    return "members", CountSettings(family=build.family_names[wildcards["family"]])
 
 
 def _corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
@@ -469,7 +460,6 @@ _OTHERS: Mapping[str, Callable[[Build, Wildcards], tuple[str, Settings | Content
     "validate_sequence": _validate_sequence,
     "probes": _probes,
     "gpu_check": _gpu_check,
-    "splits": _splits,
     "pack": _pack,
     "index": _index,
     "batch": _batch,

@@ -1,15 +1,23 @@
 """The stages that make views through another lens from finished views."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.stage import Stage, option, reads, writes
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.stages.lens_flags import LensMapFlags, ReprojectFlags, Source
 
 _FILES = "Input and output"
 _CHOICE = "Choice of files"
 _RUNTIME = "Runtime"
+
+
+def lens_map_files(path: Path, settings: Reprojection) -> dict[str, Path]:
+    """Return the files of a lens map, by what their names have more: one for each cube face."""
+    suffixes = [f"_{face}" for face in CUBE_FACES] if settings.cube_map else [""]
+    return {suffix: path.with_name(f"{path.stem}{suffix}{path.suffix}") for suffix in suffixes}
 
 
 class ComputeLensMap(Source, Stage[Reprojection]):
@@ -38,11 +46,8 @@ class Reproject(Source, Stage[Reprojection]):
     )
     output_dir: Path = writes("folder to write to", short=["-o"], group=_FILES)
     output_cfg: Path | None = writes("lightfield.json to write", None, metavar="JSON", group=_FILES)
-    record: Path | None = writes(
-        "JSON to write last: a list of the files", None, metavar="JSON", group=_FILES
-    )
-    source_record: Path | None = reads(
-        "record whose sizes and checksums the images must match", None, metavar="JSON", group=_FILES
+    source_receipt: Path | None = reads(
+        "receipt whose checksums the images must match", None, metavar="JSONL", group=_FILES
     )
     lens_map: Path | None = reads(
         "lens map that lens_map.py computed", None, metavar="FILE", group=_FILES
@@ -62,3 +67,11 @@ class Reproject(Source, Stage[Reprojection]):
         "how many images are processed at the same time", 1, short=["-j"], group=_RUNTIME
     )
     dry_run: bool = option("write only --output-cfg, and no images", False, group=_RUNTIME)
+
+    def inputs(self) -> Iterator[str | Path]:
+        """Yield the files that the job reads, with the lens maps of a cube map's faces."""
+        for path in super().inputs():
+            if self.lens_map and path == self.lens_map:
+                yield from lens_map_files(self.lens_map, self.settings).values()
+            else:
+                yield path

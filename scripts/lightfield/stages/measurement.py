@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from lightfield.configuration.config_file import Energy
 from lightfield.core.names import INVENTORY, VIEWS
 from lightfield.core.setting_types import AtLeastOne, Stops, White
-from lightfield.core.settings import Settings
+from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
 
@@ -32,7 +32,7 @@ class FullSize(Settings):
     denoise: bool | None = Field(None, description="Whether views are denoised.")
 
 
-class CostSettings(Settings):
+class CostSettings(ReaderSettings):
     """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
 
     energy: Energy = Field(description="The block `energy` of config.yaml.")
@@ -47,9 +47,10 @@ class Costs(Stage[CostSettings]):
 
     name = "costs"
     function = "lightfield.measurement.costs:write"
+    reads_history = True
 
     dataset: Path = reads("folder of the dataset")
-    journals: Path = reads("folder of the journals of its shards")
+    receipts: Path = reads("folder of the receipts of its shards")
     benchmarks: Path = reads("folder of the benchmark files that Snakemake wrote for its jobs")
     scene_benchmarks: list[Path] = reads(
         "folders of the benchmark files that Snakemake wrote for the scene's jobs"
@@ -227,7 +228,7 @@ class GpuCheck(CalibratedTrialStage[GpuCheckSettings]):
     output: Path = writes("path without suffix of the .json and .md to write")
 
 
-class SynthesisSettings(Settings):
+class SynthesisSettings(ReaderSettings):
     """The settings of scripts/synthesis_quality.py."""
 
     truth: list[str] = Field(

@@ -7,26 +7,25 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.core.settings import Settings
+from lightfield.core.settings import ReaderSettings
 from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
-from lightfield.workflow.view_store import VARIABLE
 
 FOLDER = "folder of a rig, with one or more datasets"
 
 
-class PublishChecksums(PlainStage):
+class PublishChecksums(Stage[ReaderSettings]):
     """Publishes the checksums of a valid dataset."""
 
     name = "publish_checksums"
     function = "lightfield.validation.result:publish"
 
+    settings: ReaderSettings = ReaderSettings()
     validation: Path = reads("validation.json of the dataset")
     page: Path = option("page of the dataset, to name in the error message")
-    sums: Path = reads("checksums that scripts/validate.py wrote")
     output: Path = writes("sha256sums.txt to write")
 
 
-class PackSettings(Settings):
+class PackSettings(ReaderSettings):
     """The settings of scripts/package.py and scripts/publish.py."""
 
     datasets: list[str] = Field(
@@ -102,19 +101,4 @@ class TakeDataset(PlainStage):
 
     datasets: list[Path] = writes("folders to copy, such as results/scene/rig", positional=True)
     store: str = option("URL or folder of the storage")
-
-
-class TakeViews(PlainStage):
-    """Copies the files that records and exports list from the view store."""
-
-    name = "take_views"
-    function = "lightfield.report.taking:take_views"
-
-    lists: list[Path] = reads("records of shards, and lists of exports", positional=True)
-    store: str | None = option(f"URL or folder of the store (default: ${VARIABLE})", None)
-    results: Path = option("folder of the datasets")
-    work: Path = option("folder of intermediate files, with the records")
-    mend: bool = option(
-        "remove lists of lost files from the storage, so that the next run makes these files again",
-        False,
-    )
+    work: str = option("folder of intermediate files in the storage", "work")

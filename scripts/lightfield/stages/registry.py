@@ -44,7 +44,6 @@ STAGES: list[type[Stage[Any]]] = [
     publishing.Package,
     publishing.Publish,
     publishing.TakeDataset,
-    publishing.TakeViews,
     report.ReportFigures,
     report.ReportHtml,
     report.ReportIndex,
@@ -64,3 +63,4 @@ STAGES: list[type[Stage[Any]]] = [
     family.CountMembers,
 ]
 BY_NAME = {stage.name: stage for stage in STAGES}
+VERSIONS = {stage.name: getattr(stage, "version", None) for stage in STAGES}

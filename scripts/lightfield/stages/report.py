@@ -6,12 +6,12 @@ from typing import Annotated
 from pydantic import Field, PlainSerializer
 
 from lightfield.core.names import ROOT
-from lightfield.core.settings import Settings
+from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.geometry.rigs import AnyRig, as_written
 
 
-class FiguresSettings(Settings):
+class FiguresSettings(ReaderSettings):
     """The settings of scripts/report_figures.py."""
 
     rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
@@ -37,12 +37,10 @@ class MeasurementFile(Settings):
     """A file that a measurement wrote, and that the page shows."""
 
     file: str = Field(description="Path of the file.")
-    modified_ns: int | None = cause(
-        "When the file was modified, in nanoseconds. If it changes, the page is made again."
-    )
+    sha256: str | None = cause("SHA-256 of the file. If it changes, the page is made again.")
 
 
-class PageSettings(Settings):
+class PageSettings(ReaderSettings):
     """The settings of scripts/report_html.py."""
 
     rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
@@ -72,12 +70,15 @@ class ReportHtml(Stage[PageSettings]):
     output: Path = writes("HTML file to write")
 
 
-class ReportIndex(PlainStage):
+class ReportIndex(Stage[ReaderSettings]):
     """Makes the page with links to the pages of all datasets in a results folder."""
 
     name = "report_index"
     function = "lightfield.report.index_page:write"
+    # It lists all datasets in the folder, also those of other runs.
+    reads_history = True
 
+    settings: ReaderSettings = ReaderSettings()
     results: Path = reads("folder of the datasets")
     output: Path = writes("HTML file to write, in that folder")
 

@@ -1,8 +1,9 @@
 """The stages that make a .blend, check it, and list what it contains."""
 
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -19,6 +20,7 @@ from lightfield.configuration.scene_source import (
 from lightfield.core.names import builders
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
+from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.rigs.rig import Frame
 
 
@@ -94,11 +96,6 @@ class ImportModel(Stage[ImportSettings]):
 
     output: Path = writes(".blend to write")
     record: Path = writes("JSON to write: the files that were read")
-    sources: Path | None = writes(
-        "JSON to write as soon as the files that the model names are known, also if the model is "
-        "refused",
-        None,
-    )
 
 
 class FetchBlend(PlainStage):
@@ -111,24 +108,51 @@ class FetchBlend(PlainStage):
     output: Path = writes(".blend to write")
 
 
-class CheckBlend(PlainStage):
+class CheckBlendSettings(Settings):
+    """What makes a .blend be checked again."""
+
+    sha256: str | None = cause("SHA-256 in the scene YAML. Without it, the job records the file's.")
+    bpy: str | None = cause("Version of Blender. If it changes, the job runs again.")
+
+
+class CheckBlend(Stage[CheckBlendSettings]):
     """Checks that a .blend has the SHA-256 that is recorded for its scene."""
 
     name = "check_blend"
     function = "lightfield.rendering.blend_source:check"
 
+    settings: CheckBlendSettings = CheckBlendSettings()
     scene: str = option("name of a file in configs/scenes/")
     blend: Path = reads(".blend to check")
     output: Path = writes("JSON to write if the .blend has the right SHA-256")
 
 
-class Inventory(PlainStage):
+class InventorySettings(Settings):
+    """What makes an inventory be listed again: the keys of the scene YAML that the job reads."""
+
+    scene_name: str | None = cause("As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = cause("As in the scene YAML.")
+    allow_missing: bool | None = cause("As in the scene YAML.")
+    motion_blur: Any = cause("As in the scene YAML.")
+    rendered_frames: Any = cause("Frames that the rigs render.")
+    camera_frames: list[float | None] | None = cause("Frames of rigs of the file's own camera.")
+    camera_version: int | None = cause("Version of the choice of cameras.")
+    followed_camera: str | None = cause("As in the scene YAML.")
+    light_groups: Any = cause("As in the scene YAML.")
+
+
+class Inventory(Stage[InventorySettings]):
     """Lists what a scene contains, and what its rendering can leave out."""
 
     name = "inventory"
     function = "lightfield.rendering.inventory_file:make"
     version = 5
 
+    settings: InventorySettings = InventorySettings()
     scene: str | None = option("name of the file in configs/scenes/ that uses this .blend", None)
     blend: Path = reads("the scene's .blend")
     output: Path = writes("JSON to write")
+
+    def shared(self) -> Iterator[Path]:
+        files = read_inventory(self.output, "external_files")["external_files"]
+        yield from (self.blend.parent / file["path"] for file in files)

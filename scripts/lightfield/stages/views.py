@@ -1,10 +1,12 @@
 """The stages that make views, and files from views alone: optical flow, and the list of splits."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.stage import PlainStage, option, reads, writes
+from lightfield.core.settings import ReaderSettings
+from lightfield.core.stage import PlainStage, Stage, option, reads, writes
 
 Device = Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"]
 
@@ -28,10 +30,6 @@ class RenderShard(PlainStage):
     )
     views: str = option(VIEWS, ":", metavar=FIRST_END)
     output: Path = writes("folder to write the views to")
-    record: Path | None = writes("JSON to write: the sizes and checksums of the views", None)
-    journal: Path | None = writes(
-        "file to which a JSON line is added for each view, with its time", None
-    )
     device: Device = option("device on which Cycles renders", "auto")
     threads: AtLeastOne | None = option("CPU threads (default: all cores)", None)
     stall: int = option(
@@ -39,6 +37,10 @@ class RenderShard(PlainStage):
         0,
         metavar="S",
     )
+
+    def made(self) -> Iterator[Path]:
+        # The folders of passes lie beside the folder of the views.
+        yield self.output.parent
 
 
 class ImportViews(PlainStage):
@@ -51,19 +53,18 @@ class ImportViews(PlainStage):
     lightfield: Path = reads("lightfield.json of the dataset to write")
     views: str = option(VIEWS, ":", metavar=FIRST_END)
     output: Path = writes("folder to write the views to")
-    record: Path | None = writes("JSON to write: the sizes and checksums of the views", None)
 
 
-class ComputeFlow(PlainStage):
+class ComputeFlow(Stage[ReaderSettings]):
     """Computes the optical flow from views of a dataset to their neighbours."""
 
     name = "flow"
     function = "lightfield.export.flow:write_flow"
 
+    settings: ReaderSettings = ReaderSettings()
     lightfield: Path = reads(LIGHTFIELD)
     views: str = option(VIEWS, ":", metavar=FIRST_END)
     output: Path = writes("folder to write", metavar="FOLDER")
-    record: Path | None = writes("JSON to write: the sizes and checksums of the files", None)
 
 
 class ListSplits(PlainStage):

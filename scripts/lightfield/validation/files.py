@@ -23,6 +23,7 @@ from lightfield.core.paths import (
     link_above,
     stray_places,
 )
+from lightfield.core.receipts import Output
 from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import (
     CARD,
@@ -330,49 +331,36 @@ def set_strays_aside(dataset: Path, strays: Iterable[str], folder: Path) -> int:
 
 
 def checksums(
-    recorded: Mapping[str, tuple[int, str]] | None,
-    sums: Mapping[str, tuple[int, str]],
+    made: Mapping[str, Output],
+    images: Collection[str],
+    published: Mapping[str, str],
     sets: Sequence[ImageSet],
-    altered_files: Mapping[str, str],
 ) -> Check:
-    """Check that the images have the sizes and SHA-256 that their writers recorded.
+    """Check that files have the SHA-256 with which they were made.
 
-    ``recorded`` and the actual ``sums`` are by path. ``altered_files`` fail, too.
+    ``made`` are the outputs of jobs. ``images`` are the paths of images, and ``published`` has the
+    present SHA-256 of files. Without this check, a damaged file would be published with a checksum
+    of its damage.
     """
-    if recorded is None and not altered_files:
+    faults = {}
+    for path, digest in sorted(published.items()):
+        if path in made and (expected := made[path].stamp.sha256) != digest:
+            faults[path] = f"has the sha256 {digest}, but its record says {expected}"
+    recorded = {path for path, output in made.items() if output.key}
+    if not recorded and not faults:
         return Check("checksums", None, "no record was given")
-    recorded = recorded or {}
-    faults = dict(altered_files)
-    for path, (size, digest) in sorted(recorded.items()):
-        if path not in sums:
-            faults[path] = "is recorded but is not an image of this dataset"
-        elif size != sums[path][0]:
-            faults[path] = f"has {sums[path][0]} bytes, but its record says {size}"
-        elif digest != sums[path][1]:
-            faults[path] = f"has the sha256 {sums[path][1]}, but its record says {digest}"
-    # Renderers record views and passes, but not masks and pictures for trainers.
+    for path in sorted(recorded - {*images}):
+        faults[path] = "is recorded but is not an image of this dataset"
+    # Views and passes have a key. Masks and pictures for trainers have none.
     rendered_set = rendered(sets)
     views = rendered_set.views if rendered_set else []
     rendered_files = [f"{IMAGES}/{view}.exr" for view in views]
     rendered_files += [file.path for file in expected_pass_files(sets[:1])] if rendered_set else []
     for path in sorted(rendered_files):
-        if path in sums and path not in recorded:
+        if path in images and path not in recorded:
             faults[path] = "has no record"
-    detail = f"{len(recorded)} of {len(sums)} images have a record"
+    detail = f"{len(recorded)} of {len(images)} images have a record"
     return Check.of_files("checksums", faults, detail)
-
-
-def altered(published: Mapping[str, str], ledger_sums: Mapping[str, str]) -> dict[str, str]:
-    """Return which published files changed since they were made, and how.
-
-    Both arguments hold SHA-256 by path. ``ledger_sums`` were taken when the files were made.
-    Without this check, a damaged file would be published with a checksum of its damage.
-    """
-    return {
-        path: f"has the sha256 {published[path]}, but {ledger_sums[path]} when it was made"
-        for path in sorted(published.keys() & ledger_sums.keys())
-        if published[path] != ledger_sums[path]
-    }
 
 
 def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:

@@ -5,8 +5,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_bytes
+from lightfield.core.files import read_keys
+from lightfield.formats.layout import REPORT, write_sums
 from lightfield.stages.publishing import PublishChecksums
 
 # How many problems of a check are printed. validation.json has all of them.
@@ -100,15 +102,15 @@ def causes(validation: Mapping[str, Any]) -> str:
 
 
 def publish(job: PublishChecksums) -> None:
-    """Publish the checksums of a valid dataset.
-
-    Removes the checksums of an invalid one, so that the next run validates it again. Raises
-    `UserError`.
-    """
+    """Publish the checksums of a valid dataset. Raises `UserError` if it is not valid."""
     validation = read_keys(job.validation, "validate.py", "valid", "dataset", "checks")
     if not validation["valid"]:
-        job.sums.unlink()
         raise UserError(
             f"{validation['dataset']} is not valid: {causes(validation)}: see {job.page}"
         )
-    write_bytes(job.output, job.sums.read_bytes())
+    outputs = receipts.made_in(
+        job.output.parent, [*job.settings.inputs, job.validation], job.work_folder
+    )
+    sums = {path: output.stamp.sha256 for path, output in outputs.items()}
+    published = {path: sums[path] for path in sums if not path.startswith(f"{REPORT}/")}
+    write_sums(job.output, published)

@@ -23,6 +23,7 @@ import OpenImageIO as oiio
 from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
+from lightfield.core.receipts import Output
 from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import File, ImageSet
@@ -31,32 +32,28 @@ from lightfield.validation import files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
-from lightfield.workflow.shard_files import read_record
 
 
 def validate(
     dataset: Path,
     reprojections: Sequence[str] = (),
-    records: Sequence[Path] = (),
     clearance: Path | None = None,
     inventory: Path | None = None,
     processes: int = 1,
     splits: Path | None = None,
     export_lists: Collection[Path] | None = None,
-    ledger_sums: Mapping[str, str] | None = None,
+    made: Mapping[str, Output] | None = None,
 ) -> Result:
     """Check a dataset's files and pixels.
 
     - ``reprojections``: folders in the dataset.
-    - ``records``: JSON files that list the rendered files (``files``: path: ``bytes``, ``sha256``).
     - ``clearance``: a JSON file with each camera's distance to the nearest surface (``views``:
       name: ``distance`` in metres, ``inside``).
     - ``inventory``: a JSON file of what the scene contains.
     - ``splits``: the scene's splits.json, if it has one.
     - ``export_lists``: the lists of the exports that the dataset must have. None takes all that
       exist.
-    - ``ledger_sums``: the SHA-256 that files had when they were made, by their paths in the
-      dataset.
+    - ``made``: the outputs of jobs in their receipts, by their paths in the dataset.
     - ``processes``: the most processes that read images. Small datasets take fewer.
 
     Raises `UserError` if one of these cannot be read. The result holds all faults of the dataset.
@@ -69,7 +66,6 @@ def validate(
     extras, export_files, exports_check = files.of_exports(dataset, sets, views, export_lists)
     # Check first everything that needs no images: a wrong file then stops the run before hours of
     # reading.
-    recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
     images = views + passes + extras
@@ -78,9 +74,7 @@ def validate(
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
     checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
-    digests, files_checks = _check_files(
-        dataset, sets, facts, export_files, recorded_sums, ledger_sums or {}
-    )
+    digests, files_checks = _check_files(dataset, sets, facts, export_files, made or {})
     if len(sets) <= len(reprojections):
         files_checks[0] = _UNLISTED
     checks += [*_sensor_checks(dataset, sets), *files_checks, cameras_check, *splits_checks]
@@ -108,16 +102,6 @@ def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:
     from lightfield.validation import sensor_check
 
     return sensor_check.checks(dataset, sets)
-
-
-def _recorded_sums(records: Sequence[Path]) -> _Sums | None:
-    """Return the sums of the images from the records. Return None without records."""
-    if not records:
-        return None
-    sums: _Sums = {}
-    for record in records:
-        sums |= read_record(record)
-    return sums
 
 
 # A process starts in the time in which it reads about this many bytes of images.
@@ -208,8 +192,7 @@ def _check_files(
     sets: Sequence[ImageSet],
     facts: Mapping[File, Facts],
     export_files: Sequence[str],
-    recorded_sums: _Sums | None,
-    ledger_sums: Mapping[str, str],
+    made: Mapping[str, Output],
 ) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
     sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
@@ -218,8 +201,7 @@ def _check_files(
     digests = {
         path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
     }
-    altered = files.altered(digests, ledger_sums)
-    return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
+    return digests, [files_check, files.checksums(made, sums, digests, sets)]
 
 
 def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:

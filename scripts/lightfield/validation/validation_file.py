@@ -6,7 +6,9 @@ from pathlib import Path
 
 from lightfield.core import leftovers
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import sha256, write_json
+from lightfield.core.paths import place_in
+from lightfield.core.receipts import made_in
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
@@ -14,7 +16,6 @@ from lightfield.validation import sequence
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import Result
 from lightfield.validation.validate import validate
-from lightfield.workflow import ledger
 
 
 def check(job: Validate) -> Result:
@@ -35,18 +36,18 @@ def check(job: Validate) -> Result:
     result = validate(
         job.dataset,
         reprojections,
-        [Path(record) for record in job.settings.records],
         job.clearance,
         job.inventory,
         job.processes,
         job.splits,
         export_lists,
-        _noted_sums(job.ledger, job.dataset) if job.ledger else None,
+        made_in(job.dataset, job.settings.inputs, job.work_folder),
     )
     _print(result)
-    if not job.output and not result.valid:
+    if job.output:
+        write_json(job.output, result.to_json())
+    elif not result.valid:
         raise UserError(f"{job.dataset}: is not valid")
-    _write(result, job, job.dataset)
     return result
 
 
@@ -63,12 +64,17 @@ def check_sequence(job: ValidateSequence) -> None:
     _print(result)
     if not result.valid:
         raise UserError(f"{job.rig}: the exports of its sequence are not valid")
-    _write(result, job, job.rig)
+    if job.output and job.sums:
+        write_json(job.output, result.to_json())
+        sums = dict(result.checksums)
+        if place := place_in(job.rig, job.output):
+            sums[place.as_posix()] = sha256(job.output)
+        write_sums(job.sums, sums)
 
 
 def _check_paths(job: Validate | ValidateSequence, folder: Path) -> None:
     """Raise `UserError` if there is no folder to check, or if one of two outputs is missing."""
-    if (job.output is None) != (job.sums is None):
+    if isinstance(job, ValidateSequence) and (job.output is None) != (job.sums is None):
         raise UserError("--output, --sums: give both, or neither")
     if not folder.is_dir():
         raise UserError(f"{folder}: no such folder")
@@ -78,20 +84,3 @@ def _print(result: Result) -> None:
     print(result.summary())
     for line in result.failures():
         print(line, file=sys.stderr)
-
-
-def _write(result: Result, job: Validate | ValidateSequence, folder: Path) -> None:
-    """Write validation.json and the checksums, if the job has them."""
-    if job.output and job.sums:
-        write_json(job.output, result.to_json())
-        write_sums(job.sums, result.checksums, folder, job.output)
-
-
-def _noted_sums(path: Path, dataset: Path) -> dict[str, str]:
-    """Return the SHA-256 that the ledger has of the dataset's files, by their path in it."""
-    prefix = f"{dataset}/"
-    return {
-        name.removeprefix(prefix): digest
-        for name, digest in ledger.read(path).items()
-        if name.startswith(prefix)
-    }

@@ -1,90 +1,269 @@
-"""Checks every byte of datasets and families, and sets damaged files aside."""
+"""Checks every byte of datasets, sequences and families.
+
+A file's SHA-256 may be in two places. The receipt of the job that made the file counts first.
+Receipts also have the files of reports, and intermediate files. The list sha256sums.txt in the
+folder of a dataset has its published files. A copy has only this list. The list of a corpus has the
+lists of its datasets.
+"""
 
 import os
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 
+from lightfield.configuration.corpus import CORPUS, SHARDS, THUMBNAILS
+from lightfield.configuration.family import RECORD
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
+from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
+from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
+from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify
-from lightfield.validation.corpus_integrity import corpus_faults, is_corpus
-from lightfield.validation.corpus_integrity import mend as mend_corpus
-from lightfield.validation.integrity import Fault, Integrity
-from lightfield.workflow.member_record import read_members
+
+VALIDATION = "validation.json"
+STRAY = "is not a file of this dataset, or has no checksum"
 
 
 def verify(job: Verify) -> None:
     """Print a line for each fault of a job's folders. Raises `UserError` if there is one."""
     if job.mend and not job.work:
         raise UserError("--mend: needs --work: a dataset can only be mended where it is built")
+    problems: dict[str, str] = {}
     for folder in job.dataset:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
-    faulty_paths: set[Path] = set()
-    corpora = [folder for folder in job.dataset if is_corpus(folder)]
-    for folder in corpora:
-        faulty_paths |= _verify_corpus(job, folder)
-    folders = [folder for folder in job.dataset if folder not in corpora]
-    # A family has no corpus before its first run has ended.
-    members = {_relative(path) for folder in folders for path in _member_datasets(folder)}
-    for folder in dict.fromkeys([*_datasets(folders), *sorted(members)]):
-        faulty_paths |= _verify_dataset(job, folder, folder in members, faulty_paths)
+        # All datasets of a scene share its files. Name them once.
+        for path, problem in faults(folder, job.work).items():
+            if path not in problems:
+                problems[path] = problem
+                print(f"{path}: {problem}", flush=True)
+                if job.mend and job.work:
+                    _mend(path, problem, folder, job.work / receipts.REMOVED)
     names = ", ".join(map(str, job.dataset))
-    if faulty_paths:
+    if problems:
         mended = "; the next run makes them again" if job.mend else ""
-        raise UserError(f"{len(faulty_paths)} faults in {names}{mended}")
+        raise UserError(f"{len(problems)} faults in {names}{mended}")
     print(f"no fault in {names}")
 
 
-def _verify_corpus(job: Verify, folder: Path) -> set[Path]:
-    """Verify a family with a corpus. Return the paths with faults."""
-    # Find all faults before mending the first: mending moves files.
-    faults = [*corpus_faults(folder)]
-    for fault in faults:
-        print(fault, flush=True)
-        if job.mend and job.work:
-            mend_corpus(folder, fault, job.work)
-    return {fault.path for fault in faults}
+def faults(folder: Path, work: Path | None = None) -> dict[str, str]:
+    """Return what is wrong with the files of a dataset, a sequence or a family, by their paths.
+
+    ``work`` is the workflow's folder of intermediate files. A copy has none.
+    """
+    verification = _Verification(Path(receipts.name_of(folder)), work)
+    verification.check()
+    return dict(sorted(verification.problems.items()))
 
 
-def _verify_dataset(
-    job: Verify, folder: Path, is_of_member: bool, faulty_paths: set[Path]
-) -> set[Path]:
-    """Verify a dataset. Return the paths with faults, but for ``faulty_paths``."""
-    # The checksums of a member's dataset are beside its files.
-    integrity = Integrity(folder, None if is_of_member else job.work)
-    # All datasets of a scene share its files. Name them once.
-    faults = [fault for fault in integrity.faults() if fault.path not in faulty_paths]
-    for fault in faults:
-        print(fault, flush=True)
-    if job.mend:
-        _mend(folder, is_of_member, integrity, faults)
-    return {fault.path for fault in faults}
+class _Verification:
+    """The check of a folder. ``problems`` are the faults, by the paths of the files."""
+
+    def __init__(self, folder: Path, work: Path | None) -> None:
+        self.folder = folder
+        self.work = work
+        self.problems: dict[str, str] = {}
+        # The SHA-256 that files may have, each with the receipt that says so.
+        self.made: dict[str, dict[str, str]] = {}
+        # The SHA-256 of published files, and the list that says so.
+        self.listed: dict[str, tuple[str, str]] = {}
+        # The folders that have a list, or must have one. Outer folders come first.
+        self.homes: list[Path] = []
+
+    def check(self) -> None:
+        """Find all faults."""
+        if self.work:
+            self._read_receipts(self.work)
+        present = [str(path) for path in files_below(self.folder)]
+        self.homes = _homes(self.folder, present)
+        read_homes = [home for home in self.homes if self._read_list(home)]
+        for path in {**self.listed, **self.made}:
+            self._check_file(path)
+        self._check_strays(present, read_homes)
+        # A list is older than the receipts if the dataset is not finished.
+        for home in read_homes if not self.made else ():
+            self._check_contents(home)
+
+    def _read_receipts(self, work: Path) -> None:
+        """Read the receipts of the folder, and of the jobs before them."""
+        pending = set(_receipts(self.folder, work))
+        read = set()
+        while pending:
+            path = pending.pop()
+            read.add(path)
+            receipt = receipts.read(path)
+            outputs = receipts.read_part(path)[0]
+            if receipt:
+                outputs = {**receipt.outputs, **outputs}
+                pending |= {*_makers(receipt, work)} - read
+            elif os.path.lexists(path):
+                self.problems[str(path)] = broken(path) or "is damaged"
+            for name, output in outputs.items():
+                if self._concerns(name):
+                    self.made.setdefault(name, {})[output.stamp.sha256] = str(path)
+        if not any(_is_below(name, self.folder) for name in self.made):
+            # The folder is a copy, or older than receipts.
+            self.made = {}
+
+    def _concerns(self, path: str) -> bool:
+        """Return whether a file is one of the folder, of work, or of the folder's scene."""
+        is_of_scene = Path(path).parent in self.folder.parents
+        return is_of_scene or _is_below(path, self.folder) or _is_below(path, self.work)
+
+    def _read_list(self, home: Path) -> bool:
+        """Read the list of a folder. Return whether it is there and undamaged."""
+        path = str(home / SUMS)
+        if not os.path.lexists(path):
+            if path in self.made or not self.made:
+                self.problems[path] = "is missing"
+            return False  # Without a fault, the dataset is not finished.
+        if problem := broken(home / SUMS):
+            self.problems[path] = problem
+        elif path in self.made or path in self.listed:
+            self._check_file(path)
+        if path in self.problems:
+            return False
+        try:
+            sums = read_sums(home / SUMS)
+        except UnicodeDecodeError:
+            sums = {}
+        if not sums:
+            self.problems[path] = "has no checksum"
+        self.listed |= {str(home / name): (digest, path) for name, digest in sums.items()}
+        return bool(sums)
+
+    def _check_file(self, path: str) -> None:
+        """Compare a file with its receipts. Without one, compare it with its list."""
+        listed, list_path = self.listed.get(path, ("", ""))
+        made = self.made.get(path) or {listed: list_path}
+        if not os.path.lexists(path):
+            if listed or self._is_missed(path):
+                self.problems[path] = "is missing"
+            return
+        try:
+            digest = sha256(path)
+        except OSError as error:
+            self.problems[path] = broken(Path(path)) or f"cannot be read: {read_problem(error)}"
+            return
+        if digest in made:
+            return
+        expected, source = next(iter(made.items()))
+        if digest == listed:
+            self.problems[source] = f"is damaged: {list_path} has another sha256 of {path}"
+        else:
+            problem = f"its sha256 is {digest}, but {source} says {expected}"
+            self.problems[path] = broken(Path(path)) or problem
+
+    def _is_missed(self, path: str) -> bool:
+        """Return whether a missing file that no list has is a fault.
+
+        A receipt may name files that the dataset no longer has, such as those of a former export.
+        """
+        parts = Path(path).parts
+        return REPORT in parts or SUMS in parts or _is_below(path, self.work)
+
+    def _check_contents(self, home: Path) -> None:
+        """Check that the list of a copy has what a corpus or a valid dataset must have."""
+        sums, validation, lightfield = home / SUMS, home / VALIDATION, home / NAME
+        if self._is_corpus(home):
+            for path in (str(each / SUMS) for each in self.homes[1:]):
+                if path not in self.listed:
+                    self.problems[path] = f"has no checksum in {sums}"
+            return
+        # A sequence has no light field of its own.
+        required = [validation, *([lightfield] if lightfield.exists() else [])]
+        if self._are_listed(required, sums) and self.problems.keys().isdisjoint(map(str, required)):
+            if not read_json(validation).get("valid"):
+                self.problems[str(validation)] = "says that the dataset is not valid"
+            views = LightField.read(lightfield).views if lightfield in required else []
+            self._are_listed([home / IMAGES / f"{view.name}.exr" for view in views], sums)
+
+    def _are_listed(self, required: Iterable[Path], sums: Path) -> bool:
+        """Return whether files are in a list. The first that is not is a fault of the list."""
+        for path in required:
+            if str(path) not in self.listed:
+                self.problems[str(sums)] = f"has no checksum of {path.relative_to(sums.parent)}"
+                return False
+        return True
+
+    def _check_strays(self, present: Iterable[str], read_homes: Iterable[Path]) -> None:
+        """Find the files without a checksum in the folders whose lists were read."""
+        strays: dict[Path, list[str]] = {home: [] for home in read_homes}
+        known_homes = {*self.homes}
+        for path in present:
+            home = next((each for each in Path(path).parents if each in known_homes), None)
+            if home in strays and path not in self.made and path not in self.listed:
+                name = Path(path).relative_to(home).as_posix()
+                if self._needs_checksum(home, name):
+                    strays[home].append(name)
+        for home, names in strays.items():
+            own = [path for path in self.listed if names and _is_below(path, home)]
+            own_files = [Path(path).relative_to(home).as_posix() for path in own]
+            for name in stray_places(home, names, own_files):
+                self.problems[str(home / name)] = f"{STRAY}{kept_behind_link(home, name)}"
+
+    def _needs_checksum(self, home: Path, name: str) -> bool:
+        """Return whether a file of a finished dataset or corpus must have a checksum."""
+        top = name.partition("/")[0]
+        if self._is_corpus(home):
+            return top in (THUMBNAILS, SHARDS)
+        return top not in (SUMS, CARD, README, REPORT)
+
+    def _is_corpus(self, home: Path) -> bool:
+        return str(home / CORPUS) in self.listed or (home / CORPUS).exists()
 
 
-def _mend(folder: Path, is_of_member: bool, integrity: Integrity, faults: list[Fault]) -> None:
-    """Set damaged files aside, so that the next run makes them again."""
-    if is_of_member and faults:
-        # Without the member's record, the next run makes its damaged files again.
-        (folder.parent / "member.json").unlink(missing_ok=True)
-    elif not is_of_member:
-        for fault in faults:
-            integrity.mend(fault)
+def _homes(folder: Path, present: Iterable[str]) -> list[Path]:
+    """Return the folders that have a list, or must have one. Outer folders come first."""
+    homes = set()
+    for path in map(Path, present):
+        is_dataset = path.name == NAME and (path.parent / IMAGES).is_dir()
+        if is_dataset or path.name in (SUMS, CORPUS):
+            homes.add(path.parent)
+    return sorted(homes, key=lambda home: len(home.parts)) or [folder]
 
 
-def _datasets(folders: list[Path]) -> list[Path]:
-    """Return the datasets in the folders of datasets and sequences. Families have none."""
-    datasets: list[Path] = []
-    for folder in folders:
-        if not any(folder.glob("*/member.json")):
-            datasets += [*Integrity(folder).frames, folder]
-    return [_relative(path) for path in datasets]
+def _is_below(path: str, folder: Path | None) -> bool:
+    """Return whether a path leads into a folder. Faster than `Path` for many files."""
+    return folder is not None and path.startswith(f"{folder}/")
 
 
-def _member_datasets(folder: Path) -> list[Path]:
-    """Return the datasets of the members of a family in ``folder``. Empty for a dataset."""
-    return [
-        folder / member.name / rig for member in read_members(folder) for rig in member.datasets
-    ]
+def _receipts(folder: Path, work: Path) -> Iterator[Path]:
+    """Yield the receipts of a dataset, a sequence or a family, and of its scene."""
+    parts = absolute_path(folder).parts
+    root = work / receipts.FOLDER
+    # The folder of a frame lies in the folder of a rig, and this in the folder of a scene.
+    for count in (3, 2, 1):
+        home = root.joinpath(*parts[-count:])
+        if home.is_dir():
+            of_scene = (parent.glob("*") for parent in home.parents if root in parent.parents)
+            for path in chain(home.rglob("*"), *of_scene):
+                if path.suffix in (receipts.SUFFIX, receipts.PART_SUFFIX):
+                    yield path.with_suffix(receipts.SUFFIX)
+            return
 
 
-def _relative(path: Path) -> Path:
-    return Path(os.path.relpath(path))
+def _makers(receipt: receipts.Receipt, work: Path) -> Iterator[Path]:
+    """Yield the receipts of the jobs that made the inputs of a job."""
+    for name in receipt.inputs:
+        if receipts.is_receipt(name):
+            yield Path(name)
+        elif maker := receipts.find_output(name, work):
+            yield maker[0]
+
+
+def _mend(path: str, problem: str, folder: Path, removed: Path) -> None:
+    """Move a faulty file away, so that the next run makes it again.
+
+    The next run goes on with a family if it lacks a list of checksums.
+    """
+    inside = os.path.relpath(path, folder)
+    if problem.startswith(STRAY) and link_above(folder, inside):
+        return
+    places = [Path(path)]
+    if any(folder.glob(f"*/{RECORD}")):
+        places += [folder / parent / SUMS for parent in Path(inside).parents]
+    for place in places:
+        if os.path.lexists(place):
+            set_aside(place, removed)

@@ -7,6 +7,7 @@ A job has the wildcards of its output's path: ``scene`` and ``rig`` name the fol
 
 import difflib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -16,12 +17,13 @@ from typing import TypeVar
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
-from lightfield.configuration.exports import Export
+from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import load_scene, scene_path
 from lightfield.core.errors import UserError
-from lightfield.core.names import VIEWS
+from lightfield.core.names import MESH, VIEWS
+from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.planning.cost import Cost, cost, members_cost
 from lightfield.workflow.loading import (
@@ -34,6 +36,14 @@ from lightfield.workflow.loading import (
 Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
 SMOKE = "smoke"
+INVENTORY = "inventory.json"
+VALIDATION = "validation.json"
+# The jobs that make files of a dataset, as their receipts are named.
+_JOBS = {
+    "lightfield.json": "lightfield",
+    "transforms.json": "export_instant_ngp",
+    VALIDATION: "validate",
+}
 RENDER = "render"
 """The stage that makes the rendered views. A reprojection's stage has its name."""
 
@@ -100,13 +110,13 @@ class Build:
         dataset = self.dataset(wildcards)
         return _entry(dataset.reprojections, stage, dataset.paths.folder, "reprojection of it")
 
-    def records(self, wildcards: Wildcards) -> list[str]:
-        """Return the records of the shards whose views a job reads."""
-        return self.dataset(wildcards).records(stage_of(wildcards))
+    def receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of the shards whose views a job reads."""
+        return self.dataset(wildcards).receipts(stage_of(wildcards))
 
-    def rendered_records(self, wildcards: Wildcards) -> list[str]:
-        """Return the records of a dataset's rendered views."""
-        return self.dataset(wildcards).records(RENDER)
+    def rendered_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of a dataset's rendered views."""
+        return self.dataset(wildcards).receipts(RENDER)
 
     def lens_maps(self, wildcards: Wildcards) -> list[str]:
         """Return the lens maps of a reprojection. Empty if there is no such reprojection."""
@@ -131,7 +141,7 @@ class Build:
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
-        files = [*dataset.records(RENDER), *dataset.records(stage_of(wildcards))]
+        files = [*dataset.receipts(RENDER), *dataset.receipts(stage_of(wildcards))]
         for test in self.testing(dataset, self.export(wildcards)):
             files += _views_of_source(test, wildcards)
         return list(dict.fromkeys(files))
@@ -190,7 +200,7 @@ class Build:
         """
         files = []
         for frame in self.frames(wildcards):
-            files += [*frame.all_records, *frame.lightfields]
+            files += [*frame.all_receipts, *frame.lightfields]
             for export in frame.exports.selected.values():
                 if export.is_of_sequence:
                     for test in self.testing(frame, export):
@@ -227,12 +237,8 @@ class Build:
 
     @property
     def verified_folders(self) -> list[str]:
-        """The folders of the chosen datasets, of sequences with exports, and of families."""
-        folders = []
-        for dataset in self.chosen:
-            folders.append(dataset.paths.folder)
-            if dataset.sequence_exports:
-                folders.append(dataset.sequence_paths.folder)
+        """The folders of the chosen datasets, sequences and families."""
+        folders = [dataset.sequence_paths.folder for dataset in self.chosen]
         return list(dict.fromkeys([*folders, *self.family_results]))
 
     def first_of_scene(self, folder: str) -> Dataset:
@@ -260,7 +266,7 @@ class Build:
         if files:
             files.append(datasets[0].sequence_paths.validation)
         for dataset in datasets:
-            files += [dataset.paths.validation, *dataset.published, *dataset.all_records]
+            files += [dataset.paths.validation, *dataset.published, *dataset.all_receipts]
         return files
 
     def job_cost(self, stage: str, wildcards: Wildcards) -> Cost:
@@ -271,10 +277,10 @@ class Build:
         dataset = self.dataset(wildcards)
         return cost(stage, dataset, views, wildcards.get("reprojection", ""))
 
-    def truth_records(self, wildcards: Wildcards) -> list[str]:
-        """Return the records of the views with which synthesised views are compared."""
+    def truth_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of the views with which synthesised views are compared."""
         truths = self.held_out(self.dataset(wildcards))
-        return [record for truth in truths for record in truth.records(RENDER)]
+        return [record for truth in truths for record in truth.receipts(RENDER)]
 
     def held_out(self, dataset: Dataset) -> list[Dataset]:
         """Return the scene's chosen datasets that reach less far than this one.
@@ -303,6 +309,31 @@ class Build:
             if dataset.scene_folder == wildcards["scene"] and dataset.splits
         ]
 
+    def receipt_of_file(self, path: str) -> str | None:
+        """Return the receipt of the job that made a file of a dataset, or an inventory.
+
+        A receipt stands for itself. None for another file.
+        """
+        if is_receipt(path):
+            return path
+        folder, _, name = path.rpartition("/")
+        results, work = f"{self.config.results}/", f"{self.config.work}/"
+        job = None
+        if folder.startswith(work) and name == INVENTORY:
+            job = f"{folder.removeprefix(work)}/inventory"
+        elif folder.startswith(results):
+            place = folder.removeprefix(results)
+            above, _, last = place.rpartition("/")
+            if name == MANIFEST and last != MESH:
+                kind = "sequence" if last in SEQUENCE_EXPORTS else "export"
+                job = f"{above.removesuffix('exports')}{kind}_{last}"
+            elif name in _JOBS:
+                is_sequence = name == VALIDATION and place not in self.datasets
+                job = f"{place}/validate_sequence" if is_sequence else f"{place}/{_JOBS[name]}"
+            elif name == MANIFEST:
+                job = place
+        return f"{work}{FOLDER}/{job}{SUFFIX}" if job else None
+
     # Families.
 
     @cached_property
@@ -329,16 +360,13 @@ class Build:
         """The number of batches of all families."""
         return sum(map(len, self.batches.values()))
 
-    def batch_records(self, wildcards: Wildcards) -> list[str]:
-        """Return the records of all batches of a family."""
-        return self._batch_records(wildcards["family"])
+    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of all batches of a family."""
+        return self._batch_receipts(wildcards["family"])
 
-    def _batch_records(self, folder: str) -> list[str]:
-        return [self.batch_record(folder, batch) for batch in self.batches[folder]]
-
-    def batch_record(self, folder: str, batch: str) -> str:
-        """Return the record of a batch."""
-        return f"{self.config.work}/{folder}/batches/{batch}.json"
+    def _batch_receipts(self, folder: str) -> list[str]:
+        receipts = f"{self.config.work}/{FOLDER}/{folder}/batches"
+        return [f"{receipts}/{batch}{SUFFIX}" for batch in self.batches[folder]]
 
     def members(self, wildcards: Wildcards) -> list[Member]:
         """Return the members of the batch that a job builds."""
@@ -391,8 +419,14 @@ class Build:
         """The files that a run with families makes."""
         files = self.corpora
         for folder in self.family_names:
-            files += [f"{self.config.work}/{folder}/members.json", *self._batch_records(folder)]
+            files += [f"{self.config.work}/{folder}/members.json", *self._batch_receipts(folder)]
         return files
+
+
+def has_bundle(receipt: str) -> bool:
+    """Return whether the job of a receipt makes files that no rule declares."""
+    job = receipt.removesuffix(SUFFIX)
+    return bool(re.search(r"/(\d+-\d+|inventory|mesh|(export|sequence)_\w+|batches/\w+)$", job))
 
 
 def learned_exports(dataset: Dataset) -> list[str]:
@@ -412,8 +446,8 @@ def full_datasets(scene: str) -> dict[str, Dataset]:
 def _views_of_source(dataset: Dataset, wildcards: Wildcards) -> list[str]:
     """Return the records and light fields of a dataset's rendered views, and of the source's."""
     return [
-        *dataset.records(RENDER),
-        *dataset.records(stage_of(wildcards)),
+        *dataset.receipts(RENDER),
+        *dataset.receipts(stage_of(wildcards)),
         dataset.paths.lightfield,
         dataset.paths.source_lightfield(wildcards["source"]),
     ]

@@ -2,9 +2,11 @@
 
 import itertools
 import signal
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import LESS_MEMORY
 
 # The likely cause when a signal ended a program.
@@ -19,6 +21,66 @@ _SIGNALS = {
 
 # Lines that tar prints after the cause.
 _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recoverable")
+
+
+# The clocks of nodes differ by at most this many seconds.
+_CLOCKS_DIFFER = 5
+
+
+@dataclass
+class Job:
+    """A job that runs or ran: its rule, log and outputs.
+
+    ``began`` is in seconds since 1970. ``message`` is the executor's message on its failure.
+    """
+
+    rule: str
+    log: Path | None
+    outputs: Sequence[Path]
+    began: float
+    message: str = ""
+
+    def cause(self) -> str | None:
+        """Return why it failed, by its log, or by the full disk that cut the log short.
+
+        Return None if it wrote no log.
+        """
+        if self.log is None or not is_newer(self.log, self.began):
+            return None
+        why = cause(self.log)
+        if why and why.startswith("error: "):
+            return why
+        return obstacle(self.log) or why
+
+    def is_finished(self) -> bool:
+        """Return whether it has written all its outputs."""
+        return all(is_newer(path, self.began) for path in self.outputs)
+
+
+@dataclass
+class Submission:
+    """Jobs that run as one job: a single job, or a ``group`` of them by its name."""
+
+    group: str | None = None
+    jobs: list[Job] = field(default_factory=list)
+
+    def causes(self) -> list[tuple[str, str, Path | None]]:
+        """Return the rule, cause and log of each of its jobs that failed."""
+        # Snakemake says of each job of a group that it failed.
+        failed = [job for job in self.jobs if self.group is None or not job.is_finished()]
+        causes = [(job.rule, why, job.log) for job in failed if (why := job.cause())]
+        return causes or [self._cause_without_logs(job) for job in failed[:1]]
+
+    def _cause_without_logs(self, job: Job) -> tuple[str, str, Path | None]:
+        """Return the rule, cause and log of a job that wrote no log, as if it never began.
+
+        The cause is in the batch system's log, or in the executor's message.
+        """
+        rules = "_".join(sorted({job.rule for job in self.jobs}))
+        batch = batch_log(f"{self.group}_{rules}" if self.group else rules, job.began)
+        # A full disk takes no log at all.
+        why = (batch and cause(batch)) or job.message or (job.log and obstacle(job.log))
+        return job.rule, why or "it said nothing", batch or job.log
 
 
 def cause(log: Path) -> str | None:
@@ -51,14 +113,16 @@ def first_sentence(message: str) -> str:
     return " ".join(lines).strip().rstrip(":")
 
 
-def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
+def failure_report(jobs: Iterable[tuple[str, str, Path | None]]) -> str:
     """Return each cause of failed jobs with one of its logs. Each job is a rule, cause and log."""
-    logs: dict[tuple[str, str], list[Path]] = {}
+    logs: dict[tuple[str, str], list[Path | None]] = {}
     for rule, why, log in jobs:
         logs.setdefault((rule, why), []).append(log)
     paragraphs = []
     for (rule, why), paths in logs.items():
-        paragraph = f"{rule} failed: {why}\n  log: {paths[0]}"
+        paragraph = f"{rule} failed: {why}"
+        if paths[0]:
+            paragraph += f"\n  log: {paths[0]}"
         if len(paths) > 1:
             paragraph += f" (and {len(paths) - 1} more with the same cause)"
         paragraphs.append(paragraph)
@@ -67,7 +131,7 @@ def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
 
 def is_newer(path: Path, time: float) -> bool:
     """Return whether a file exists, and was written after ``time``, in seconds since 1970."""
-    return path.is_file() and path.stat().st_mtime >= time
+    return path.is_file() and path.stat().st_mtime >= time - _CLOCKS_DIFFER
 
 
 def batch_log(name: str, since: float) -> Path | None:

@@ -1,21 +1,25 @@
-"""Shows a run while it works: its phases, a line of progress, warnings, and failures.
+"""Shows a run while it works: its phases, its views, the time left, warnings and failures.
 
-On a terminal the line of progress is rewritten in place. Elsewhere, as in the log of a CI, it is
-written again now and then.
+On a terminal, the phases at work have bars, which are drawn again each second. Elsewhere, as in the
+log of a CI, one line is written now and then. Snakemake's logger plugin tells which jobs start, end
+and fail. The jobs' logs tell how far each is.
 """
 
-import re
-import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from lightfield.core import progress
 from lightfield.core.units import count, duration
+from lightfield.workflow.failures import Job, Submission, failure_report, first_sentence
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.live import Live
 
 # After this many seconds of work, the run's rate counts.
 _SURE_AFTER = 2.0
@@ -23,20 +27,18 @@ _SURE_AFTER = 2.0
 _FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
 _NEXT_LINE = 0.1
-CLEAR_LINE = "\r\x1b[K"
 # The lines of a program's log that the user sees.
-_FOR_THE_USER = re.compile(r"warning: |note: ")
+_FOR_THE_USER = ("warning: ", "note: ", "waiting for ")
 
 
 @dataclass
 class Task:
-    """A job: its rule, ``name``, phase and log.
+    """A job: its name, its phase and its log.
 
     ``views`` is the number of the dataset's views that it renders. ``seconds`` is its estimated
     time on one core, None if that is unknown.
     """
 
-    rule: str
     name: str
     phase: str
     log: Path
@@ -100,52 +102,151 @@ class Task:
 class RunDisplay:
     """Shows the progress of a run's tasks.
 
-    ``look`` returns the keys of the jobs that are running, finished and failed. ``explain`` returns
-    why the jobs of some keys failed.
+    The Snakefile calls `begin` and `at_close`. Snakemake's logger plugin calls what says what
+    Snakemake does. ``forecast`` prints the end of a dry run. ``find_log`` returns the file of a log
+    that Snakemake names.
     """
 
     def __init__(
         self,
-        look: Callable[[], tuple[Iterable[Hashable], Iterable[Hashable], Iterable[Hashable]]],
-        explain: Callable[[set[Hashable]], str],
+        forecast: Callable[[], object] = lambda: None,
+        find_log: Callable[[str], Path] = Path,
         stream: TextIO | None = None,
     ) -> None:
-        self._look = look
-        self._explain = explain
+        self._forecast = forecast
+        self._find_log = find_log
         self._stream = stream or sys.stderr
-        self._terminal = self._stream.isatty()
-        self._failed: set[Hashable] = set()
+        self._live: Live | None = None
+        # Whether Snakemake's logger plugin calls this.
+        self.is_told = False
+        self._is_shown = False
+        self._at_close: list[Callable[[], object]] = []
+        # The jobs that run or ran, and what belongs to them, by Snakemake's numbers.
+        self._jobs: dict[int, Job] = {}
+        self._submissions: dict[int, Submission] = {}
+        self._started: dict[int, Task] = {}
+        self._running: set[int] = set()
+        self._failed: set[int] = set()
+        self._new_failures: set[int] = set()
         self._shown_warnings: set[str] = set()
-        self._drawn = False
         self._end = threading.Event()
         self._lock = threading.RLock()
-        self.begin({}, 1)
+        self._set_tasks({}, 1)
 
-    def begin(self, tasks: Mapping[Hashable, Task], cores: int) -> None:
-        """Begin to show these tasks, which share ``cores``."""
-        self._tasks = tasks
+    def _set_tasks(self, tasks: Mapping[Path, Task], cores: int) -> None:
+        self._tasks = dict(tasks)
         self._open = dict(tasks)
         self._cores = cores
         self._phases = dict.fromkeys(task.phase for task in tasks.values())
         self._began = time.time()
         self._due = _FIRST_LINE
 
+    def begin(self, tasks: Mapping[Path, Task], cores: int) -> None:
+        """Begin to show these tasks, by their logs. They share ``cores``."""
+        with self._lock:
+            self._set_tasks(tasks, cores)
+
     def start(self) -> None:
-        """Update the display each second, until `stop`."""
+        """Update the display each second, until it is closed."""
         threading.Thread(target=self._watch, daemon=True).start()
 
-    def stop(self) -> None:
-        """Update the display a last time."""
-        if not self._end.is_set():
-            self._end.set()
-            self.update()
-            self.clear()
+    def at_close(self, action: Callable[[], object]) -> None:
+        """Call ``action`` after Snakemake's last message. Without the logger plugin, at once."""
+        if self.is_told:
+            self._at_close.append(action)
+        else:
+            action()
+
+    # What Snakemake does, by its logger plugin.
+
+    def planned(self, *, is_dry_run: bool, is_shown: bool) -> None:
+        """Take notice of Snakemake's plan, which has jobs, and whether to show the progress."""
+        if is_dry_run and self._forecast not in self._at_close:
+            self._at_close.append(self._forecast)
+        self._is_shown = is_shown
+
+    def submission(self, group: str | None = None) -> Submission:
+        """Return the jobs that start next as one: a single job, or a group by its name."""
+        return Submission(group)
+
+    def started(
+        self,
+        number: int,
+        rule: str,
+        logs: Sequence[str],
+        outputs: Sequence[str],
+        submission: Submission,
+    ) -> None:
+        """Take notice of a job that starts, perhaps for another time."""
+        with self._lock:
+            now = time.time()
+            path = self._find_log(logs[0]) if logs else None
+            self._jobs[number] = Job(rule, path, [Path(output) for output in outputs], now)
+            submission.jobs.append(self._jobs[number])
+            self._submissions[number] = submission
+            self._running.add(number)
+            self._failed.discard(number)
+            # A job without outputs takes seconds, and answers on the terminal.
+            if path and outputs:
+                if path not in self._tasks:
+                    self._tasks[path] = self._open[path] = Task(path.stem, rule, path)
+                    self._phases[rule] = None
+                task = self._started[number] = self._tasks[path]
+                task.began = task.began or now
+
+    def finished(self, number: int) -> None:
+        """Take notice of a job that is finished."""
+        with self._lock:
+            self._running.discard(number)
+            if task := self._started.get(number):
+                self._follow(task)
+                task.ended = time.time()
+                self._open.pop(task.log, None)
+
+    def failed(self, number: int, message: str | None) -> None:
+        """Take notice of a job that failed, and of the executor's message. This may come twice."""
+        with self._lock:
+            self._running.discard(number)
+            if number in self._jobs and number not in self._failed:
+                self._jobs[number].message = first_sentence(message or "")
+                self._failed.add(number)
+                self._new_failures.add(number)
+
+    def say(self, text: str) -> None:
+        """Write a line above the progress."""
+        with self._lock:
+            if self._live:
+                self._live.console.print(text)
+            else:
+                self._stream.write(f"{text}\n")
+                self._stream.flush()
+
+    def close(self) -> None:
+        """Show the end of the run: Snakemake has written its last message."""
+        self._end.set()
+        with self._lock:
+            if self._is_shown:
+                self.update()
+            if self._live:
+                self._live.stop()
+                self._live = None
+        while self._at_close:
+            self._at_close.pop(0)()
+
+    # What the Snakefile prints at the end.
+
+    def failures(self) -> str:
+        """Return why the jobs of this run failed."""
+        # Snakemake does not say which job lacks an output. Such a job does not end.
+        return self._explain(self._failed or self._running)
 
     def summary(self, cpu_seconds: float | None) -> str:
         """Return what the run did and took, and its forecast, if these are known.
 
-        With Snakemake's ``--until`` a run ends before all tasks have run.
+        Empty if it had no tasks. With Snakemake's ``--until`` a run ends before all tasks have run.
         """
+        if not self._tasks:
+            return ""
         ended = [task for task in self._tasks.values() if task.ended is not None]
         jobs = count(len(self._tasks), "job")
         if len(ended) < len(self._tasks):
@@ -158,34 +259,23 @@ class RunDisplay:
             return text
         return f"{text}; the forecast was {duration(_expected_seconds(ended))}"
 
-    def clear(self) -> None:
-        """Remove the line of progress from the terminal, so that other text can be written."""
-        with self._lock:
-            if self._drawn:
-                self._write(CLEAR_LINE)
-                self._drawn = False
+    # What it shows meanwhile.
 
     def _watch(self) -> None:
         while not self._end.wait(1):
-            self.update()
+            if self._is_shown:
+                self.update()
 
     def update(self) -> None:
-        """Look at the state of the run, and show it."""
+        """Read the logs of the jobs that run, and show the state of the run."""
         with self._lock:
-            running, finished, failed = map(set, self._look())
-            now = time.time()
-            for key, task in list(self._open.items()):
-                if task.began is None and key in running | finished | failed:
-                    task.began = now
+            for task in self._open.values():
                 if task.began is not None:
                     self._follow(task)
-                if key in finished:
-                    task.ended = now
-                    del self._open[key]
-            self._report_failed(failed, running)
+            self._report_failed()
             self._report_phases()
             if self._open and not self._end.is_set():
-                self._draw(now)
+                self._draw(time.time())
 
     def _follow(self, task: Task) -> None:
         """Read a job's progress from its log, and show the lines for the user."""
@@ -197,18 +287,23 @@ class RunDisplay:
                 task.done = report.done
                 task.total = report.total + task.already
                 task.each = report.each
-            elif _FOR_THE_USER.match(line) and line not in self._shown_warnings:
+            elif line.startswith(_FOR_THE_USER) and line not in self._shown_warnings:
                 self._shown_warnings.add(line)
                 # A note names its subject. A warning does not, so add the task.
                 text = line.removeprefix("warning: ")
-                self._say(line if text == line else f"warning: {task.name}: {text}")
+                self.say(line if text == line else f"warning: {task.name}: {text}")
 
-    def _report_failed(self, failed: set[Hashable], running: set[Hashable]) -> None:
+    def _report_failed(self) -> None:
         """Say at once why a job failed, if others go on. The end of the run repeats it."""
-        new = {key for key in failed - self._failed if key in self._tasks}
-        self._failed |= failed
-        if new and running:
-            self._say(self._explain(new))
+        new = self._new_failures & self._failed
+        self._new_failures.clear()
+        if new and self._running:
+            self.say(self._explain(new))
+
+    def _explain(self, numbers: Iterable[int]) -> str:
+        submissions = {id(each): each for each in map(self._submissions.__getitem__, numbers)}
+        causes = [cause for each in submissions.values() for cause in each.causes()]
+        return failure_report(sorted(causes, key=str))
 
     def _report_phases(self) -> None:
         waiting = {task.phase for task in self._open.values()}
@@ -220,16 +315,36 @@ class RunDisplay:
             done = count(views_made, "view") if has_views else count(len(tasks), "job")
             began = min(task.began or self._began for task in tasks)
             ended = max(task.ended or began for task in tasks)
-            self._say(f"{phase}: {done} in {duration(ended - began)}")
+            self.say(f"{phase}: {done} in {duration(ended - began)}")
 
     def _draw(self, now: float) -> None:
-        if self._terminal:
-            columns = shutil.get_terminal_size().columns
-            self._write(CLEAR_LINE + self.line(now)[: columns - 1])
-            self._drawn = True
+        if self._stream.isatty():
+            self._live = self._live or _new_live(self._stream)
+            self._live.update(self._bars(now), refresh=True)
         elif now - self._began >= self._due:
             self._due = now - self._began + max(_FIRST_LINE, _NEXT_LINE * (now - self._began))
-            self._say(self.line(now))
+            at_work = dict.fromkeys(task.at_work for task in self._tasks_at_work())
+            self.say(" · ".join([self.line(now), *at_work]))
+
+    def _bars(self, now: float) -> "RenderableType":
+        """Return a bar for each phase at work, and the line of progress."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        bars = Table.grid(padding=(0, 1), expand=True)
+        bars.add_column(no_wrap=True)
+        bars.add_column(ratio=1)
+        bars.add_column(no_wrap=True, justify="right")
+        for phase in dict.fromkeys(task.phase for task in self._tasks_at_work()):
+            tasks = [task for task in self._tasks.values() if task.phase == phase]
+            part = sum(task.part for task in tasks) / len(tasks)
+            bars.add_row(phase, ProgressBar(total=1.0, completed=part), _state(tasks))
+        return Group(bars, Text(self.line(now), no_wrap=True, overflow="ellipsis"))
+
+    def _tasks_at_work(self) -> list[Task]:
+        return [self._started[number] for number in sorted(self._running & self._started.keys())]
 
     def line(self, now: float) -> str:
         """Return the line of progress at ``now``, in seconds since 1970."""
@@ -243,8 +358,7 @@ class RunDisplay:
             if views_made and now > since and any(task.views for task in self._open.values()):
                 parts[-1] += f", {60 * views_made / (now - since):.3g} a minute"
         parts.append(f"{duration(self.seconds_left(now))} left")
-        at_work = [task.at_work for task in self._open.values() if task.began is not None]
-        return " · ".join([*parts, *dict.fromkeys(at_work)])
+        return " · ".join(parts)
 
     def seconds_left(self, now: float) -> float:
         """Return an estimate of the seconds until the run ends.
@@ -279,13 +393,26 @@ class RunDisplay:
                 expected += (task.seconds or 0.0) * task.views_made / task.views
         return spent / expected if expected else 1.0
 
-    def _say(self, text: str) -> None:
-        self.clear()
-        self._write(f"{text}\n")
 
-    def _write(self, text: str) -> None:
-        self._stream.write(text)
-        self._stream.flush()
+def _new_live(stream: TextIO) -> "Live":
+    """Return what draws at the end of a terminal."""
+    # It takes long to import.
+    from rich.console import Console
+    from rich.live import Live
+
+    console = Console(file=stream, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    live = Live(console=console, auto_refresh=False, transient=True)
+    live.start()
+    return live
+
+
+def _state(tasks: Sequence[Task]) -> str:
+    """Return how much of the work of a phase is done."""
+    if views := sum(task.views for task in tasks):
+        return f"{sum(task.views_done for task in tasks)} of {views} views"
+    if len(tasks) == 1 and tasks[0].total > 1:
+        return f"{tasks[0].already + tasks[0].done} of {tasks[0].total}"
+    return f"{sum(task.ended is not None for task in tasks)} of {count(len(tasks), 'job')}"
 
 
 def _expected_seconds(tasks: Iterable[Task]) -> float:

@@ -1,8 +1,8 @@
-"""Journals of shards: lines of JSON that say what each process did, and how fast.
+"""The history in receipts: lines that say what each process of a job did, and how fast.
 
-Every process that works on a shard appends to the shard's journal at once. So the journal holds all
-the time that was spent, even by killed processes. Times of day are seconds since 1970. The lines of
-a process are in this order:
+Every process that works on a shard notes at once what it has done. So the history holds all the
+time that was spent, even by killed processes. Times of day are seconds since 1970. The lines of a
+process are in this order:
 
 - ``started``, ``host``, ``pid``: when and where it began;
 - ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open;
@@ -16,7 +16,7 @@ a process are in this order:
 import os
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -25,11 +25,8 @@ from typing import Any
 import psutil
 
 from lightfield.core import memory
-from lightfield.core.files import append_json_line, read_json_lines
-from lightfield.workflow.shard_files import JOURNAL_SUFFIX
-
-# The journals of all shards in a folder. 0-6.journal.jsonl is for the views from 0 to 5.
-JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
+from lightfield.core.receipts import PART_SUFFIX, SUFFIX, history, is_shard
+from lightfield.workflow.shard_log import log
 
 # A view is suspect if it took less than this part of the median time of its shard's views.
 _SUSPECT_PART = 0.02
@@ -51,24 +48,18 @@ _LINES: dict[str, dict[str, type]] = {
 }
 
 
-class Journal:
-    """Appends the lines of this process to a journal. With ``path`` None it writes nothing."""
+class History:
+    """Notes the beginning and the end of this process."""
 
-    def __init__(self, path: Path | None) -> None:
-        self.path = path
-        # Until now Python has loaded modules, which takes hardly longer than its processor time.
+    def __init__(self) -> None:
+        # Python's imports are over here. They took about as long as their CPU time.
         self.started = round(time.time() - time.process_time(), 3)
-        self.append({"started": self.started, "host": socket.gethostname(), "pid": os.getpid()})
-
-    def append(self, entry: Mapping[str, Any]) -> None:
-        """Add one line, at once."""
-        if self.path:
-            append_json_line(self.path, entry)
+        log({"started": self.started, "host": socket.gethostname(), "pid": os.getpid()})
 
     def end(self) -> None:
-        """Add the line of a process that has done all its work."""
+        """Note that this process has done all its work."""
         now = time.time()
-        self.append(
+        log(
             {
                 "ended": round(now, 3),
                 "wall_seconds": round(now - self.started, 4),
@@ -80,7 +71,7 @@ class Journal:
 
 @dataclass
 class Run:
-    """One process's part of a journal: its start, its images, and its end if it was not killed."""
+    """What one process did: its start, its images, and its end if it was not killed."""
 
     start: dict[str, Any]
     views: list[dict[str, Any]] = field(default_factory=list)
@@ -134,13 +125,19 @@ class Run:
             return False
 
 
+def shards(folder: Path) -> list[Path]:
+    """Return the receipts of the shards in a folder, also of shards that were never finished."""
+    files = [*folder.glob(f"*{SUFFIX}"), *folder.glob(f"*{PART_SUFFIX}")]
+    return sorted({path.with_suffix(SUFFIX) for path in files if is_shard(path)})
+
+
 def read(path: Path) -> list[Run]:
-    """Return the runs in a journal, in their order.
+    """Return the runs in the history of a receipt, in their order.
 
     Leaves out damaged lines, lines that a kill cut short, and lines before the first start.
     """
     runs: list[Run] = []
-    for entry in read_json_lines(path):
+    for entry in history(path):
         if not _is_sound(entry):
             continue
         if "started" in entry:
@@ -162,7 +159,7 @@ def is_suspect(seconds: float, other_seconds: Sequence[float]) -> bool:
 
 
 def _is_sound(entry: dict[str, Any]) -> bool:
-    """Return whether an entry is a journal's line with all its keys."""
+    """Return whether an entry is a line of history with all its keys."""
     kind = next((kind for kind in _LINES if kind in entry), None)
     if kind is None:
         return False

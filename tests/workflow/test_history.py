@@ -1,4 +1,4 @@
-"""What follows from journals: views that hang, and suspect views."""
+"""What follows from the history of jobs: views that hang, and suspect views."""
 
 import json
 import signal
@@ -8,9 +8,9 @@ import sys
 import pytest
 from conftest import SCRIPTS, largest_file
 
-from lightfield.core import files
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.workflow.journal import Journal, is_suspect, read
+from lightfield.workflow.history import is_suspect, read
 
 
 def test_a_view_that_took_far_less_time_than_others_is_suspect():
@@ -20,8 +20,8 @@ def test_a_view_that_took_far_less_time_than_others_is_suspect():
 
 
 def test_lines_before_the_first_start_belong_to_no_run(tmp_path):
-    """A journal whose first line was damaged can still be read."""
-    path = tmp_path / "0-2.journal.jsonl"
+    """A history whose first line was damaged can still be read."""
+    path = tmp_path / "0-2.part"
     view = {"finished": 12.0, "wall_seconds": 2.0, "cpu_seconds": 2.0, "render_seconds": 1.0}
     lines = [
         {"start_up_seconds": 1.0, "device": "CPU", "threads": 1},
@@ -31,23 +31,24 @@ def test_lines_before_the_first_start_belong_to_no_run(tmp_path):
         {"view": "view_0001f"} | view,
     ]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
-    (run,) = read(path)
+    (run,) = read(path.with_suffix(".jsonl"))
     assert run.start["started"] == 20.0 and run.end is None
     assert [line["view"] for line in run.views] == ["view_0001f"]
 
 
-def test_a_journal_continues_after_a_truncated_line(tmp_path):
-    path = tmp_path / "journal.jsonl"
-    journal = Journal(path)
-    size = path.stat().st_size
-    with (
-        largest_file(size + 5),
-        pytest.raises(UserError, match=r"journal\.jsonl: cannot be written: File too large"),
-    ):
-        journal.append({"view": "lost"})
-    assert path.stat().st_size == size + 5
-    journal.append({"view": "kept"})
-    assert [entry.get("view") for entry in files.read_json_lines(path)] == [None, "kept"]
+def test_a_history_continues_after_a_truncated_line(tmp_path):
+    path = tmp_path / "receipts/0-2.jsonl"
+    with receipts.opened(path, {}, []) as receipt:
+        receipt.log({"view": "first"})
+        size = path.with_suffix(".part").stat().st_size
+        with (
+            largest_file(size + 5),
+            pytest.raises(UserError, match=r"0-2\.part: cannot be written: File too large"),
+        ):
+            receipt.log({"view": "lost"})
+        receipt.log({"view": "kept"})
+    lines = receipts.history(path)
+    assert [line["view"] for line in lines] == ["first", "kept"]
 
 
 HANG = """

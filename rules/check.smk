@@ -1,0 +1,251 @@
+# Decides which jobs run: those whose receipts do not say that their files are fine.
+import atexit
+import contextlib
+import functools
+import itertools
+import json
+import os
+import re
+import sys
+import uuid
+from pathlib import Path
+
+from lightfield.core import bundles
+from lightfield.core.errors import UserError
+from lightfield.core.files import set_aside, unreadable, write_text
+from lightfield.stages import job_settings
+from lightfield.stages.registry import VERSIONS
+from lightfield.workflow import run_lock
+from lightfield.workflow.build import has_bundle
+from lightfield.core.receipts import SUFFIX
+from lightfield.workflow.check import JobCheck
+
+RECEIPTS = f"{WORK}/receipts"
+# An input of each job. It has new content if a job must run, and no other job looks at it.
+MARK = f"{WORK}/check.txt"
+# A plan names at most this many outdated jobs.
+MOST_REASONS = 10
+# The names of jobs, with wildcards, and the functions that return their inputs and settings.
+JOBS = []
+# The jobs that Snakemake asked about: their names with wildcards, and the wildcards, by receipt.
+ASKED = {}
+# The settings that differ from their files. They are written when a run starts.
+NEW_SETTINGS = {}
+
+
+def receipt_of(job):
+    """Return the output that is the receipt of a job. ``job`` is its name, with wildcards."""
+    return update(f"{RECEIPTS}/{job}.jsonl")
+
+
+def bundle_of(job):
+    """Return the output that is the bundle of a job. Empty if jobs share a folder."""
+    return f"{RECEIPTS}/{job}{bundles.SUFFIX}" if STORE else []
+
+
+def reads(job, stage=None, **inputs):
+    """Return the inputs of a rule: its files, its settings, and the mark that makes it run.
+
+    ``job`` is the name of the job, with wildcards, as `receipt_of` has it. ``stage`` is the name of
+    its settings. ``inputs`` are paths with wildcards, lists of them, or input functions.
+    """
+
+    def wanted(wildcards):
+        """Return the job's inputs by name, and the path and content of its settings."""
+        files = {name: paths_of(each, wildcards) for name, each in inputs.items()}
+        if not stage:
+            return files, None, {}
+        path, content = asked(
+            lambda names: job_settings.settings_file(stage, BUILD, names), wildcards
+        )
+        if "inputs" in content:
+            content["inputs"] = [*flat(files.values())]
+        return files, path, content
+
+    def input_function(wildcards):
+        files, path, content = wanted(wildcards)
+        settings = {"settings": settings_file(path, content)} if path else {}
+        receipt = f"{RECEIPTS}/{job.format(**dict(wildcards.items()))}.jsonl"
+        ASKED[receipt] = job, Names(wildcards.items())
+        if STORE:
+            # Snakemake compares times. The check cannot see the files in the storage.
+            return files | settings | carried(files)
+        if not IS_MAIN_PROCESS:
+            return files | settings | {"mark": ancient(MARK)}
+        is_fine = CHECK.verdict(receipt, content).is_fine
+        if not os.path.exists(MARK):
+            new_mark()
+        files = {name: unless_newer(receipt, each) for name, each in files.items()}
+        # The mark comes first: for the first file below a folder, Snakemake lists all folders down to
+        # that file, and never sees what is written into them later, such as settings.
+        mark = {"mark": ancient(MARK) if is_fine else new_mark()}
+        return mark | files | settings
+
+    JOBS.append((job, wanted))
+    return unpack(input_function)
+
+
+def carried(files):
+    """Return the inputs with which the files of a job's inputs reach another machine.
+
+    These are the receipts of the jobs that made the inputs, and their bundles. A job that reads
+    only the receipts names its inputs ``receipts`` or ``lists``.
+    """
+    receipts, packed = [], []
+    for name, each in files.items():
+        found = [BUILD.receipt_of_file(path) for path in flat([each])]
+        receipts += filter(None, found)
+        if name not in ("receipts", "lists"):
+            packed += [path for path in found if path and has_bundle(path)]
+    bundled = [path.removesuffix(SUFFIX) + bundles.SUFFIX for path in packed]
+    return {"makers": [*dict.fromkeys(receipts)], "bundles": [*dict.fromkeys(bundled)]}
+
+
+def paths_of(each, wildcards):
+    """Return an input of a job: a path, or a list of paths."""
+    if callable(each):
+        return each(wildcards)
+    if isinstance(each, str):
+        return each.format(**dict(wildcards.items()))
+    return [paths_of(one, wildcards) for one in each]
+
+
+def flat(inputs):
+    """Yield the paths of inputs, which are paths or lists of paths."""
+    for each in inputs:
+        yield from [each] if isinstance(each, str) else each
+
+
+def unless_newer(receipt, each):
+    """Return an input, so that Snakemake does not see its time if it is only newer."""
+    if not isinstance(each, str):
+        return [unless_newer(receipt, one) for one in each]
+    return ancient(each) if CHECK.is_only_newer(receipt, each) else each
+
+
+def write_or_end(path, text):
+    """Write a text. End the run with one line if the disk takes none."""
+    try:
+        write_text(path, text)
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
+@functools.cache
+def new_mark():
+    """Give the mark new content, and return it. Snakemake ignores a mere new time."""
+    write_or_end(MARK, f"{uuid.uuid4()}\n")
+    return MARK
+
+
+def settings_file(path, content):
+    """Return the settings file of a job as an input. Its time does not count: the check reads it.
+
+    The file is written now only if it is missing, because a live run may read it. A run writes the
+    others when it starts.
+    """
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    if STORE:
+        NEW_SETTINGS[path] = text
+        return path
+    if IS_MAIN_PROCESS:
+        if unreadable(path):
+            set_aside(Path(path), Path(REMOVED))
+        if not os.path.exists(path):
+            write_or_end(path, text)
+        elif Path(path).read_bytes() != text.encode():
+            NEW_SETTINGS[path] = text
+    return ancient(path)
+
+
+def write_new_settings():
+    """Write the settings that differ from their files."""
+    for path, text in NEW_SETTINGS.items():
+        if not STORE:
+            write_text(path, text)
+
+
+def mark_of_settings(wildcards):
+    """Return the mark as the input of the job that writes settings, new if they have changed."""
+    text = NEW_SETTINGS[wildcards.path]
+    is_same = STORAGE.read(wildcards.path) == text.encode()
+    return ancient(local(MARK)) if is_same else local(new_mark())
+
+
+class Names(dict):
+    """The wildcards of a job, by their names, as input functions get them."""
+
+    __getattr__ = dict.__getitem__
+
+
+def wanted_settings(receipt):
+    """Return the wanted settings of a receipt's job. None if no job of this plan makes it."""
+    for job, wanted in JOBS:
+        if found := re.fullmatch(expression_of(job), name_of(receipt)):
+            # A job that the configuration no longer has would end the run.
+            with contextlib.suppress(SystemExit):
+                _, _, content = wanted(Names(found.groupdict()))
+                return content
+
+
+@functools.cache
+def expression_of(job):
+    """Return the regular expression that the names of jobs match."""
+    parts = re.split(r"\{(\w+)\}", job)
+    texts = map(re.escape, parts[::2])
+    wildcards = [f"(?P<{name}>{CONSTRAINTS[name]})" for name in parts[1::2]]
+    return "".join(
+        itertools.chain(*itertools.zip_longest(texts, wildcards, fillvalue=""))
+    )
+
+
+CHECK = JobCheck(Path(WORK), wanted_settings, VERSIONS)
+if IS_MAIN_PROCESS:
+    # The next plan need not read the same files again.
+    atexit.register(CHECK.sums.save)
+
+
+def scene_folders():
+    """Return the folders of the receipts of the scenes that this run makes."""
+    scenes = {
+        Path(receipt).relative_to(RECEIPTS).parts[0] for receipt in CHECK.verdicts
+    }
+    return [
+        Path(RECEIPTS, name) for name in sorted(scenes) if not name.endswith(".jsonl")
+    ]
+
+
+def announce_changes():
+    """Say which files this run makes again, and why. Another run may be replacing them now."""
+    if any(map(run_lock.is_held, scene_folders())):
+        return
+    for verdict in CHECK.verdicts.values():
+        for path in verdict.damaged:
+            print(f"{path}: {damage_of(path)}; it is made anew", file=sys.stderr)
+    outdated = {
+        receipt: verdict.outdated
+        for receipt, verdict in CHECK.verdicts.items()
+        if verdict.outdated
+    }
+    for receipt in [*outdated][:MOST_REASONS]:
+        changes = ", ".join(outdated[receipt][:3])
+        print(f"outdated: {name_of(receipt)}: {changes}", file=sys.stderr)
+    if len(outdated) > MOST_REASONS:
+        print(f"outdated: and {len(outdated) - MOST_REASONS} more", file=sys.stderr)
+
+
+def damage_of(path):
+    """Return what is wrong with a file that is not as its receipt says."""
+    if not os.path.lexists(path):
+        return "is missing"
+    return unreadable(path) or "its sha256 is not the one in its receipt"
+
+
+def planned_jobs():
+    """Return the jobs that run: their names with wildcards, and the wildcards."""
+    return [job for receipt, job in ASKED.items() if CHECK.will_run(receipt)]
+
+
+def name_of(receipt):
+    """Return the name of the job of a receipt."""
+    return receipt.removeprefix(f"{RECEIPTS}/").removesuffix(".jsonl")

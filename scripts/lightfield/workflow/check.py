@@ -1,0 +1,204 @@
+"""The check before the plan: compares the receipts of jobs with the disk and the wanted settings.
+
+A job is fine if its receipt has the wanted settings, and the sums that its inputs and outputs have
+now. Otherwise its files are *missing*, *damaged* (their bytes are not what the receipt says) or
+*outdated* (settings or inputs are not what the receipt says). The check changes no result.
+
+A file is read only if its size or time differs from its receipt. The sums of files that were read
+are kept in work/sums.json, so that each is read once.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lightfield.core import receipts
+from lightfield.core.errors import UserError
+from lightfield.core.files import DAMAGE, Stamp, size_and_time, write_json
+from lightfield.core.receipts import Receipt
+
+NAME = "sums.json"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the check found out about a job. A job without a reason to run is fine.
+
+    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files.
+    """
+
+    has_receipt: bool = True
+    outdated: list[str] = field(default_factory=list)
+    damaged: list[str] = field(default_factory=list)
+
+    @property
+    def is_fine(self) -> bool:
+        return self.has_receipt and not self.outdated and not self.damaged
+
+
+class Sums:
+    """The sums of files that were read, by their paths, sizes and times."""
+
+    def __init__(self, path: Path) -> None:
+        # Snakemake leaves the folder of the run before its process ends.
+        self._path = path.absolute()
+        self._stamps: dict[str, list[Any]] = {}
+        self._has_new = False
+        try:
+            self._stamps = dict(json.loads(path.read_bytes()))
+        except (OSError, *DAMAGE):
+            pass
+
+    def of(self, path: str) -> str | None:
+        """Return the SHA-256 of a file. None if there is no file, or if it cannot be read."""
+        found = size_and_time(path)
+        if found is None:
+            return None
+        if tuple(self._stamps.get(path, ())[1:]) != found:
+            try:
+                self._stamps[path] = [*Stamp.of(path)]
+            except OSError:
+                return None
+            self._has_new = True
+        return str(self._stamps[path][0])
+
+    def save(self) -> None:
+        """Write the sums, if there are new ones. On a full disk, the next plan reads again."""
+        if self._has_new:
+            with suppress(UserError):
+                write_json(self._path, self._stamps)
+            self._has_new = False
+
+
+class _Summary(NamedTuple):
+    """The sum of a receipt, and the paths of its inputs."""
+
+    sum: str
+    inputs: tuple[str, ...]
+
+
+class JobCheck:
+    """Judges jobs by their receipts. ``work`` is the folder of intermediate files.
+
+    ``wanted`` returns the wanted settings of a job, by the path of its receipt. None if no job of
+    this run makes the receipt. ``versions`` has the version of each stage.
+    """
+
+    def __init__(
+        self,
+        work: Path,
+        wanted: Callable[[str], Mapping[str, Any] | None],
+        versions: Mapping[str, int | None],
+    ) -> None:
+        self.work = work
+        self.verdicts: dict[str, Verdict] = {}
+        self.sums = Sums(work / NAME)
+        self._wanted = wanted
+        self._versions = versions
+        self._summaries: dict[str, _Summary | None] = {}
+        self._oldest: dict[str, int] = {}
+        self._input_sums: dict[str, str | None] = {}
+        self._runs: dict[str, bool] = {}
+        self._makers: dict[str, str | None] = {}
+
+    def _summary(self, path: str) -> "_Summary | None":
+        """Return what readers need of a receipt. None if it is missing or damaged."""
+        if path not in self._summaries:
+            self._read(path)
+        return self._summaries[path]
+
+    def _read(self, path: str) -> Receipt | None:
+        """Return a receipt, and keep its summary. The outputs of all shards would take memory."""
+        receipt = receipts.read(path)
+        self._summaries[path] = _Summary(receipt.sum, tuple(receipt.inputs)) if receipt else None
+        return receipt
+
+    def verdict(self, path: str, settings: Mapping[str, Any]) -> Verdict:
+        """Return the verdict on the job with a receipt and these wanted settings."""
+        if path not in self.verdicts:
+            self.verdicts[path] = self._judge(path, settings)
+        return self.verdicts[path]
+
+    def _judge(self, path: str, settings: Mapping[str, Any]) -> Verdict:
+        receipt = self._read(path)
+        if receipt is None:
+            return Verdict(has_receipt=False)
+        outdated = [*self._changed_settings(receipt, settings)]
+        outdated += [name for name, digest in receipt.inputs.items() if self._sum(name) != digest]
+        oldest = os.stat(path).st_mtime_ns  # noqa: PTH116, a `Path` is slow for many files
+        damaged = []
+        for name, output in receipt.outputs.items():
+            # Snakemake also takes the time of the job's benchmark, which is written after these.
+            oldest = min(oldest, output.stamp.modified_ns)
+            stamp = size_and_time(name)
+            if stamp != output.stamp[1:]:
+                # Snakemake touches the declared outputs of a job after the job.
+                oldest = min(oldest, stamp[1] if stamp else oldest)
+                if self.sums.of(name) != output.stamp.sha256:
+                    damaged.append(name)
+        self._oldest[path] = oldest
+        return Verdict(True, outdated, damaged)
+
+    def _changed_settings(self, receipt: Receipt, settings: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the settings that are not as the receipt says, and the version of the stage."""
+        for key in {**settings, **receipt.settings}:
+            if receipt.settings.get(key) != settings.get(key):
+                yield f"setting {key}"
+        if receipt.version != self._versions.get(receipt.stage):
+            yield f"version of {receipt.stage}"
+
+    def _sum(self, name: str) -> str | None:
+        """Return the present sum of an input."""
+        if name not in self._input_sums:
+            if receipts.is_receipt(name):
+                summary = self._summary(name)
+                self._input_sums[name] = summary and summary.sum
+            else:
+                self._input_sums[name] = self.sums.of(name)
+        return self._input_sums[name]
+
+    def is_only_newer(self, path: str, name: str) -> bool:
+        """Return whether a fine job reads a file that has a newer time, but the same bytes.
+
+        So it is after a touch or a copy. Such a file is no reason to run, unless the job that made
+        it runs.
+        """
+        if not self.verdicts[path].is_fine or path not in self._oldest:
+            return False
+        stamp = size_and_time(name)
+        if stamp is None or stamp[1] < self._oldest[path]:
+            return False
+        maker = self._maker(name)
+        return maker is None or not self.will_run(maker)
+
+    def _maker(self, name: str) -> str | None:
+        """Return the receipt of the job that made an input."""
+        if receipts.is_receipt(name):
+            return name
+        if name not in self._makers:
+            found = receipts.find_output(name, self.work)
+            self._makers[name] = str(found[0]) if found else None
+        return self._makers[name]
+
+    def will_run(self, path: str) -> bool:
+        """Return whether the job of a receipt runs.
+
+        It runs if it is not fine, or if a job runs that makes one of its inputs.
+        """
+        if path not in self._runs:
+            settings = self._wanted(path)
+            summary = self._summary(path)
+            # A job that is its own ancestor, as no plan has one, would not end.
+            self._runs[path] = False
+            if settings is not None and summary:
+                makers = map(self._maker, summary.inputs)
+                self._runs[path] = not self.verdict(path, settings).is_fine or any(
+                    self.will_run(maker) for maker in makers if maker
+                )
+            else:
+                self._runs[path] = summary is None
+        return self._runs[path]

@@ -1,0 +1,138 @@
+"""Old results are used for what they are: in copies, with new times, and from older versions."""
+
+import os
+import shutil
+
+import bookkeeping
+import pytest
+import tiny
+from bookkeeping import rendered
+from checkouts import assert_same_bytes, planned, snakemake
+
+pytestmark = pytest.mark.slow
+NOTHING = "Nothing to be done"
+# The jobs that a change of the scene YAML plans.
+PUBLISHED = {"export_to_instant_ngp", "validate", "checksums", "costs", "page", "index"}
+REPROJECTED = {"lens_map", "reprojected_lightfield", "reproject"} | PUBLISHED
+RENDERED = {"lightfield", "check_cameras", "render", "figures"} | REPROJECTED
+CHANGES = {
+    ("licence: CC0-1.0", "licence: CC-BY-4.0"): {"page", "index"},
+    ("fov: 80", "fov: 70"): REPROJECTED,
+    ("samples: 4", "samples: 5"): REPROJECTED
+    | {"lightfield", "check_cameras", "render", "figures"},
+}
+
+
+def plan(folder):
+    return snakemake(folder, "--dry-run", *tiny.CHOSEN).stderr
+
+
+def copy_without_times(folder, parent):
+    """Return a copy of everything with new times and without Snakemake's notes."""
+    copy = shutil.copytree(folder, parent / "copy", copy_function=shutil.copyfile)
+    shutil.rmtree(copy / ".snakemake")
+    return copy
+
+
+def test_a_copy_without_times_has_nothing_to_do(built_tiny, tmp_path):
+    copy = copy_without_times(built_tiny, tmp_path)
+    assert NOTHING in plan(copy)
+    # The second plan reads no file again.
+    assert NOTHING in plan(copy)
+
+
+@pytest.mark.parametrize("without_notes", [False, True])
+def test_a_changed_setting_plans_its_jobs_and_no_others(built_tiny, tmp_path, without_notes):
+    if without_notes:
+        folder = copy_without_times(built_tiny, tmp_path)
+    else:
+        folder = shutil.copytree(built_tiny, tmp_path / "copy")
+    for (old, new), rules in CHANGES.items():
+        tiny.edit(folder, old, new)
+        assert planned(folder, *tiny.CHOSEN).keys() - {"all"} == rules
+        tiny.edit(folder, new, old)
+    assert NOTHING in plan(folder)
+
+
+@pytest.mark.parametrize("without_notes", [False, True])
+def test_new_times_run_nothing(tiny_build, without_notes):
+    if without_notes:
+        shutil.rmtree(tiny_build / ".snakemake")
+    names = [
+        path for name in ("results", "work", "configs") for path in (tiny_build / name).rglob("*")
+    ]
+    for path in [*names, tiny_build / "config.yaml", tiny_build / "Snakefile"]:
+        os.utime(path)
+        # Each file by itself takes too long.
+    assert NOTHING in plan(tiny_build)
+    for name in (
+        tiny.LIGHTFIELD,
+        tiny.BLEND,
+        tiny.VIEW,
+        bookkeeping.shard(tiny.NAME, "render", "0-2"),
+    ):
+        os.utime(tiny_build / name)
+        assert NOTHING in plan(tiny_build), name
+
+
+def test_touching_outputs_with_snakemake_hides_nothing(tiny_build):
+    (tiny_build / tiny.VIEW).write_text("not a view")
+    tiny.build(tiny_build, "--touch")
+    assert planned(tiny_build, *tiny.CHOSEN)["render"] == 1
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    tiny.build(tiny_build, "--touch")
+    assert planned(tiny_build, *tiny.CHOSEN)["reproject"] == 3
+
+
+def test_other_views_and_shards_give_the_bytes_of_a_fresh_build(tiny_build, tmp_path):
+    for count, change in enumerate(
+        [
+            lambda: tiny.edit(tiny_build, "cameras: [3, 2]", "cameras: [3, 3]"),
+            lambda: tiny.edit(tiny_build, "cameras: [3, 3]", "cameras: [2, 2]"),
+        ]
+    ):
+        change()
+        tiny.build(tiny_build)
+        assert NOTHING in plan(tiny_build), count
+    before = rendered(tiny_build)
+    tiny.build(tiny_build, "views_per_shard=3")
+    assert rendered(tiny_build) == before
+    fresh = tiny.checked_out(tmp_path / "fresh")
+    tiny.edit(fresh, "cameras: [3, 2]", "cameras: [2, 2]")
+    tiny.build(fresh)
+    assert_same_bytes(fresh, tiny_build)
+
+
+def test_a_flipped_byte_at_the_old_time_is_refused_by_its_reader(tiny_build):
+    """The plan compares sizes and times. Jobs that read the file, and verify, compare bytes."""
+    view = tiny_build / tiny.VIEW
+    status = view.stat()
+    content = bytearray(view.read_bytes())
+    content[len(content) // 2] ^= 1
+    view.write_bytes(content)
+    os.utime(view, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert NOTHING in plan(tiny_build)
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    result = snakemake(tiny_build, *tiny.CHOSEN)
+    assert result.returncode == 1
+    assert f"{tiny.VIEW}: is not as its job made it" in result.stdout + result.stderr
+    # Now the plan knows.
+    before = rendered(tiny_build)
+    tiny.build(tiny_build)
+    assert (rendered(tiny_build) - before).total() == 1
+
+
+@pytest.mark.parametrize("with_log", [True, False])
+def test_no_view_of_an_older_version_is_rendered_again(built_tiny, tiny_build, with_log):
+    """Older versions noted views in a log. Also the published checksums tell what is intact."""
+    for shard in tiny.SHARDS:
+        for stage in ("render", "perspective"):
+            if with_log:
+                bookkeeping.write_as_older_version(tiny_build, tiny.NAME, stage, shard)
+    bookkeeping.forget_all(tiny_build)
+    if with_log:
+        (tiny_build / f"results/{tiny.NAME}/sha256sums.txt").unlink()
+    tiny.build(tiny_build)
+    assert not rendered(tiny_build)
+    assert_same_bytes(built_tiny, tiny_build)
+    assert NOTHING in plan(tiny_build)
