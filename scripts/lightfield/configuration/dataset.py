@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Literal
 
 from lightfield.configuration import scene_yaml
@@ -13,7 +12,7 @@ from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
-from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
+from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.names import PARTS
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
@@ -228,26 +227,6 @@ class Dataset(Capture):
         """The lightfield.json of the dataset and of each of its reprojections."""
         prefixes = ["", *map(prefix_of, self.reprojections)]
         return [self.paths.source_lightfield(prefix) for prefix in prefixes]
-
-    @property
-    def image_folders(self) -> list[str]:
-        """The names of the folders that hold views, their passes and reprojections."""
-        folders = ["exr", *(view_pass.name for view_pass in self.render.selected_passes)]
-        if self.render.light_groups:
-            # Only lightfield.json names all of them.
-            present = Path(self.paths.folder).glob(f"{passes.GROUP_PREFIX}*")
-            folders = list(dict.fromkeys([*folders, *sorted(path.name for path in present)]))
-        if self.flow:
-            folders.append(passes.FLOW.name)
-        folders += self.reprojections
-        for name, reprojection in self.reprojections.items():
-            for pass_name in reprojection.passes:
-                if pass_name == LIGHT_GROUPS:
-                    groups = [each for each in folders if each.startswith(passes.GROUP_PREFIX)]
-                    folders += [f"{name}/{group}" for group in groups]
-                else:
-                    folders.append(f"{name}/{pass_name}")
-        return folders
 
     @property
     def exported(self) -> list[str]:

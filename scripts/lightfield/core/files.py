@@ -159,18 +159,6 @@ def write_json(path: Path | str, content: Any) -> None:
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
-def write_json_if_changed(path: Path, content: Any) -> bool:
-    """Write ``content`` as JSON, atomically, if the file differs. Return whether it was written."""
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-    try:
-        if path.read_text(encoding="utf-8") == text:
-            return False
-    except (OSError, UnicodeDecodeError):
-        pass
-    write_text(path, text)
-    return True
-
-
 def write_csv(path: Path | str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows with the same columns as CSV, atomically. The first line names the columns."""
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:

@@ -8,9 +8,8 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from lightfield.core.bundles import VARIABLE
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 
@@ -20,12 +19,6 @@ class Storage:
 
     def __init__(self, url: str) -> None:
         self.url = url
-
-    @classmethod
-    def configured(cls) -> Self | None:
-        """Return the storage in this process's environment. None if all machines share a folder."""
-        url = os.environ.get(VARIABLE)
-        return cls(url) if url else None
 
     def _place(self, path: str) -> Any:
         """Return the place of a file in the storage. It has a path's methods."""
