@@ -54,6 +54,14 @@ def test_a_file_with_its_key_and_bytes_is_finished_whichever_shard_made_it(seals
     assert not finished("0-2.jsonl", Path("exr/gone.exr"))
 
 
+def test_a_new_view_reads_the_receipt_of_no_other_shard(monkeypatch):
+    """Each of thousands of shards would read the receipts of all."""
+    render("0-1.jsonl", Path("exr/a.exr"))
+    with opened("1-2.jsonl"):
+        monkeypatch.setattr(receipts, "read", None)
+        assert not shard_log.is_finished(Path("exr/b.exr"), "key")
+
+
 def test_a_file_of_another_key_stays_until_it_is_overwritten():
     view = Path("exr/a.exr")
     render("0-1.jsonl", view, key="old")
