@@ -13,14 +13,14 @@ from pathlib import Path
 from lightfield.core import bundles
 from lightfield.core.errors import UserError
 from lightfield.core.files import set_aside, unreadable, write_text
+from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import run_lock
 from lightfield.workflow.build import has_bundle
-from lightfield.core.receipts import SUFFIX
 from lightfield.workflow.check import JobCheck
 
-RECEIPTS = f"{WORK}/receipts"
+RECEIPTS = f"{WORK}/{FOLDER_OF_RECEIPTS}"
 # An input of each job. It has new content if a job must run, and no other job looks at it.
 MARK = f"{WORK}/check.txt"
 # A plan names at most this many outdated jobs.
@@ -35,7 +35,7 @@ NEW_SETTINGS = {}
 
 def receipt_of(job):
     """Return the output that is the receipt of a job. ``job`` is its name, with wildcards."""
-    return update(f"{RECEIPTS}/{job}.jsonl")
+    return update(f"{RECEIPTS}/{job}{SUFFIX}")
 
 
 def bundle_of(job):
@@ -65,7 +65,7 @@ def reads(job, stage=None, **inputs):
     def input_function(wildcards):
         files, path, content = wanted(wildcards)
         settings = {"settings": settings_file(path, content)} if path else {}
-        receipt = f"{RECEIPTS}/{job.format(**dict(wildcards.items()))}.jsonl"
+        receipt = f"{RECEIPTS}/{job.format(**dict(wildcards.items()))}{SUFFIX}"
         ASKED[receipt] = job, Names(wildcards.items())
         if STORE:
             # Snakemake compares times. The check cannot see the files in the storage.
@@ -146,7 +146,7 @@ def settings_file(path, content):
     """
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     if STORE:
-        NEW_SETTINGS[path] = text
+        STORED_SETTINGS[path] = text
         return path
     if IS_MAIN_PROCESS:
         if unreadable(path):
@@ -161,15 +161,7 @@ def settings_file(path, content):
 def write_new_settings():
     """Write the settings that differ from their files."""
     for path, text in NEW_SETTINGS.items():
-        if not STORE:
-            write_text(path, text)
-
-
-def mark_of_settings(wildcards):
-    """Return the mark as the input of the job that writes settings, new if they have changed."""
-    text = NEW_SETTINGS[wildcards.path]
-    is_same = STORAGE.read(wildcards.path) == text.encode()
-    return ancient(local(MARK)) if is_same else local(new_mark())
+        write_text(path, text)
 
 
 class Names(dict):
@@ -181,7 +173,7 @@ class Names(dict):
 def wanted_settings(receipt):
     """Return the wanted settings of a receipt's job. None if no job of this plan makes it."""
     for job, wanted in JOBS:
-        if found := re.fullmatch(expression_of(job), name_of(receipt)):
+        if found := re.fullmatch(expression_of(job), job_of(receipt)):
             # A job that the configuration no longer has would end the run.
             with contextlib.suppress(SystemExit):
                 _, _, content = wanted(Names(found.groupdict()))
@@ -208,11 +200,11 @@ if IS_MAIN_PROCESS:
 def scene_folders():
     """Return the folders of the receipts of the scenes that this run makes."""
     scenes = {
-        Path(receipt).relative_to(RECEIPTS).parts[0] for receipt in CHECK.verdicts
+        scene
+        for scene, separator, _ in (job_of(each).partition("/") for each in ASKED)
+        if separator
     }
-    return [
-        Path(RECEIPTS, name) for name in sorted(scenes) if not name.endswith(".jsonl")
-    ]
+    return [Path(RECEIPTS, scene) for scene in sorted(scenes)]
 
 
 def announce_changes():
@@ -229,7 +221,7 @@ def announce_changes():
     }
     for receipt in [*outdated][:MOST_REASONS]:
         changes = ", ".join(outdated[receipt][:3])
-        print(f"outdated: {name_of(receipt)}: {changes}", file=sys.stderr)
+        print(f"outdated: {job_of(receipt)}: {changes}", file=sys.stderr)
     if len(outdated) > MOST_REASONS:
         print(f"outdated: and {len(outdated) - MOST_REASONS} more", file=sys.stderr)
 
@@ -246,6 +238,6 @@ def planned_jobs():
     return [job for receipt, job in ASKED.items() if CHECK.will_run(receipt)]
 
 
-def name_of(receipt):
+def job_of(receipt):
     """Return the name of the job of a receipt."""
-    return receipt.removeprefix(f"{RECEIPTS}/").removesuffix(".jsonl")
+    return receipt.removeprefix(f"{RECEIPTS}/").removesuffix(SUFFIX)

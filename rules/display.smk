@@ -143,7 +143,7 @@ def print_pages():
     """Print the paths of the pages of this run's datasets, which are all valid."""
     prefix = f"{STORE}/" if STORE else ""
     validated = {
-        name_of(receipt)
+        job_of(receipt)
         for receipt, (job, _) in ASKED.items()
         if KINDS[job].phase == "validation"
     }

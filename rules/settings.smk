@@ -14,7 +14,7 @@ rule write_settings:
         path=rf"{re.escape(WORK)}/(.+/)?settings/.+\.json" if STORE else one_of([]),
     localrule: True
     params:
-        text=lambda wildcards: NEW_SETTINGS[wildcards.path],
+        text=lambda wildcards: STORED_SETTINGS[wildcards.path],
     message:
         "Storing {output}"
     run:

@@ -12,6 +12,17 @@ PROVIDER, _, PLACE = STORE.rpartition("://")
 COPIES = f".snakemake/storage/{PROVIDER or 'fs'}/{PLACE.strip('/')}/" if STORE else ""
 
 
+# The settings of a plan with a storage, by path. A job writes each of them: see rules/settings.smk.
+STORED_SETTINGS = {}
+
+
+def mark_of_settings(wildcards):
+    """Return the mark as the input of the job that writes settings, new if they have changed."""
+    text = STORED_SETTINGS[wildcards.path]
+    is_same = STORAGE.read(wildcards.path) == text.encode()
+    return ancient(local(MARK)) if is_same else local(new_mark())
+
+
 def check_storage():
     """Raise `UserError` for a path that jobs could not find in a storage."""
     places = {"results": RESULTS, "work": WORK}
