@@ -10,7 +10,7 @@ from typing import Literal
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
-from lightfield.configuration.dataset_paths import Paths, prefix_of
+from lightfield.configuration.dataset_paths import Paths, prefix_of, scene_folder
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.names import PARTS
@@ -64,8 +64,7 @@ class Dataset(Capture):
     @property
     def scene_folder(self) -> str:
         """The folder of the scene under its preset: garden, garden_tiny, or garden_tiny/0007."""
-        is_full = self.preset == "full"
-        folder = self.scene_name if is_full else f"{self.scene_name}_{self.preset}"
+        folder = scene_folder(self.scene_name, self.preset)
         return f"{folder}/{self.member}" if self.member else folder
 
     @property

@@ -36,6 +36,7 @@ from lightfield.core.files import (
     append_json_line,
     atomic_path,
     file_watchers,
+    read_json_lines,
     read_problem,
     set_aside,
     unreadable,
@@ -115,17 +116,12 @@ def read_part(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
     """
     outputs: dict[str, Output] = {}
     history: list[dict[str, Any]] = []
-    try:
-        text = path.with_suffix(PART_SUFFIX).read_bytes()
-    except OSError:
-        return outputs, history
-    for line in text.splitlines():
-        try:
-            more_outputs, more_history = _sorted([_checked(json.loads(line), dict)])
-        except DAMAGE:
-            continue
-        outputs |= more_outputs
-        history += more_history
+    with suppress(UserError):
+        for line in read_json_lines(path.with_suffix(PART_SUFFIX)):
+            with suppress(*DAMAGE):
+                more_outputs, more_history = _sorted([line])
+                outputs |= more_outputs
+                history += more_history
     return outputs, history
 
 

@@ -43,9 +43,7 @@ class MemberBuild:
     def __init__(self, settings: BatchSettings, member: Member) -> None:
         self.settings = settings
         self.member = member
-        is_full = settings.preset == "full"
-        family = settings.family if is_full else f"{settings.family}_{settings.preset}"
-        place = f"{family}/{member.name}"
+        place = settings.folder_of(member)
         self.folder = Path(settings.results, place)
         self.work = Path(settings.work, place)
         self.receipt = Path(settings.work, receipts.FOLDER, place, f"member{receipts.SUFFIX}")

@@ -21,7 +21,8 @@ IMAGES = "exr"
 SUMS = "sha256sums.txt"
 """The file with a dataset's checksums. Only a valid dataset has it."""
 
-OUTPUTS = ("validation.json", SUMS)
+VALIDATION = "validation.json"
+OUTPUTS = (VALIDATION, SUMS)
 """The files in a dataset that its validation writes."""
 
 REPORT = "report"

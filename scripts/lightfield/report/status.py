@@ -18,7 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
 from lightfield.core.receipts import FOLDER, Output
 from lightfield.core.units import duration
-from lightfield.formats.layout import IMAGES
+from lightfield.formats.layout import IMAGES, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
@@ -207,7 +207,7 @@ def _reprojected(shards: Path, folder: Path, rendering: RenderProgress) -> int:
 
 def _validated(folder: Path, count: int, rendering: RenderProgress) -> str:
     """Return whether a dataset's current views were validated, and the result."""
-    path = folder / "validation.json"
+    path = folder / VALIDATION
     if len(rendering.finished) < count or not path.exists():
         return "no"
     if path.stat().st_mtime_ns < max(rendering.finished.values()):

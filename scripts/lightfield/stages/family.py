@@ -8,6 +8,7 @@ from pydantic import Field
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.corpus import CorpusOptions
+from lightfield.configuration.dataset_paths import scene_folder
 from lightfield.configuration.family import Draw, Member
 from lightfield.core.paths import files_below
 from lightfield.core.receipts import FOLDER
@@ -39,6 +40,10 @@ class BatchSettings(Settings):
     )
     bpy: str | None = cause("Version of Blender. If it changes, the job runs again.")
 
+    def folder_of(self, member: Member) -> str:
+        """Return the folder of a member in the folders of results, of work and of receipts."""
+        return f"{scene_folder(self.family, self.preset)}/{member.name}"
+
 
 class BuildMembers(Stage[BatchSettings]):
     """Builds a batch of a family's members: all their datasets, one member after the other."""
@@ -54,11 +59,8 @@ class BuildMembers(Stage[BatchSettings]):
 
     def shared(self) -> Iterator[Path]:
         settings = self.settings
-        family = settings.family
-        if settings.preset != "full":
-            family = f"{family}_{settings.preset}"
         for member in settings.members:
-            place = f"{family}/{member.name}"
+            place = settings.folder_of(member)
             yield from files_below(Path(settings.results, place))
             yield from files_below(Path(settings.work, FOLDER, place))
             yield Path(settings.work, place, "member.log")

@@ -17,11 +17,10 @@ from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
-from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, read_sums
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, VALIDATION, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify
 
-VALIDATION = "validation.json"
 STRAY = "is not a file of this dataset, or has no checksum"
 
 

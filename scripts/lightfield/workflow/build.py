@@ -17,6 +17,7 @@ from typing import TypeVar
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
+from lightfield.configuration.dataset_paths import scene_folder
 from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
@@ -25,10 +26,10 @@ from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, VIEWS
 from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
 from lightfield.formats.export_lists import MANIFEST
+from lightfield.formats.layout import VALIDATION
 from lightfield.planning.cost import Cost, cost, members_cost
 from lightfield.workflow.loading import (
     chosen_families,
-    family_folder,
     load_datasets,
     scene_datasets,
 )
@@ -37,7 +38,6 @@ Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
-VALIDATION = "validation.json"
 # The jobs that make files of a dataset, as their receipts are named.
 _JOBS = {
     "lightfield.json": "lightfield",
@@ -339,7 +339,7 @@ class Build:
     @cached_property
     def family_names(self) -> dict[str, str]:
         """The names of the chosen families, by their folders."""
-        return {family_folder(name, self.config): name for name in self.families}
+        return {scene_folder(name, self.config.preset): name for name in self.families}
 
     @cached_property
     def batches(self) -> dict[str, dict[str, list[Member]]]:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Configuration, Preset
 from lightfield.configuration.dataset import Cluster, Dataset
+from lightfield.configuration.dataset_paths import scene_folder
 from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
@@ -64,18 +65,13 @@ def chosen_families(settings: Configuration) -> dict[str, Family]:
     return families
 
 
-def family_folder(scene: str, settings: Configuration) -> str:
-    """Return the folder of a family under its preset: chairs, or chairs_tiny."""
-    return scene if settings.preset == "full" else f"{scene}_{settings.preset}"
-
-
 def _check_scene_folder(scene: str, settings: Configuration) -> None:
     """Raise `UserError` if another scene under another preset would have the same folder.
 
     The scene garden_tiny has the folder of the scene garden under the preset tiny.
     """
     is_full = settings.preset == "full"
-    folder = scene if is_full else f"{scene}_{settings.preset}"
+    folder = scene_folder(scene, settings.preset)
     base, _, preset = folder.rpartition("_")
     other_scene = base if is_full else folder
     has_preset_suffix = preset in settings.presets.keys() - {"full"}
