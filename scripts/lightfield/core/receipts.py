@@ -125,10 +125,21 @@ def read_part(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
     return outputs, history
 
 
-def history(path: Path) -> list[dict[str, Any]]:
-    """Return the history of a job in the order of time, also of its killed processes."""
+def noted(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
+    """Return the outputs and the history of a job, finished or not.
+
+    ``path`` is that of its receipt. The history is in the order of time, and has killed processes.
+    """
     receipt = read(path)
-    return [*(receipt.history if receipt else []), *read_part(path)[1]]
+    outputs, history = read_part(path)
+    if receipt is None:
+        return outputs, history
+    return {**receipt.outputs, **outputs}, [*receipt.history, *history]
+
+
+def history(path: Path) -> list[dict[str, Any]]:
+    """Return the history of a job, finished or not."""
+    return noted(path)[1]
 
 
 def _sorted(lines: Iterable[dict[str, Any]]) -> tuple[dict[str, Output], list[dict[str, Any]]]:
@@ -456,8 +467,7 @@ class OpenReceipt:
         outputs: dict[str, Output] = {}
         shards = {path.with_suffix(SUFFIX) for path in self.path.parent.iterdir()}
         for shard in sorted(shards - {self.path}):
-            receipt = read(shard)
-            outputs |= {**(receipt.outputs if receipt else {}), **read_part(shard)[0]}
+            outputs |= noted(shard)[0]
         return outputs
 
 

@@ -6,7 +6,7 @@ its file is as the job left it. A reprojected view counts if it is also no older
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -92,10 +92,12 @@ def look(folder: Path, shards: Path, now: float) -> RenderProgress:
     """
     rendering = RenderProgress()
     names: list[str] = []
+    noted = {path: receipts.noted(path) for path in history.shards(shards / RENDER)}
+    outputs_of_shards = [outputs for outputs, _ in noted.values()]
     try:
         if (folder / NAME).exists():
             lightfield = LightField.read(folder / NAME)
-            outputs = _outputs(shards / RENDER, folder / IMAGES)
+            outputs = _images(outputs_of_shards, folder / IMAGES)
             for view in lightfield.views:
                 names.append(view.name)
                 output = outputs.get(view.name)
@@ -103,8 +105,8 @@ def look(folder: Path, shards: Path, now: float) -> RenderProgress:
                     rendering.finished[view.name] = output.stamp.modified_ns
     except UserError as error:
         print(f"{error}; it is made anew", file=sys.stderr)
-    for path in history.shards(shards / RENDER):
-        if runs := history.read(path):
+    for path, (_, lines_of_history) in noted.items():
+        if runs := history.runs_in(lines_of_history):
             first, end = map(int, path.stem.split("-"))
             missing = any(name not in rendering.finished for name in names[first:end])
             _add_shard(rendering, f"{first}:{end}", runs, missing, now)
@@ -113,19 +115,17 @@ def look(folder: Path, shards: Path, now: float) -> RenderProgress:
     return rendering
 
 
-def _outputs(shards: Path, folder: Path) -> dict[str, Output]:
+def _images(outputs_of_shards: Iterable[Mapping[str, Output]], folder: Path) -> dict[str, Output]:
     """Return the images in a folder that are as the shards made them, by the names of the views."""
     beginning = f"{receipts.name_of(folder)}/"
-    outputs = {}
-    for path in history.shards(shards):
-        receipt = receipts.read(path)
-        made = [*(receipt.outputs.items() if receipt else ()), *receipts.read_part(path)[0].items()]
-        for name, output in made:
+    images = {}
+    for outputs in outputs_of_shards:
+        for name, output in outputs.items():
             view, _, suffix = name.removeprefix(beginning).rpartition(".")
             is_image = name == f"{beginning}{view}.{suffix}" and suffix in ("exr", "png")
             if is_image and output.stamp.matches(name):
-                outputs[view] = output
-    return outputs
+                images[view] = output
+    return images
 
 
 def _add_shard(
@@ -196,7 +196,7 @@ def outlook(remaining: int, recent: int, seconds: float) -> str:
 
 def _reprojected(shards: Path, folder: Path, rendering: RenderProgress) -> int:
     """Count the finished views that are reprojected too."""
-    outputs = _outputs(shards, folder)
+    outputs = _images((receipts.noted(path)[0] for path in history.shards(shards)), folder)
     count = 0
     for name, rendered_ns in rendering.finished.items():
         # A cube map is finished with its last face.

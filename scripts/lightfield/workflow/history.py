@@ -16,7 +16,7 @@ process are in this order:
 import os
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
@@ -132,12 +132,17 @@ def shards(folder: Path) -> list[Path]:
 
 
 def read(path: Path) -> list[Run]:
-    """Return the runs in the history of a receipt, in their order.
+    """Return the runs in the history of a receipt, in their order."""
+    return runs_in(history(path))
+
+
+def runs_in(entries: Iterable[dict[str, Any]]) -> list[Run]:
+    """Return the runs in a history, in their order.
 
     Leaves out damaged lines, lines that a kill cut short, and lines before the first start.
     """
     runs: list[Run] = []
-    for entry in history(path):
+    for entry in entries:
         if not _is_sound(entry):
             continue
         if "started" in entry:
