@@ -102,7 +102,7 @@ rule validate_sequence:
         " > {log} 2>&1"
 
 
-# The jobs that made the files are unknown when this is planned. It reads all files, also those of an
+# The jobs that made the files are unknown when this is planned. It reads all files, also of an
 # unfinished build. With a storage, it takes the finished datasets from there.
 rule verify:
     log:

@@ -56,7 +56,7 @@ def unpack(receipt_path: Path) -> None:
     """Write the files of a bundle, unless they exist. Does nothing without a bundle.
 
     A file that the receipt does not have as an output is written only if it is missing: it may be
-    the user's own, and newer. Raises `UserError` for bytes that are not those of the receipt.
+    the user's own, and newer. Raises `UserError` for bytes that are not as in the receipt.
     """
     receipt = receipts.read(receipt_path)
     bundle = bundle_of(receipt_path)

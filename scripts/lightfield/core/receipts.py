@@ -112,7 +112,7 @@ def read(path: str | Path) -> Receipt | None:
 def read_part(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
     """Return the outputs and the history of an unfinished receipt. Skips damaged lines.
 
-    ``path`` is that of the receipt.
+    ``path`` is the path of the receipt.
     """
     outputs: dict[str, Output] = {}
     history: list[dict[str, Any]] = []
@@ -128,7 +128,8 @@ def read_part(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
 def noted(path: Path) -> tuple[dict[str, Output], list[dict[str, Any]]]:
     """Return the outputs and the history of a job, finished or not.
 
-    ``path`` is that of its receipt. The history is in the order of time, and has killed processes.
+    ``path`` is the path of its receipt. The history is in the order of time, and has killed
+    processes.
     """
     receipt = read(path)
     outputs, history = read_part(path)
@@ -172,7 +173,7 @@ def _line(path: str, output: Output) -> dict[str, Any]:
 
 
 def is_receipt(path: str | Path) -> bool:
-    """Return whether a path is that of a receipt."""
+    """Return whether a path leads to a receipt."""
     return str(path).endswith(SUFFIX) and FOLDER in Path(path).parts
 
 

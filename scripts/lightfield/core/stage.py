@@ -142,7 +142,7 @@ class Stage(BaseModel, Generic[StageSettings]):
         yield from self._paths("written")
 
     def shared(self) -> Iterator[Path]:
-        """Yield files that other jobs need, also on other machines, beside those of the receipt."""
+        """Yield files beside the receipt's that other jobs need, also on other machines."""
         yield from ()
 
     def _paths(self, role: str) -> Iterator[Path]:

@@ -128,7 +128,7 @@ class MemberBuild:
         return scene_yaml.check_member(self.content, file)
 
     def _datasets(self, written: Scene) -> list[Dataset]:
-        places = {
+        fields = {
             "results_root": self.settings.results,
             "work_root": self.settings.work,
             # One shard has all views.
@@ -136,7 +136,7 @@ class MemberBuild:
             "member": self.member.name,
         }
         settings = self.settings
-        return datasets_of(settings.family, written, settings.preset, settings.limits, places)
+        return datasets_of(settings.family, written, settings.preset, settings.limits, fields)
 
     def _fail(self, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member. Removes what is half-written of it."""

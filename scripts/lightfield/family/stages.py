@@ -1,4 +1,4 @@
-"""The stages that make the datasets of one member: those of the rules, with the same settings.
+"""The stages that make the datasets of one member: the rules' stages, with the same settings.
 
 All stages of a member run in this process, so that Blender is loaded once for many members. Each
 stage that needs the scene opens its .blend anew, as the stages of other scenes do. The stages have

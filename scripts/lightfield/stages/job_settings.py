@@ -371,7 +371,7 @@ def _validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Setting
 
 
 def _probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    """Return the settings of a scene's probe cameras: those of its first rig."""
+    """Return the settings of a scene's probe cameras. They are its first rig's settings."""
     return "probes", lightfield(build.first_of_scene(wildcards["scene"]))
 
 

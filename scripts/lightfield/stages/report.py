@@ -75,7 +75,7 @@ class ReportIndex(Stage[ReaderSettings]):
 
     name = "report_index"
     function = "lightfield.report.index_page:write"
-    # It lists all datasets in the folder, also those of other runs.
+    # It lists all datasets in the folder, also datasets of other runs.
     reads_history = True
 
     settings: ReaderSettings = ReaderSettings()

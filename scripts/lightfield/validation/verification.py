@@ -157,7 +157,7 @@ class _Verification:
     def _is_missed(self, path: str) -> bool:
         """Return whether a missing file that no list has is a fault.
 
-        A receipt may name files that the dataset no longer has, such as those of a former export.
+        A receipt may name files that the dataset no longer has, such as files of a former export.
         """
         parts = Path(path).parts
         return REPORT in parts or SUMS in parts or _is_below(path, self.work)
