@@ -3,6 +3,7 @@
 import io
 import re
 import time
+from pathlib import Path
 
 import pytest
 
@@ -211,3 +212,15 @@ def test_progress_lines_can_be_parsed(capsys):
     assert (last.done, last.total, last.already) == (2, 2, None)
     assert 0 <= last.each < 1
     assert progress.read("3 of 4 views") is None
+
+
+def test_the_end_of_a_run_is_shown_from_the_folder_of_the_run(tmp_path, monkeypatch):
+    """With --directory, Snakemake leaves that folder before the display closes."""
+    monkeypatch.chdir(tmp_path)
+    display = RunDisplay()
+    display.is_told = True
+    folders = []
+    display.at_close(lambda: folders.append(Path.cwd()))
+    monkeypatch.chdir("/")
+    display.close()
+    assert folders == [tmp_path]

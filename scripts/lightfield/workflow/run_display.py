@@ -5,6 +5,7 @@ log of a CI, one line is written now and then. Snakemake's logger plugin tells w
 and fail. The jobs' logs tell how far each is.
 """
 
+import contextlib
 import sys
 import threading
 import time
@@ -120,6 +121,7 @@ class RunDisplay:
         # Whether Snakemake's logger plugin calls this.
         self.is_told = False
         self._is_shown = False
+        self._folder = Path.cwd()
         self._at_close: list[Callable[[], object]] = []
         # The jobs that run or ran, and what belongs to them, by Snakemake's numbers.
         self._jobs: dict[int, Job] = {}
@@ -230,8 +232,10 @@ class RunDisplay:
             if self._live:
                 self._live.stop()
                 self._live = None
-        while self._at_close:
-            self._at_close.pop(0)()
+        # With --directory, Snakemake has left the folder of the run. Paths are relative to it.
+        with contextlib.chdir(self._folder):
+            while self._at_close:
+                self._at_close.pop(0)()
 
     # What the Snakefile prints at the end.
 
