@@ -19,8 +19,9 @@ from typing import NamedTuple
 from lightfield.core import bundles, receipts
 from lightfield.core.files import Stamp, read_json
 from lightfield.core.receipts import Output, Receipt
-from lightfield.stages.registry import VERSIONS
+from lightfield.stages.registry import BY_NAME, VERSIONS
 from lightfield.validation.verification import faults
+from lightfield.workflow import run_lock
 from lightfield.workflow.check import JobCheck
 
 # The folder of the notes of all jobs of a build.
@@ -118,12 +119,21 @@ def _says(found, path):
 
 
 def times_of_making(folder):
-    """Return when each file was made that a finished job has made, in nanoseconds."""
+    """Return when each file was made that a finished job has made, in nanoseconds.
+
+    Leaves out jobs that add up what all runs cost. These work at each start.
+    """
     return {
         name: output.stamp.modified_ns
         for receipt in _receipts(folder).values()
+        if not BY_NAME[receipt.stage].reads_history
         for name, output in receipt.outputs.items()
     }
+
+
+def has_lock(folder, scene):
+    """Return whether a run of a build has had the lock of a scene."""
+    return Path(folder, NOTES, scene, run_lock.NAME).exists()
 
 
 def _digests(receipt):

@@ -76,7 +76,7 @@ def test_changed_settings_run_their_jobs_again(tmp_path):
     target = "results/soak/LFSoak/lightfield.json"
     said, _ = (run := build.start("--", target)).communicate()
     assert run.returncode == 0, said
-    assert (tmp_path / "cloud/work/receipts/soak/run.lock").exists()
+    assert bookkeeping.has_lock(tmp_path / "cloud", "soak")
     # A fresh clone, beside the same storage.
     (tmp_path / "cloud/.snakemake").rename(tmp_path / "notes")
     shown = ("--dry-run", "--printshellcmds", "--", target)

@@ -10,10 +10,10 @@ from typing import Literal
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
-from lightfield.configuration.dataset_paths import Paths, prefix_of, scene_folder
+from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.core.names import PARTS
+from lightfield.core.names import PARTS, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES

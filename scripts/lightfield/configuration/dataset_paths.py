@@ -20,11 +20,6 @@ def prefix_of(source: str) -> str:
     return "" if source == VIEWS else f"{source}/"
 
 
-def scene_folder(scene: str, preset: str) -> str:
-    """Return the folder of a scene or family under its preset: garden, or garden_tiny."""
-    return scene if preset == "full" else f"{scene}_{preset}"
-
-
 @dataclass(frozen=True)
 class Paths:
     """The paths of a dataset's files, as Snakemake compares them.

@@ -44,3 +44,8 @@ def builders() -> list[str]:
     """Return the names of the scene builders: the folders of scripts/scenes/ except library."""
     folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
     return sorted(name for name in folders if name != "library")
+
+
+def scene_folder(scene: str, preset: str) -> str:
+    """Return the folder of a scene or family under its preset: garden, or garden_tiny."""
+    return scene if preset == "full" else f"{scene}_{preset}"

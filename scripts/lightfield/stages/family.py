@@ -8,8 +8,8 @@ from pydantic import Field
 
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.corpus import CorpusOptions
-from lightfield.configuration.dataset_paths import scene_folder
 from lightfield.configuration.family import Draw, Member
+from lightfield.core.names import scene_folder
 from lightfield.core.paths import files_below
 from lightfield.core.receipts import FOLDER
 from lightfield.core.setting_types import AtLeastOne
