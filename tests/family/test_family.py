@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 
-from lightfield.configuration.family import Family, Member, drawn, member_content
+from lightfield.configuration.family import Family, Member, drawn, member_content, stand_in
 from lightfield.configuration.scene_yaml import check_member
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
@@ -157,6 +157,23 @@ def test_a_member_gets_its_seed_and_values_and_the_familys_yaml_stays_as_it_is()
     assert made["rigs"]["LF"]["camera"]["fov"] == 60
     assert "family" not in made
     assert json.dumps(content) == before
+
+
+OF_MODELS = {"render": {"samples": 1}, "rigs": {"ring": {"type": "ring", "count": 2, "size": 3}}}
+OF_MODELS["rigs"]["ring"]["camera"] = {"lens": "rectilinear", "fov": 50, "resolution": [8, 8]}
+
+
+@pytest.mark.parametrize("models", ["models/*.obj", "models/*.PLY", "models/**/*"])
+def test_a_family_of_models_takes_the_keys_of_its_format(models):
+    scene = {"up": "z", "unit": "metres"}
+    content = {"scene": scene, "family": {"models": models}, **OF_MODELS}
+    assert check_member(stand_in(content), "models.yaml").scene.up == "z"
+
+
+def test_a_family_of_gltf_models_says_that_they_know_their_axes():
+    content = {"scene": {"up": "z"}, "family": {"models": "models/*.glb"}, **OF_MODELS}
+    with pytest.raises(UserError, match=r"up: is only for OBJ, PLY and STL"):
+        check_member(stand_in(content), "models.yaml")
 
 
 def test_a_wrong_value_of_a_member_names_the_member_and_the_key():
@@ -495,7 +512,8 @@ def test_a_new_description_builds_no_member_again(run_batch, batch):
 def test_a_missing_texture_and_later_its_file_make_a_batch_outdated(run_batch, batch):
     Path("face.obj").write_text(RED)
     Path("face.mtl").write_text("newmtl red\nmap_Kd red.png\n")
-    assert verdict(batch).outdated == ["face.obj"]
+    # Blender reads a library with the name of the OBJ, so its arrival counts, too.
+    assert verdict(batch).outdated == ["face.obj", "face.mtl"]
     run_batch(batch)
     member = read_json(Path("results/faces/face/member.json"))
     assert member["state"] == "failed"

@@ -320,6 +320,17 @@ def _colmap_text(folder):
     return "images.txt"
 
 
+def _marked(write):
+    """Return a writer of the same file, which begins with a byte order mark."""
+
+    def marked(folder):
+        path = folder / write(folder)
+        path.write_text(path.read_text(), encoding="utf-8-sig")
+        return path.name
+
+    return marked
+
+
 def _colmap_text_without_points(folder):
     """Some programs that write only poses omit the line of an image's points."""
     text = (folder / _colmap_text(folder)).read_text()
@@ -350,7 +361,9 @@ def _colmap_binary(folder):
         _mirrored,
         _opencv,
         _with_keys_that_place_no_camera,
+        _marked(_transforms),
         _colmap_text,
+        _marked(_colmap_text),
         _colmap_text_without_points,
         _colmap_binary,
     ],

@@ -212,6 +212,9 @@ def test_missing_or_unreadable_files_are_an_error(run_program, tmp_path, monkeyp
         assert "scene: {allow_missing: true}" in errors
         bark.unlink(missing_ok=True)
         font.unlink(missing_ok=True)
+    written = bark.with_name("Bark.PNG")
+    written.touch()
+    assert f"; {texture} (missing) ({written} differs only in case); " in listed("textured")[1]
     (tmp_path / "library.blend").unlink()
     code, errors = listed("linked")
     assert code == 1

@@ -405,6 +405,109 @@ def test_members_of_a_family_obey_the_same_rule():
     assert ImportSettings.of_source(shared).shared_folder == "textures"
 
 
+# ---- libraries and textures of an OBJ -------------------------------------------------------
+
+
+# What an OBJ says after mtllib, and the libraries in its folder.
+LIBRARIES = {
+    "one": ("a.mtl", {"a.mtl": MTL}),
+    "two": ("b.mtl a.mtl", {"a.mtl": MTL, "b.mtl": "newmtl blue\nKd 0 0 1\n"}),
+    "two, one a line": ("b.mtl\nmtllib\ta.mtl", {"a.mtl": MTL, "b.mtl": ""}),
+    "blank": ("a b.mtl", {"a b.mtl": MTL}),
+    "escaped blank": (r"a\ b.mtl", {"a b.mtl": MTL}),
+    "two with blanks": (r"a\ b.mtl sub/c d.mtl", {"a b.mtl": "", "sub/c d.mtl": MTL}),
+    "name of two": ("a.mtl b.mtl", {"a.mtl b.mtl": MTL}),
+    "quotes": ('"a b.mtl"', {"a b.mtl": MTL}),
+}
+
+
+@pytest.mark.parametrize("case", LIBRARIES)
+def test_the_libraries_of_an_obj_are_read_and_recorded(tmp_path, monkeypatch, case):
+    import bpy
+
+    named, libraries = LIBRARIES[case]
+    at(
+        tmp_path,
+        ("own/m.obj", f"mtllib {named}\n{OBJ}"),
+        *((f"own/{n}", t) for n, t in libraries.items()),
+    )
+    monkeypatch.chdir(tmp_path)
+    record = imported(Path("own/m.obj"))
+    assert {entry["path"] for entry in record["external_files"]} == {"m.obj", *libraries}
+    (red,) = bpy.data.materials
+    assert colour(red) == pytest.approx((1, 0, 0))
+
+
+def colour(material):
+    return tuple(material.node_tree.nodes["Principled BSDF"].inputs[0].default_value[:3])
+
+
+def test_each_missing_library_of_an_obj_is_named(tmp_path):
+    at(tmp_path, ("m.obj", f"mtllib a.mtl b.mtl my own.mtl\n{OBJ}"), ("b.mtl", MTL))
+    message = refusal(tmp_path / "m.obj")
+    assert "a.mtl, " in message and "my own.mtl; put" in message and "b.mtl" not in message
+
+
+# What follows map_Kd, with the texture's name in place of NAME, and where the texture then lies.
+TEXTURES = {
+    "plain": ("NAME", (0, 0, 0)),
+    "offset": ("-o 0.25 NAME", (0.25, 0, 0)),
+    "colour space": ("-colorspace sRGB NAME", (0, 0, 0)),
+    "colour space and offset": ("-colorspace sRGB -o 0.25 0.5 NAME", (0.25, 0.5, 0)),
+    "turbulence": ("-t 1 NAME", (0, 0, 0)),
+    "gain": ("-mm 0.5 -clamp on\t-o 0.25 NAME", (0.25, 0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", ["b.png", r"tex/b\ c.png", "tex/b c.png"])
+@pytest.mark.parametrize("case", TEXTURES)
+def test_options_of_an_objs_texture_are_no_part_of_its_name(tmp_path, monkeypatch, case, name):
+    import bpy
+
+    text, offset = TEXTURES[case]
+    file = name.replace("\\", "")
+    at(
+        tmp_path,
+        ("own/m.obj", "mtllib m/c.mtl\nvt 0 0\n" + OBJ.replace("f 1 2 3", "f 1/1 2/1 3/1")),
+        ("own/m/c.mtl", f"{MTL}map_Kd {text.replace('NAME', name)}\n"),
+        (f"own/m/{file}", PNG),
+    )
+    monkeypatch.chdir(tmp_path)
+    record = imported(Path("own/m.obj"))
+    assert {entry["path"] for entry in record["external_files"]} == {
+        "m.obj",
+        "m/c.mtl",
+        f"m/{file}",
+    }
+    (image,) = [image for image in bpy.data.images if image.packed_files]
+    assert image.packed_file.data == PNG
+    nodes = bpy.data.materials["red"].node_tree.nodes
+    places = [tuple(n.inputs["Location"].default_value) for n in nodes if n.type == "MAPPING"]
+    assert places == ([] if offset == (0, 0, 0) else [pytest.approx(offset)])
+
+
+def test_a_colour_space_that_blender_leaves_out_is_named(tmp_path):
+    at(tmp_path, ("m.obj", OBJ), ("m.mtl", f"{MTL}map_Kd -colorspace acescg b.png\n"))
+    at(tmp_path, ("b.png", PNG))
+    assert "left out: the colour space acescg of b.png; " in refusal(tmp_path / "m.obj")
+    assert imported(tmp_path / "m.obj", allow_missing=True)["left_out"] == [
+        "the colour space acescg of b.png"
+    ]
+
+
+@pytest.mark.parametrize("name", ["Tex/red.png", "tex/Red.PNG"])
+def test_a_file_whose_name_differs_only_in_case_is_named(tmp_path, monkeypatch, name):
+    at(
+        tmp_path,
+        ("own/m.obj", OBJ),
+        ("own/m.mtl", f"{MTL}map_Kd {name}\n"),
+        ("own/tex/red.png", PNG),
+    )
+    monkeypatch.chdir(tmp_path)
+    message = refusal(Path("own/m.obj"))
+    assert f"missing: own/{name} (own/tex/red.png differs only in case); " in message
+
+
 # ---- parts that Blender leaves out ----------------------------------------------------------
 
 # References to what Blender cannot read: as written, and what the message names.

@@ -518,8 +518,10 @@ def test_a_dataset_of_a_model_follows_its_files(renders, tmp_path):
 @pytest.mark.slow
 def test_a_missing_model_is_named_before_the_first_job(tmp_path):
     folder = checkout(tmp_path / "plenoforge", chair=SCENE)
+    no_file = "error: configs/scenes/chair.yaml: scene.model: there is no file models/shape.obj"
     result = snakemake(folder, "--config", "scenes=chair")
     assert result.returncode != 0
-    assert "error: configs/scenes/chair.yaml: scene.model: there is no file models/shape.obj" in (
-        result.stderr
-    )
+    assert f"{no_file}; put it there" in result.stderr
+    written(folder / "models/Shape.OBJ", TRIANGLE)
+    result = snakemake(folder, "--config", "scenes=chair")
+    assert f"{no_file} (models/Shape.OBJ differs only in case); put it there" in result.stderr

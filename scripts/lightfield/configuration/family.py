@@ -142,6 +142,13 @@ class Family(Settings):
         first, last = map(int, self.seeds.split("-"))
         return range(first, last + 1)
 
+    @property
+    def example_model(self) -> str:
+        """The name of a model file that may match. Of several formats, OBJ takes the most keys."""
+        assert self.models
+        suffix = Path(self.models).suffix.lower()
+        return f"model{suffix if suffix in MODELS else '.obj'}"
+
     def members(self) -> list[Member]:
         """Return all members. Raises `UserError` if no model matches, or too many do."""
         if self.seeds:
@@ -188,7 +195,9 @@ def stand_in(content: Mapping[str, Any]) -> dict[str, Any]:
     It keeps the block `family`. So a check of it finds mistakes that all members have.
     """
     family = Family(**content["family"])
-    member = Member.of(name="", seed=0) if family.seeds else Member.of(name="", model="model.glb")
+    member = (
+        Member(name="", seed=0) if family.seeds else Member(name="", model=family.example_model)
+    )
     values = {key: draw.value(0) for key, draw in family.values.items()}
     return member_content(content, member, values) | {"family": content["family"]}
 

@@ -306,7 +306,8 @@ def set_aside(path: Path, folder: Path) -> Path:
 def read_text(path: Path | str) -> str:
     """Read a text in UTF-8. Raises `UserError` if it is missing, or not UTF-8."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        # Some programs begin a file with a byte order mark.
+        return Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except UnicodeDecodeError:

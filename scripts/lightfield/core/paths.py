@@ -53,6 +53,28 @@ def _files_below(folder: Path, real_folders: list[Path], strict: bool) -> Iterat
             yield from _files_below(path, [*real_folders, real_path], strict)
 
 
+def case_hint(path: Path) -> str:
+    """Return which existing path differs from a missing one only in the case of letters.
+
+    It is a remark in brackets. "" if there is no such path.
+    """
+    other = _in_other_case(path)
+    return f" ({other} differs only in case)" if other not in (None, path) else ""
+
+
+def _in_other_case(path: Path) -> Path | None:
+    """Return the path itself if it exists, or else one that differs from it only in case."""
+    # Path.exists() raises for a path that is too long.
+    if os.path.exists(path):  # noqa: PTH110
+        return path
+    folder = _in_other_case(path.parent) if path.parent != path else None
+    with suppress(OSError):
+        for name in sorted(os.listdir(folder) if folder else []):  # noqa: PTH208, only names
+            if folder and name.casefold() == path.name.casefold():
+                return folder / name
+    return None
+
+
 def link_above(folder: Path, name: str) -> str | None:
     """Return the first link that leads from a folder to the file ``name`` in it. None without one.
 

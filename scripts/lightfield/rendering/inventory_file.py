@@ -12,6 +12,7 @@ from lightfield.configuration.scene_source import FILE
 from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.paths import case_hint
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera
@@ -141,8 +142,9 @@ def _refusal(path: Path, problems: list[dict[str, str]]) -> str:
     """Return which files of a .blend are missing or cannot be read, and what to do about them."""
     descriptions = []
     for entry in problems[:8]:
-        file = os.path.normpath(path.parent / entry["path"])
-        descriptions.append(f"the {entry['kind']} {entry['name']} at {file} ({entry['problem']})")
+        file = Path(os.path.normpath(path.parent / entry["path"]))
+        place = f"{file} ({entry['problem']}){case_hint(file)}"
+        descriptions.append(f"the {entry['kind']} {entry['name']} at {place}")
     more = " …" if len(problems) > 8 else ""
     return (
         f"{path}: {len(problems)} of the files that it shows are missing or cannot be read: "

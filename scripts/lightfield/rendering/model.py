@@ -4,7 +4,7 @@ import logging
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, keep_apart, listed, write_json
 from lightfield.core.names import UP
+from lightfield.core.paths import case_hint
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging.images import is_readable
-from lightfield.rendering import blend_file, model_files, model_light
+from lightfield.rendering import blend_file, model_files, model_light, obj_files
 from lightfield.rendering.model_references import FileReference, printable, refuse_outside
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import quiet
@@ -89,6 +90,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     references, left_out = model_files.survey(path)
     refuse_outside(path, references, settings.shared_folder)
     receipts.note_inputs(reference.path for reference in references)
+    if path.suffix.lower() == ".obj":
+        receipts.note_inputs([obj_files.own_library(path)])
     if not settings.allow_missing:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
@@ -153,10 +156,13 @@ def _import(path: Path, up: str) -> list[str]:
         "stl": bpy.ops.wm.stl_import,
         "usd": bpy.ops.wm.usd_import,
     }
+    readable = obj_files.readable(path) if family == "obj" else nullcontext(path)
     try:
-        with quiet(), _skipped_by_gltf() as skipped:
+        with quiet(), _skipped_by_gltf() as skipped, readable as file:
             # Blender would take a path with // before it for one from the .blend.
-            result = operators[family](filepath=str(path.absolute()), **options)
+            result = operators[family](filepath=str(file.absolute()), **options)
+            if file != path:
+                _normalise_textures()
     except RuntimeError as error:
         raise UserError(_refusal(path, str(error))) from None
     except UnicodeError:
@@ -166,6 +172,12 @@ def _import(path: Path, up: str) -> list[str]:
     if suffix == ".ply":
         _check_faces(path)
     return skipped
+
+
+def _normalise_textures() -> None:
+    """Name textures by paths that do not lead through the folder of a copy of the model."""
+    for image in _images():
+        image.filepath_raw = os.path.normpath(image.filepath)
 
 
 @contextmanager
@@ -278,7 +290,8 @@ def _refuse_missing(path: Path, files: Sequence[Path]) -> None:
 def _missing(files: Sequence[Path]) -> list[str]:
     """Return the names of the files that do not exist."""
     # Path.is_file() raises for a path that is too long.
-    return [printable(file) for file in files if not os.path.isfile(file)]  # noqa: PTH113
+    missing_files = [file for file in files if not os.path.isfile(file)]  # noqa: PTH113
+    return [printable(f"{file}{case_hint(file)}") for file in missing_files]
 
 
 def _refuse_without(path: Path, left_out: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
-from lightfield.rendering import usd_files
+from lightfield.rendering import obj_files, usd_files
 from lightfield.rendering.model_references import FileReference, Survey
 
 
@@ -107,7 +107,7 @@ def survey(path: Path) -> Survey:
         case ".gltf" | ".glb":
             return Survey(list(_of_gltf(path)), [])
         case ".obj":
-            return Survey(list(_of_obj(path)), [])
+            return obj_files.survey(path)
         case ".usd" | ".usda" | ".usdc" | ".usdz":
             return usd_files.survey(path)
         case _:
@@ -161,32 +161,3 @@ def compressions(path: Path) -> list[str]:
     names = _gltf_document(path).get("extensionsUsed")
     names = names if isinstance(names, list) else []
     return [name for name in names if "_compression" in str(name)]
-
-
-def _of_obj(path: Path) -> Iterator[FileReference]:
-    """Yield the libraries of materials of an OBJ file."""
-    for line in _obj_lines(path):
-        words = line.split(None, 1)
-        if words[:1] == [b"mtllib"]:
-            name = os.fsdecode(words[-1].strip())
-            if len(name) > 2 and name[0] == name[-1] == '"':
-                name = name[1:-1]
-            # Blender puts the folder before an absolute path, too.
-            yield FileReference(path, name, Path(os.path.normpath(f"{path.parent}/{name}")))
-    # Blender also reads a library with the name of the OBJ.
-    library = path.with_suffix(".mtl")
-    if library.is_file():
-        yield FileReference(path, library.name, library)
-
-
-def _obj_lines(path: Path) -> Iterator[bytes]:
-    """Yield the lines of an OBJ file. A backslash at the end of a line continues it."""
-    begun = b""
-    with path.open("rb") as file:
-        for line in file:
-            if line.endswith((b"\\\n", b"\\\r\n")):
-                begun += line.rstrip()[:-1] + b" "
-            else:
-                yield begun + line
-                begun = b""
-    yield begun

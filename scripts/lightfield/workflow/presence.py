@@ -8,6 +8,7 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE
+from lightfield.core.paths import case_hint
 
 
 def missing_views(dataset: Dataset) -> int:
@@ -28,16 +29,17 @@ def check_presence(dataset: Dataset) -> None:
     On machines without a common folder, only the user's machine has the file.
     """
     source = dataset.source
+    hint = case_hint(Path(source.model or source.blend or "."))
     if source.model and not Path(source.model).is_file():
         raise UserError(
             f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.model: "
-            f"there is no file {source.model}; put it there"
+            f"there is no file {source.model}{hint}; put it there"
         )
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
         raise UserError(
             f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
-            f"there is no file {source.blend}; {page}put it there"
+            f"there is no file {source.blend}{hint}; {page}put it there"
         )
 
 
