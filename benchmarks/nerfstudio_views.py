@@ -16,7 +16,7 @@ from lightfield.core.files import read_json
 
 Array = np.ndarray[Any, Any]
 
-LENSES = {"PINHOLE": "perspective", "OPENCV_FISHEYE": "fisheye", "EQUIRECTANGULAR": "panorama"}
+LENSES = {"OPENCV": "perspective", "OPENCV_FISHEYE": "fisheye", "EQUIRECTANGULAR": "panorama"}
 TRUE = "as exported"
 SHUFFLED = "shuffled poses"
 MILLIMETRES = 1000
@@ -94,7 +94,7 @@ def _rays(content: dict[str, Any]) -> tuple[Array, str]:
     column, row = np.meshgrid(np.arange(content["w"]) + 0.5, np.arange(content["h"]) + 0.5)
     x = (column - content["cx"]) / content["fl_x"]
     y = -(row - content["cy"]) / content["fl_y"]
-    if content["camera_model"] == "PINHOLE":
+    if content["camera_model"] == "OPENCV":
         rays = np.stack([x, y, -np.ones_like(x)], axis=-1)
         return rays / np.linalg.norm(rays, axis=-1, keepdims=True), "Z"
     if content["camera_model"] == "OPENCV_FISHEYE":

@@ -315,7 +315,8 @@ def nerfstudio_rays(content):
     """Return directions in the camera's frame, as nerfstudio's Cameras.generate_rays does."""
     y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
     x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
-    if content["camera_model"] == "PINHOLE":
+    if content["camera_model"] == "OPENCV":
+        assert [content[key] for key in ("k1", "k2", "p1", "p2")] == [0, 0, 0, 0]
         return np.stack([x, y, -np.ones_like(x)], axis=-1)
     if content["camera_model"] == "OPENCV_FISHEYE":
         assert [content[f"k{i}"] for i in range(1, 5)] == [0, 0, 0, 0]
@@ -357,6 +358,58 @@ def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
     vertices, _ = ply(folder / content["ply_file_path"])
     on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
     assert np.array_equal(content["applied_transform"], np.eye(4)[:3])
+
+
+def brush_pixels(content, local):
+    """Project points (n, 3), x right, y down and z forward, as Brush does.
+
+    Source: resolve_camera_model in crates/brush-dataset/src/formats/nerfstudio.rs of Brush 1.0.
+    """
+    fx, fy, cx, cy = (content[key] for key in ("fl_x", "fl_y", "cx", "cy"))
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    still = np.zeros(3)
+    model = content.get("camera_model", "PERSPECTIVE")
+    if model == "OPENCV_FISHEYE":
+        distortion = np.array([content.get(f"k{number}", 0) for number in range(1, 5)])
+        points = local[:, None]
+        return cv2.fisheye.projectPoints(points, still, still, matrix, distortion)[0][:, 0]
+    assert model in ("PERSPECTIVE", "OPENCV"), f"Unsupported nerfstudio camera_model `{model}`"
+    distortion = None
+    if model == "OPENCV":
+        distortion = np.array([content.get(key, 0.0) for key in ("k1", "k2", "p1", "p2")])
+    return cv2.projectPoints(local, still, still, matrix, distortion)[0][:, 0]
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv"])
+def test_brush_reads_the_cameras_of_a_nerfstudio_export(dataset, tmp_path, source):
+    folder = exported(dataset, "nerfstudio", source, tmp_path, points=400)
+    content = json.loads((folder / "transforms.json").read_text())
+    # Brush takes the last .ply for its first splats.
+    assert [path.name for path in folder.rglob("*.ply")] == [content["ply_file_path"]]
+    vertices, _ = ply(folder / content["ply_file_path"])
+    points = np.stack([vertices[name] for name in "xyz"], axis=-1)
+    colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
+    for frame in content["frames"]:
+        camera_from_world = np.linalg.inv(np.array(frame["transform_matrix"]))
+        local = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+        local *= [1, -1, -1]
+        in_front = local[:, 2] > 0.1
+        pixels = brush_pixels(content, local[in_front])
+        picture = images.read_image(folder / frame["file_path"]).channels
+        shown = np.stack([picture[name] for name in "RGB"], axis=-1)
+        light = np.full(shown.shape[:2], 255)
+        if "mask_path" in frame:
+            light = images.read_image(folder / frame["mask_path"]).channels["Y"]
+        inside = ((pixels >= 0) & (pixels < [content["w"], content["h"]])).all(axis=1)
+        column, row = np.floor(pixels[inside]).astype(int).T
+        lit = light[row, column] > 0
+        assert lit.sum() > 20
+        # A fisheye's pixels are up to 0.3 m wide, and colour changes by 29 levels a metre.
+        np.testing.assert_allclose(shown[row, column][lit], colours[in_front][inside][lit], atol=12)
+    rays = lenses.from_camera(LENSES[source]).pixel_rays() * [1, -1, -1]
+    row, column = np.nonzero(rays[..., 2] > 0.05)
+    projected = brush_pixels(content, rays[row, column])
+    np.testing.assert_allclose(projected, np.column_stack([column, row]) + 0.5, atol=1e-4)
 
 
 def test_splits_have_no_view_in_two_and_follow_the_rig(dataset, tmp_path):

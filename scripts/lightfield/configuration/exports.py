@@ -161,7 +161,7 @@ class InstantNgp(Export):
 
 
 class Colmap(Developed):
-    """A COLMAP model, for gsplat, 3DGRUT and the original 3D Gaussian splatting."""
+    """A COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting."""
 
     is_for_training: ClassVar[bool] = True
 
@@ -189,7 +189,7 @@ class Colmap(Developed):
 
 
 class Nerfstudio(Developed):
-    """A nerfstudio dataset."""
+    """A nerfstudio dataset, for nerfstudio and Brush."""
 
     is_for_training: ClassVar[bool] = True
 
@@ -443,9 +443,11 @@ class Exports(Settings):
 
     instant_ngp: InstantNgp | None = Field(None, description="transforms.json for instant-ngp.")
     colmap: Colmap | None = Field(
-        None, description="COLMAP model for gsplat, 3DGRUT and the original 3D Gaussian splatting."
+        None,
+        description="COLMAP model for gsplat, 3DGRUT, Brush and the original 3D Gaussian "
+        "splatting.",
     )
-    nerfstudio: Nerfstudio | None = Field(None, description="Dataset for nerfstudio.")
+    nerfstudio: Nerfstudio | None = Field(None, description="Dataset for nerfstudio and Brush.")
     nerf_synthetic: NerfSynthetic | None = Field(
         None, description="Layout of NeRF's synthetic scenes, for programs that read it."
     )

@@ -1,4 +1,4 @@
-"""Writes a COLMAP model, for gsplat, 3DGRUT and the original 3D Gaussian splatting.
+"""Writes a COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting.
 
 - ``sparse/0/``: cameras, images and points3D, in binary or as text.
 - ``images/``: the views as 8-bit PNG.

@@ -9,8 +9,9 @@
   unit is an option of nerfstudio's parser, which no file can set.
 - ``points.ply``: a point cloud.
 
-Splatfacto treats every camera as a pinhole: give it perspective views. Source: nerfstudio's
-nerfstudio_dataparser.py and cameras.py.
+Splatfacto treats every camera as a pinhole: give it perspective views. Brush reads the same files,
+and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py and cameras.py,
+and formats/nerfstudio.rs of Brush 1.0.
 """
 
 from pathlib import Path
@@ -84,7 +85,10 @@ def camera(lens: Lens) -> dict[str, Any]:
         return {"camera_model": "EQUIRECTANGULAR", **focal, **_center(lens), **size}
     if isinstance(lens, Rectilinear):
         fx, fy = cameras.focal_pixels(lens)
-        return {"camera_model": "PINHOLE", "fl_x": fx, "fl_y": fy, **_center(lens), **size}
+        # nerfstudio takes OPENCV without distortion for PINHOLE, which Brush does not read.
+        undistorted = dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
+        focal = {"fl_x": fx, "fl_y": fy}
+        return {"camera_model": "OPENCV", **focal, **_center(lens), **size, **undistorted}
     fx, fy, *distortion = cameras.opencv_fisheye(lens)
     named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
     focal = {"fl_x": fx, "fl_y": fy}

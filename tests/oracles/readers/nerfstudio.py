@@ -83,7 +83,10 @@ def _camera(content: dict[str, Any]) -> Camera:
     width, height = int(content["w"]), int(content["h"])
     fx, fy, cx, cy = (number(content[key]) for key in ("fl_x", "fl_y", "cx", "cy"))
     model = content["camera_model"]
-    if model == "PINHOLE":
+    if model == "OPENCV":
+        undistorted = [number(content[key]) for key in ("k1", "k2", "p1", "p2")]
+        if any(undistorted):
+            raise ValueError(f"camera_model: has the distortion {undistorted}; must be zeros")
         return Pinhole(width, height, fx, fy, cx, cy)
     if model == "OPENCV_FISHEYE":
         k1, k2, k3, k4 = (number(content[f"k{index}"]) for index in range(1, 5))
@@ -93,4 +96,4 @@ def _camera(content: dict[str, Any]) -> Camera:
         west, east = (math.pi * (x - cx) / fx for x in (0, width))
         north, south = (-math.pi * (y - cy) / fy for y in (0, height))
         return Panorama(width, height, west, east, north, south)
-    raise ValueError(f"camera_model: {model!r} is not PINHOLE, OPENCV_FISHEYE or EQUIRECTANGULAR")
+    raise ValueError(f"camera_model: {model!r} is not OPENCV, OPENCV_FISHEYE or EQUIRECTANGULAR")
