@@ -108,6 +108,12 @@ TEXTS = {
     "no such integer": "a: !!int x\n",
     "no such number": "a: !!float x\n",
     "no such binary": "a: !!binary ä\n",
+    "no such bool": "a: !!bool x\n",
+    "no such timestamp": 'a: !!timestamp "x"\n',
+    "an empty integer": 'a: !!int ""\n',
+    "an empty number": 'a: !!float ""\n',
+    "half a character": 'a: "\\ud800"\n',
+    "half a character in a key": '"\\ud800": 1\n',
     "a merge": "a: &a {b: 1}\nrigs: {<<: *a}\n",
     "a merge of itself": "a: &a {<<: *a}\n",
     "a merge of a number": "rigs: {<<: 1}\n",
@@ -157,6 +163,30 @@ EXPLAINED_TEXTS = [
     ),
     ("render: {clamp_indirect: 1:30.5}\n", 'clamp_indirect: is "1:30.5"; must be a number'),
     ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
+    (
+        'description: !!timestamp "x"\n',
+        "line 1, column 14: description: is 'x', which is not a valid timestamp",
+    ),
+    (
+        "rigs:\n  A:\n    split: !!bool x\n",
+        "line 3, column 12: rigs.A.split: is 'x', which is not a valid bool",
+    ),
+    (
+        "rigs: {A: {size: [1, !!float y]}}\n",
+        "line 1, column 22: rigs.A.size.[1]: is 'y', which is not a valid float",
+    ),
+    (
+        f"render:\n  samples: {'9' * 60_000}\n",
+        "line 2, column 12: render.samples: is '999",
+    ),
+    (
+        f"render:\n  samples: 0x{'f' * 60_000}\n",
+        "line 2, column 12: render.samples: is a number with too many digits",
+    ),
+    (
+        'description: "a \\ud800"\n',
+        "line 1, column 14: description: has '\\ud800', half of a character",
+    ),
 ]
 
 CAMERA = RIGHT["rigs"]["LFSphere"]["camera"]

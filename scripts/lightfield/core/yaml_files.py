@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,37 @@ from lightfield.core.errors import UserError
 _LARGEST_YAML = 2**16
 # A YAML's nodes, with each alias counted as the nodes that it repeats.
 _MOST_NODES = 20_000
+# Larger whole numbers do not fit into a float.
+_MOST_BITS = 1023
+# Halves of characters, which no file in UTF-8 can hold. "\ud800" in quotes is one.
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
-    """Safe YAML in which a key given twice is an error, not a silent overwrite."""
+    """Safe YAML in which a key given twice is an error, not a silent overwrite.
+
+    A value that does not fit its tag, as in ``!!bool x``, is an error at its line.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._merged_nodes: set[yaml.MappingNode] = set()
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            value = super().construct_object(node, deep)
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError):
+            shown = repr(node.value)
+            shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+            problem = f"is {shown}, which is not a valid {node.tag.rpartition(':')[2]}"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from None
+        if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+            problem = "is a number with too many digits"
+        elif isinstance(value, str) and (half := _SURROGATE.search(value)):
+            problem = f"has {half[0]!r}, half of a character; write the character itself"
+        else:
+            return value
+        raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         """Replace `<<: *other` by the keys of the other mapping. Keys beside it take precedence.
@@ -103,6 +126,7 @@ def read_settings_text(path: Path, file: str) -> str:
 
 def parse_yaml(text: str, file: str) -> Any:
     """Return what a YAML file's text says. Raises `UserError` as `read_yaml` does."""
+    node = None
     try:
         loader = _UniqueKeyLoader(text)
         node = loader.get_single_node()
@@ -114,12 +138,27 @@ def parse_yaml(text: str, file: str) -> Any:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        problem = error.problem
+        keys = ".".join(_keys_to(mark.index, node)) if mark and node else ""
+        problem = f"{keys}: {error.problem}" if keys else error.problem
         if mark and _is_indented_by_tabs(text, mark.line):
             problem = "is indented with a tab; use spaces"
         raise UserError(f"{file}: {where}{problem}") from None
     except (ValueError, RecursionError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+
+
+def _keys_to(index: int, node: yaml.Node) -> Iterator[str]:
+    """Yield the keys below a node that lead to the value at ``index`` of the text."""
+    children: list[tuple[str, yaml.Node]] = []
+    if isinstance(node, yaml.MappingNode):
+        children = [(str(key.value), value) for key, value in node.value]
+    elif isinstance(node, yaml.SequenceNode):
+        children = [(f"[{number}]", value) for number, value in enumerate(node.value)]
+    for key, child in children:
+        if child.start_mark.index <= index < child.end_mark.index:
+            yield key
+            yield from _keys_to(index, child)
+            return
 
 
 def _is_indented_by_tabs(text: str, line: int) -> bool:
