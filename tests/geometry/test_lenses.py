@@ -994,6 +994,8 @@ OF_EQUIDISTANT = {"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTA
     ("change", "message"),
     [
         ({"resolution": None}, "resolution"),
+        ({"resolution": [96.5, 48]}, "resolution: is 96.5; must be two whole numbers"),
+        ({"resolution": [True, 48]}, "resolution: is True; must be two whole numbers"),
         ({"camera": {"type": "ORTHO"}}, "ORTHO"),
         ({"camera": {"type": "PANO"}}, "panorama_type"),
         ({"camera": {"type": "PANO", "panorama_type": "MIRRORBALL"}}, "MIRRORBALL"),
@@ -1003,7 +1005,7 @@ OF_EQUIDISTANT = {"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTA
         ({"camera": {"type": "PERSP", "lens_unit": "MILLIMETERS"}}, "focal_length"),
         ({"camera": {"type": "PERSP", "lens_unit": "FOV", "angle": 0}}, "camera, resolution or"),
         ({"camera": {"type": "PERSP", "projection_matrix": [[1]]}}, "camera, resolution or"),
-        (OF_EQUIDISTANT | {"resolution": [math.inf, 9]}, "camera, resolution or"),
+        (OF_EQUIDISTANT | {"resolution": [math.inf, 9]}, "resolution: is inf"),
     ],
 )
 def test_a_wrong_lightfield_json_names_its_key(change: dict[str, object], message: str) -> None:

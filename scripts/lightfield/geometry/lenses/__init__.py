@@ -74,8 +74,8 @@ def from_lightfield(content: Mapping[str, Any]) -> Lens:
     """
     try:
         camera = content["camera"]
-        width, height = content["resolution"]
-        image: dict[str, Any] = {"width": int(width), "height": int(height)}
+        width, height = map(_pixel_count, content["resolution"])
+        image: dict[str, Any] = {"width": width, "height": height}
         if "sensor_size" in content:
             image["sensor_size"] = pair(content["sensor_size"])
         if "principal_point" in camera:
@@ -85,6 +85,13 @@ def from_lightfield(content: Mapping[str, Any]) -> Lens:
         raise UserError(f"{error.args[0]}: is missing; the lens needs it") from None
     except (TypeError, ValueError, IndexError, ArithmeticError) as error:
         raise UserError(f"camera, resolution or sensor_size: {error}") from None
+
+
+def _pixel_count(side: Any) -> int:
+    """Return an image's side. 96.0 is a whole number, too."""
+    if isinstance(side, bool) or not isinstance(side, int | float) or side % 1:
+        raise UserError(f"resolution: is {side!r}; must be two whole numbers of pixels")
+    return int(side)
 
 
 def _lens_of(camera: Mapping[str, Any]) -> type[Lens]:
