@@ -43,11 +43,13 @@ def bundle_of(job):
     return f"{RECEIPTS}/{job}{bundles.SUFFIX}" if STORE else []
 
 
-def reads(job, stage=None, **inputs):
+def reads(job, stage=None, are_noted=False, **inputs):
     """Return the inputs of a rule: its files, its settings, and the mark that makes it run.
 
     ``job`` is the name of the job, with wildcards, as `receipt_of` has it. ``stage`` is the name of
     its settings. ``inputs`` are paths with wildcards, lists of them, or input functions.
+    ``are_noted`` says that the job must run if its receipt lacks one of them. A receipt may have
+    more of them, which other runs chose.
     """
 
     def wanted(wildcards):
@@ -72,7 +74,8 @@ def reads(job, stage=None, **inputs):
             return files | settings | carried(files)
         if not IS_MAIN_PROCESS:
             return files | settings | {"mark": ancient(MARK)}
-        is_fine = CHECK.verdict(receipt, content).is_fine
+        noted = [*flat(files.values())] if are_noted else ()
+        is_fine = CHECK.verdict(receipt, content, noted).is_fine
         if not os.path.exists(MARK):
             new_mark()
         files = {name: unless_newer(receipt, each) for name, each in files.items()}

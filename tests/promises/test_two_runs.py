@@ -1,6 +1,7 @@
 """Two runs in one folder: at the same time, and after one of them was killed or stopped."""
 
 import os
+import pwd
 import shutil
 import signal
 import subprocess
@@ -85,7 +86,8 @@ def last_line(run):
 
 def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(building):
     folder, process, number, run = building
-    refusal = f"error: another run makes these files, process {number}: wait for it, or end"
+    user = pwd.getpwuid(os.getuid()).pw_name
+    refusal = f"error: another run (process {number} of {user}) makes the scene one: wait for it, "
     second = run()
     assert second.returncode != 0
     assert last_line(second).startswith(refusal)
@@ -125,6 +127,24 @@ def test_a_build_of_another_dataset_runs_beside_it(building):
     assert process.wait() == 0
 
 
+def test_two_scenes_are_built_at_once_in_one_folder(built_tiny, tmp_path, real_jobs):
+    scene = f"scene: {{dataset: {built_tiny}/results/tiny}}"
+    folder = checkout(tmp_path / "shared", one=scene, two=scene)
+    chosen = [
+        ("--config", f"scenes=[{name}]", "rigs=all", "preset=full") for name in ("one", "two")
+    ]
+    pipe = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    runs = [start_snakemake(folder, *given, **pipe) for given in chosen]
+    for run in runs:
+        said, _ = run.communicate()
+        assert run.returncode == 0, said
+    index = (folder / "results/index.html").read_text()
+    assert all(f"{name}/LFPlane/report/index.html" in index for name in ("one", "two"))
+    for given in chosen:
+        plan = snakemake(folder, "--dry-run", *given)
+        assert "Nothing to be done" in plan.stdout + plan.stderr
+
+
 def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
     folder, process, number, run = building
     os.killpg(number, signal.SIGKILL)
@@ -143,7 +163,7 @@ def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp
     log = tmp_path / "terminal.log"
     with log.open("w") as terminal:
         following = run.start(stdout=terminal, stderr=terminal)
-    waiting = "waiting for a process of an earlier run"
+    waiting = "waiting for a process of another run"
     wait_until(lambda: waiting in log.read_text(), following, log=log)
     (folder / "go").touch()
     assert following.wait() == 0, log.read_text()

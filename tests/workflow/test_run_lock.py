@@ -1,7 +1,9 @@
 """A run holds the locks of its scenes until its process ends."""
 
+import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from conftest import SCRIPTS
@@ -37,12 +39,23 @@ def run(tmp_path):
 def test_a_live_run_is_named_and_a_killed_one_frees_its_lock(run, tmp_path):
     folder = tmp_path / "scene"
     assert run_lock.is_held(folder)
-    with pytest.raises(UserError, match=rf"another run makes these files, process {run.pid}: wait"):
+    with pytest.raises(UserError, match=rf"process {run.pid} of \w+\) makes the scene scene: wait"):
         run_lock.take([folder])
     run.kill()
     run.wait()
     assert not run_lock.is_held(folder)
     run_lock.take([folder])
+
+
+def test_only_the_own_run_is_to_be_killed(run, tmp_path, monkeypatch):
+    with pytest.raises(UserError, match=rf"\(kill {run.pid}\)"):
+        run_lock.take([tmp_path / "scene"])
+    me = run_lock.pwd.getpwuid(os.getuid()).pw_name
+    # To another user, the same run is a colleague's.
+    monkeypatch.setattr(run_lock.pwd, "getpwuid", lambda _: SimpleNamespace(pw_name="ada"))
+    with pytest.raises(UserError, match=f"or ask {me} to end it") as refusal:
+        run_lock.take([tmp_path / "scene"])
+    assert "kill" not in str(refusal.value)
 
 
 def test_runs_of_other_scenes_are_let_in(run, tmp_path):

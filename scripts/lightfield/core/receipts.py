@@ -331,6 +331,14 @@ class OpenReceipt:
         self.inputs[name] = stamp.sha256
         self._input_stamps[name] = stamp
 
+    def add_shared_input(self, path: str | Path) -> None:
+        """Note a file that the job reads, and that another run may replace meanwhile.
+
+        The job need not fail then, because that run does this job again.
+        """
+        name = name_of(path)
+        self.inputs[name] = input_sum(name)
+
     def still_holds(self) -> bool:
         """Return whether the job was finished before, with equal settings and inputs.
 
@@ -495,7 +503,8 @@ def work_of(path: Path) -> Path:
 def _locked(part: Path) -> IO[bytes]:
     """Return the open, locked file of an unfinished receipt.
 
-    Waits for another process that makes the same files, as one of a killed run may.
+    Waits for another process that makes the same files: of a killed run, or of a run of another
+    scene that also lists all datasets.
     """
     if unreadable(part):
         set_aside(part, work_of(part) / REMOVED)
@@ -506,7 +515,7 @@ def _locked(part: Path) -> IO[bytes]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            print("waiting for a process of an earlier run that makes the same files", flush=True)
+            print("waiting for a process of another run that makes the same files", flush=True)
             fcntl.flock(file, fcntl.LOCK_EX)
         except OSError as error:
             print(f"warning: {part}: cannot be locked: {error.strerror}", file=sys.stderr)
@@ -530,6 +539,13 @@ def note_inputs(paths: Iterable[str | Path]) -> None:
     if receipt := current():
         for path in paths:
             receipt.add_input(os.path.relpath(path))
+
+
+def note_shared_inputs(paths: Iterable[str | Path]) -> None:
+    """Note files as `note_inputs` does. Another run may replace them while the job reads them."""
+    if receipt := current():
+        for path in paths:
+            receipt.add_shared_input(os.path.relpath(path))
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """The index of all datasets: a page that links the page of each, and of each corpus."""
 
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from lightfield.configuration.corpus import CORPUS
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.core.paths import files_below
@@ -28,12 +30,10 @@ def write(job: ReportIndex) -> None:
     if not results.is_dir():
         raise UserError(f"{results}: no such folder")
     corpora = sorted(path.parent for path in results.glob(f"*/{CORPUS}"))
-    pages = [path for path in files_below(results, strict=False) if path.parts[-2:] == _PAGE]
     datasets = []
-    for path in pages:
-        # A family may have thousands of members. Its own page has them.
-        if any(path.is_relative_to(folder) for folder in corpora):
-            continue
+    receipts.note_shared_inputs(folder / CORPUS for folder in corpora)
+    for path in _pages(results, corpora):
+        receipts.note_shared_inputs([path])
         try:
             datasets.append(_entry(results, path))
         except UserError as error:
@@ -41,6 +41,13 @@ def write(job: ReportIndex) -> None:
             print(f"warning: left out: {error}", file=sys.stderr)
     families = [_family(results, folder) for folder in corpora]
     page.write(job.output, "index.html.j2", datasets=datasets, families=families)
+
+
+def _pages(results: Path, corpora: Iterable[Path]) -> Iterator[Path]:
+    """Yield the pages of datasets, but of members of families: a family's own page has them."""
+    for path in files_below(results, strict=False):
+        if path.parts[-2:] == _PAGE and not any(path.is_relative_to(each) for each in corpora):
+            yield path
 
 
 def _family(results: Path, folder: Path) -> dict[str, Any]:

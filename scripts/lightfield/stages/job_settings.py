@@ -394,10 +394,6 @@ def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "pack", settings
 
 
-def _index(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    return "index", ReaderSettings()
-
-
 def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     name = build.family_names[folder]
@@ -461,7 +457,6 @@ _OTHERS: Mapping[str, Callable[[Build, Wildcards], tuple[str, Settings | Content
     "probes": _probes,
     "gpu_check": _gpu_check,
     "pack": _pack,
-    "index": _index,
     "batch": _batch,
     "members": _members,
     "corpus": _corpus,

@@ -70,7 +70,7 @@ class ReportHtml(Stage[PageSettings]):
     output: Path = writes("HTML file to write")
 
 
-class ReportIndex(Stage[ReaderSettings]):
+class ReportIndex(PlainStage):
     """Makes the page with links to the pages of all datasets in a results folder."""
 
     name = "report_index"
@@ -78,7 +78,6 @@ class ReportIndex(Stage[ReaderSettings]):
     # It lists all datasets in the folder, also datasets of other runs.
     reads_history = True
 
-    settings: ReaderSettings = ReaderSettings()
     results: Path = reads("folder of the datasets")
     output: Path = writes("HTML file to write, in that folder")
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from lightfield.configuration.config_file import Configuration
-from lightfield.configuration.corpus import CORPUS_FILES
+from lightfield.configuration.corpus import CORPUS, CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
 from lightfield.configuration.family import RECORD, Family, Member
@@ -412,6 +412,11 @@ class Build:
             for folder in self.family_names
             for name in CORPUS_FILES
         ]
+
+    @property
+    def corpus_lists(self) -> list[str]:
+        """The lists of the members of the chosen families."""
+        return [f"{self.config.results}/{folder}/{CORPUS}" for folder in self.family_names]
 
     @property
     def family_targets(self) -> list[str]:

@@ -10,7 +10,7 @@ are kept in work/sums.json, so that each is read once.
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -117,18 +117,24 @@ class JobCheck:
         self._summaries[path] = _Summary(receipt.sum, tuple(receipt.inputs)) if receipt else None
         return receipt
 
-    def verdict(self, path: str, settings: Mapping[str, Any]) -> Verdict:
-        """Return the verdict on the job with a receipt and these wanted settings."""
+    def verdict(
+        self, path: str, settings: Mapping[str, Any], inputs: Iterable[str] = ()
+    ) -> Verdict:
+        """Return the verdict on the job with a receipt and these wanted settings.
+
+        The receipt must have these ``inputs``.
+        """
         if path not in self.verdicts:
-            self.verdicts[path] = self._judge(path, settings)
+            self.verdicts[path] = self._judge(path, settings, inputs)
         return self.verdicts[path]
 
-    def _judge(self, path: str, settings: Mapping[str, Any]) -> Verdict:
+    def _judge(self, path: str, settings: Mapping[str, Any], inputs: Iterable[str]) -> Verdict:
         receipt = self._read(path)
         if receipt is None:
             return Verdict(has_receipt=False)
         outdated = [*self._changed_settings(receipt, settings)]
         outdated += [name for name, digest in receipt.inputs.items() if self._sum(name) != digest]
+        outdated += [name for name in inputs if receipts.name_of(name) not in receipt.inputs]
         oldest = os.stat(path).st_mtime_ns  # noqa: PTH116, a `Path` is slow for many files
         damaged = []
         for name, output in receipt.outputs.items():

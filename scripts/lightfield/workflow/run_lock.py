@@ -5,7 +5,10 @@ receipt (`lightfield.core.receipts`), for which the jobs of the next run wait.
 """
 
 import fcntl
+import json
 import os
+import pwd
+import socket
 import sys
 import time
 from collections.abc import Iterable
@@ -13,6 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import writing
 
 NAME = "run.lock"
 # The open files whose locks this process holds.
@@ -20,14 +24,15 @@ _held: list[IO[bytes]] = []
 
 
 def take(folders: Iterable[Path]) -> None:
-    """Hold the lock in each folder until this process ends.
+    """Hold the lock in the folder of each scene until this process ends.
 
     Raises `UserError` if another run holds one of them. File systems without locks get a warning.
     """
     for folder in folders:
-        folder.mkdir(parents=True, exist_ok=True)
         path = folder / NAME
-        file = path.open("a+b")
+        with writing(path):
+            folder.mkdir(parents=True, exist_ok=True)
+            file = path.open("a+b")
         try:
             _lock(file)
         except BlockingIOError:
@@ -35,9 +40,17 @@ def take(folders: Iterable[Path]) -> None:
         except OSError as error:
             print(f"warning: {path}: cannot be locked: {error.strerror}", file=sys.stderr)
         file.truncate(0)
-        file.write(f"{os.getpid()}\n".encode())
+        file.write(json.dumps([os.getpid(), _user(), socket.gethostname()]).encode())
         file.flush()
         _held.append(file)
+
+
+def _user() -> str:
+    """Return the name of this process's user."""
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return f"user {os.getuid()}"
 
 
 def _lock(file: IO[bytes]) -> None:
@@ -52,12 +65,20 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _refusal(path: Path) -> str:
-    number = path.read_text(encoding="utf-8").strip()
-    process = f", process {number}" if number else ""
-    end = f", or end it (kill {number})" if number else ""
+    """Return which scene another run makes, and whose run it is."""
+    try:
+        number, user, host = json.loads(path.read_bytes())
+    except (OSError, ValueError, TypeError):
+        # That run has not written it yet, or is of an older version.
+        whose, end = "", ""
+    else:
+        here = host == socket.gethostname()
+        whose = f" (process {number} of {user}{'' if here else f' on {host}'})"
+        is_own = here and user == _user()
+        end = f", or end it (kill {number})" if is_own else f", or ask {user} to end it"
     return (
-        f"another run makes these files{process}: wait for it{end}; snakemake --cores 1 status "
-        "shows its progress"
+        f"another run{whose} makes the scene {path.parent.name}: wait for it{end}; "
+        "snakemake --cores 1 status shows its progress"
     )
 
 
