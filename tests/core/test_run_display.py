@@ -80,7 +80,9 @@ def test_bars_and_one_line_show_the_progress_of_the_whole_run(run):
     # 250 s of renders on two cores.
     assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 05 s left"]
     run.shown(running=["place"])
-    assert "cameras: 1 job in 2 s" in run.shown(2, finished=["place"], running=["a", "b"])
+    assert "cameras: 1 job in 2 s, from 0 s to 2 s of the run" in run.shown(
+        2, finished=["place"], running=["a", "b"]
+    )
     run.log("a", "render scene a: 8 views to do, 2 already done")
     run.log("b", "render scene b: 10 views to do", "render scene b: 2 of 10 views, 20 s each, …")
     bar, line = run.shown(40)
@@ -90,10 +92,12 @@ def test_bars_and_one_line_show_the_progress_of_the_whole_run(run):
     run.log("a", "render scene a: 8 of 8 views, 20 s each, done in 180 s")
     run.log("b", "render scene b: 10 of 10 views, 20 s each, done in 200 s")
     shown = run.shown(160, finished=["a", "b"], running=["panorama"])
-    assert "views: 18 views in 3 min 20 s" in shown
+    # The run began 2 s before.
+    assert "views: 18 views in 3 min 20 s, from 2 s to 3 min 22 s of the run" in shown
     # Views took 20 s instead of 10 s: 50 s become 100 s, of which 1.8 are done in a second.
     assert shown[-1] == "3 of 4 jobs · 20 of 20 views · 56 s left"
-    assert "report: 1 job in 50 s" in run.shown(50, finished=["panorama"])
+    report = "report: 1 job in 50 s, from 3 min 22 s to 4 min 12 s of the run"
+    assert report in run.shown(50, finished=["panorama"])
 
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
@@ -139,7 +143,8 @@ def test_a_measurement_takes_the_time_that_its_log_tells(run):
     assert bar.startswith("measurement ") and bar.endswith(" 10 of 50")
     assert line == "0 of 1 job · 2 min 00 s left"
     run.log("error", "garden: trials: 50 of 50 renders, 3 s each, done in 150 s")
-    assert "measurement: 1 job in 2 min 30 s" in run.shown(120, finished=["error"])
+    phase = "measurement: 1 job in 2 min 30 s, from 0 s to 2 min 30 s of the run"
+    assert phase in run.shown(120, finished=["error"])
 
 
 def test_warnings_are_shown_once_and_other_lines_not(run):

@@ -319,7 +319,10 @@ class RunDisplay:
             done = count(views_made, "view") if has_views else count(len(tasks), "job")
             began = min(task.began or self._began for task in tasks)
             ended = max(task.ended or began for task in tasks)
-            self.say(f"{phase}: {done} in {duration(ended - began)}")
+            # Phases overlap: without its place in the run, a time would be added to the others.
+            first, last = (duration(max(0, round(at - self._began))) for at in (began, ended))
+            took = duration(ended - began)
+            self.say(f"{phase}: {done} in {took}, from {first} to {last} of the run")
 
     def _draw(self, now: float) -> None:
         if self._stream.isatty():
