@@ -81,18 +81,21 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
         return len(replace(sphere, **settings).shards)
 
     assert count() == 64
-    # Jobs of 16 cores run for 20 minutes: three of them render a view.
-    assert count(cluster=Cluster(jobs=100, cores=16)) == 216
+    # Jobs of 2 cores render a view in 54 minutes, and may take two hours.
+    assert count(cluster=Cluster(jobs=100, cores=2)) == 288
+    # Jobs of 16 cores would need fewer than 100, but 100 run at once.
+    assert count(cluster=Cluster(jobs=100, cores=16)) == 100
     assert count(cluster=Cluster(jobs=300, cores=16)) == 300
-    assert count(cluster=Cluster(jobs=100, cores=1)) == 642
-    # Jobs of 1000 cores would need fewer than 100, but 100 run at once.
-    assert count(cluster=Cluster(jobs=100, cores=1000)) == 100
+    # Jobs of 1000 cores render a view in 6 s, and take five minutes at least.
+    assert count(cluster=Cluster(jobs=100, cores=1000)) == 14
     probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
     probe |= {"views": 642, "view_seconds": [6.0], "view_bytes": [1e7]}
     write_json(Path(sphere.paths.probe), probe)
     # Ten views are the fewest for which the start is a small part.
-    assert count(cluster=Cluster(jobs=100, cores=16)) == 65
-    assert count(cluster=Cluster(jobs=50, cores=16)) == 64
+    assert count() == 64
+    assert count(views_per_shard=5) == 129
+    # Two cores render a hundred views in five minutes.
+    assert count(cluster=Cluster(jobs=100, cores=2)) == 7
 
 
 def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
@@ -123,7 +126,7 @@ def begin(work, dataset, shards):
 
 
 def test_a_dataset_in_progress_keeps_its_shards(sphere):
-    begun = replace(sphere, cluster=Cluster(jobs=100, cores=1000))
+    begun = replace(sphere, cluster=Cluster(jobs=100, cores=16))
     begin(sphere.work_root, "other/rig", [(0, 3), (3, 6), (6, 10)])
     assert len(begun.shards) == 100
     begun = replace(begun)
@@ -148,9 +151,9 @@ def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     target = "results/garden/LFSphere_e100cm_d170cm/report/rig.svg"
     arguments = (target, "--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
     cluster = ("--executor", "cluster-generic", "--cluster-generic-submit-cmd", "sh")
-    # One core each for 20 minutes is less than a view takes.
+    # With one core each, most jobs of two hours render one view.
     on_cluster = planned(folder, "--jobs", "100", *cluster, *arguments, "cluster_jobs=100")
-    assert on_cluster["render"] == 642
+    assert on_cluster["render"] == 575
     begin(folder / "work", "garden/LFSphere_e100cm_d170cm", shard_bounds(642, 300)[:100])
     assert planned(folder, *arguments)["render"] == 300
 

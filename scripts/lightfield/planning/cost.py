@@ -77,8 +77,9 @@ _MOST_SHOWN_VIEWS = 120
 _START_UP_PART = 0.05
 # More jobs would lengthen the plan, but not render faster. A cluster may get more.
 _USUAL_SHARDS = 64
-# On a cluster each job is expected to take at most so long.
-_CLUSTER_JOB_MINUTES = 20
+# On a cluster each job is expected to take at least and at most so long, unless a view takes longer.
+# A batch system may take a minute to start a job.
+_CLUSTER_JOB_MINUTES = (5, 120)
 # Planning more shards than this takes too long.
 _MOST_SHARDS = 10_000
 
@@ -200,17 +201,20 @@ def shard_count(dataset: Dataset) -> int:
     """Return how many shards a dataset gets before the first is rendered.
 
     Shards are as short as possible, so that many processes can work at once. But start-up must stay
-    a small part of a shard's time. The count must depend only on the configuration and the probe.
+    a small part of a shard's time, and a cluster's job must last some minutes. The count must
+    depend only on the configuration and the probe.
     """
     view_count = dataset.view_count
     probe = _probe_of(dataset)
     seconds = probe.view_cost.seconds if probe else _planned_view_seconds(dataset)
-    shortest = math.ceil(START_UP_SECONDS / _START_UP_PART / max(seconds, 1e-6))
+    least_seconds = START_UP_SECONDS / _START_UP_PART
     most = _USUAL_SHARDS
     if dataset.cluster:
-        job_seconds = 60 * _CLUSTER_JOB_MINUTES * dataset.cluster.cores
-        short_jobs = math.ceil(view_count * seconds / job_seconds)
+        least, longest = (60 * each * dataset.cluster.cores for each in _CLUSTER_JOB_MINUTES)
+        least_seconds = max(least_seconds, least)
+        short_jobs = math.ceil(view_count * seconds / longest)
         most = min(max(most, dataset.cluster.jobs, short_jobs), _MOST_SHARDS)
+    shortest = math.ceil(least_seconds / max(seconds, 1e-6))
     return min(math.ceil(view_count / shortest), most)
 
 
