@@ -77,8 +77,8 @@ _MOST_SHOWN_VIEWS = 120
 _START_UP_PART = 0.05
 # More jobs would lengthen the plan, but not render faster. A cluster may get more.
 _USUAL_SHARDS = 64
-# On a cluster each job is expected to take at least and at most so long, unless a view takes longer.
-# A batch system may take a minute to start a job.
+# On a cluster each job is expected to take at least and at most so long, but at least one view. A
+# batch system may take a minute to start a job.
 _CLUSTER_JOB_MINUTES = (5, 120)
 # Planning more shards than this takes too long.
 _MOST_SHARDS = 10_000
