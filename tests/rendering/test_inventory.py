@@ -231,6 +231,48 @@ def test_missing_or_unreadable_files_are_an_error(run_program, tmp_path, monkeyp
     assert not output.exists()
 
 
+PACKED = """
+import sys
+import bpy
+
+folder, sources = sys.argv[1:]
+sys.path.insert(0, sources)
+from scenes import room
+
+def link(name, pack):
+    with bpy.data.libraries.load(folder + "/library.blend", link=True, pack=pack) as (_, wanted):
+        wanted.objects = [name]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+room.build({})
+shapes = {bpy.data.objects[name] for name in ("cone", "sphere")}
+bpy.data.libraries.write(folder + "/library.blend", shapes)
+for shape in shapes:
+    bpy.data.objects.remove(shape)
+link("cone", pack=True)
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/packed.blend")
+link("sphere", pack=False)
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/also_linked.blend")
+"""
+
+
+def test_the_library_of_packed_objects_is_not_read(run_program, tmp_path):
+    (tmp_path / "make.py").write_text(PACKED)
+    run_program(tmp_path / "make.py", tmp_path, Path(pruning.__file__).parents[2])
+    (tmp_path / "library.blend").unlink()
+    output = tmp_path / "inventory.json"
+    arguments = ("--blend", tmp_path / "packed.blend", "--output", output)
+    run_program("inventory.py", *arguments)
+    inventory = json.loads(output.read_text())
+    assert inventory["external_files"] == inventory["missing"] == []
+    assert inventory["objects"] == 5
+    # An object that is only linked still needs it.
+    arguments = ("--blend", tmp_path / "also_linked.blend", "--output", output)
+    result = run_program("inventory.py", *arguments, check=False)
+    assert f"the library library.blend at {tmp_path}/library.blend (missing)" in result.stderr
+
+
 MINIMAL = """
 scene: {builder: room}
 render: {samples: 1, depth: none}

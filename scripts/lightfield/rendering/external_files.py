@@ -108,7 +108,9 @@ def _is_absolute(block: Any, path: str) -> bool:
 def _blocks_and_paths() -> Iterator[tuple[Any, str]]:
     """Yield each data-block that reads a file, and the path as the .blend has it."""
     for library in bpy.data.libraries:
-        if not library.packed_file:
+        # Packed data-blocks are in an archive, which keeps the name of the file. Nothing reads it.
+        is_packed = library.packed_file or library.is_archive
+        if library.users_id and not is_packed:
             yield library, library.filepath
     for block, paths in bpy.data.file_path_map().items():
         if type(block).__name__ in KINDS and not _is_packed(block):
