@@ -287,8 +287,7 @@ REFUSED = [
         (
             f"exports.{name}",
             {"sources": ["perspective"]},
-            f"exports.{name}.sources: perspective is of the rig LFSphere, which has fewer than two "
-            "frames",
+            f"exports.{name}.sources: perspective of the rig LFSphere has fewer than two frames",
         )
         for name in ("dnerf", "colmap_frames", "multipleview")
     ),
@@ -435,6 +434,10 @@ REFUSED = [
             ("colmap", "sources", []),
             ("colmap", "sources", ["nowhere"]),
             ("colmap", "sources", "perspective"),
+            ("colmap", "rigs", []),
+            ("colmap", "rigs", "LFSphere"),
+            ("colmap", "rigs", ["LFSpher"]),
+            ("colmap", "rigs", ["LFCuboid"]),
             ("nerfstudio", "exposure", 101),
             ("nerfstudio", "reinhard", 0),
             ("instant_ngp", "scale", 0),
@@ -719,6 +722,19 @@ EXPLAINED = [
         "rigs.LFSphere.camera",
         {"lens": "rectilinear", "focal_length": 2, "sensor_size": 0.5, "resolution": [9, 9]},
         "rigs.LFSphere.camera.sensor_size: is 0.5; must be at least 1 mm in Blender",
+    ),
+    (
+        "rigs.A",
+        {"type": "plane", "camera": CAMERA, "cameras": [3, 2], "size": 1, "baseline": 0.1},
+        "rigs.A.baseline: does not go with size",
+    ),
+    *(
+        (
+            "rigs.A",
+            {"type": "plane", "camera": CAMERA, "cameras": [3, 2], "baseline": value},
+            "rigs.A.baseline: is ",
+        )
+        for value in (0, -1, 1001, [1, 2])
     ),
     ("rigs.LFSphere.type", "ball", 'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,'),
     (

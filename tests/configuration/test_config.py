@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from mistakes import REMOVE, RIGHT, changed
+from pydantic import ValidationError
 
 from lightfield.configuration import config_file, json_schema, scene_yaml
 from lightfield.configuration.config_file import Preset
@@ -18,7 +19,8 @@ from lightfield.core import yaml_files
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.geometry.rigs import as_written
-from lightfield.workflow.loading import load_datasets, scene_datasets
+from lightfield.stages import job_settings
+from lightfield.workflow.loading import datasets_of, load_datasets, scene_datasets
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 
@@ -150,8 +152,64 @@ def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     assert scene_yaml.read_scene(path).exports.colmap
     content["exports"]["colmap"] = {"sources": ["views"], "depth": True}
     path.write_text(yaml.safe_dump(content))
-    with pytest.raises(UserError, match="views is a panorama, for which COLMAP has no depth maps"):
+    problem = (
+        "exports.colmap.sources: views of the rig LFCuboid is a panorama, for which COLMAP has no "
+        r"depth maps; .*; or export without it: rigs: \[LFSphere\]"
+    )
+    with pytest.raises(UserError, match=problem):
         scene_yaml.read_scene(path)
+    content["exports"]["colmap"]["rigs"] = ["LFSphere"]
+    path.write_text(yaml.safe_dump(content))
+    assert scene_yaml.read_scene(path).exports.colmap
+
+
+def test_each_rig_has_the_exports_that_name_it():
+    flat = {"type": "plane", "cameras": [3, 3], "size": 1}
+    flat["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+    wide = {"type": "sphere", "subdivisions": 1, "size": 1}
+    wide["camera"] = {"lens": "equidistant", "fov": 200, "resolution": [8, 8]}
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 1},
+        "rigs": {"flat": flat, "wide": wide},
+        "exports": {
+            "hci": {"sources": ["views"], "rigs": ["flat"]},
+            "instant_ngp": {"sources": ["views"], "rigs": ["wide"]},
+            "poses_csv": {"sources": ["views"]},
+        },
+    }
+    written = scene_yaml.Scene.model_validate(content)
+    first, second = datasets_of("mixed", written, "full", Preset(), {})
+    assert [*first.exports.selected] == ["hci", "poses_csv"]
+    assert first.exported == [
+        "results/mixed/flat/exports/hci/export.json",
+        "results/mixed/flat/exports/poses_csv/export.json",
+    ]
+    assert second.exported == [
+        "results/mixed/wide/transforms.json",
+        "results/mixed/wide/exports/poses_csv/export.json",
+    ]
+    # The files of an export do not depend on the rigs that have one, too.
+    settings = job_settings.export(first, "hci", first.exports.hci, "views").as_json()
+    assert "rigs" not in settings["options"]
+    assert "rigs" not in first.exports.hci.recorded
+
+
+def test_an_export_for_training_is_of_a_whole_split():
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+    rig = {"type": "plane", "cameras": [2, 2], "camera": camera}
+    rigs = {"a": rig | {"split": "train"}, "b": rig | {"split": "test"}, "c": rig}
+    content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": rigs}
+    for name in ("nerfstudio", "instant_ngp"):
+        for chosen in (["a"], ["b"], ["a", "c"]):
+            content["exports"] = {name: {"sources": ["views"], "rigs": chosen}}
+            with pytest.raises(ValidationError, match=rf"exports\.{name}\.rigs: lacks [ab]; must"):
+                scene_yaml.Scene.model_validate(content)
+        for chosen in (["a", "b"], ["c"]):
+            content["exports"] = {name: {"sources": ["views"], "rigs": chosen}}
+            scene_yaml.Scene.model_validate(content)
+    content["exports"] = {"poses_csv": {"sources": ["views"], "rigs": ["a"]}}
+    scene_yaml.Scene.model_validate(content)
 
 
 def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):

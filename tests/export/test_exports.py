@@ -23,7 +23,7 @@ from lightfield.configuration.exports import EXPORTS, Exports, settings_of
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.export import disparity
+from lightfield.export import disparity, hci
 from lightfield.export.points import evenly, one_a_voxel
 from lightfield.export.source import SeenSurface, SourceDataset
 from lightfield.formats.lightfield import LightField, View
@@ -661,6 +661,31 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     assert names[tuple(np.round(center, 9))] == "view_0007f"
 
 
+def test_hci_disparity_as_exr_has_the_values_of_the_benchmarks_maps(tmp_path):
+    rig = {"type": "plane", "cameras": [3, 2], "baseline": 0.2}
+    write_views(tmp_path / "dataset", LENSES["perspective"], rig)
+    folder = exported(tmp_path / "dataset", "hci", "views", tmp_path, disparity="exr")
+    paths = sorted(folder.glob("*.exr"))
+    assert [path.stem for path in paths] == [f"gt_disp_lowres_Cam{n:03}" for n in range(6)]
+    for path in paths:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            ((name, channel),) = file.channels().items()
+        assert (name, channel.pixels.dtype) == ("Y", np.float32)
+        np.testing.assert_array_equal(channel.pixels, pfm(path.with_suffix(".pfm")))
+
+
+def test_a_plane_with_a_baseline_suits_hci_at_every_number_of_views(tmp_path):
+    for name, keys in (("baseline", {"baseline": 0.2}), ("size", {"size": [1.6, 0, 0.8]})):
+        rig = rigs.from_settings({"type": "plane", "cameras": [9, 5], **keys})
+        lens = lenses.from_camera(LENSES["perspective"])
+        grids = [LightField.from_rig(rig.thinned(views), lens) for views in (45, 20, 6)]
+        # Only the full rig of a size has equal distances.
+        for lightfield in grids if name == "baseline" else grids[:1]:
+            assert hci.grid(lightfield)[2] == pytest.approx(0.2)
+    with pytest.raises(UserError, match="give the plane a baseline"):
+        hci.grid(grids[1])
+
+
 def test_hci_is_for_regular_grids(dataset, tmp_path):
     with pytest.raises(UserError, match="frames: are not a grid of cameras that look in parallel"):
         exported(dataset, "hci", "perspective", tmp_path)  # Rows are farther apart.
@@ -1199,9 +1224,9 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
         ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
-        ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
+        ("scannetpp", "views", VIEWS, {}, "sees 180 degrees, but this layout ends below"),
         ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
-        ("lichtfeld", "views", VIEWS, {}, "sees 180 degrees, where LichtFeld's fisheye ends"),
+        ("lichtfeld", "views", VIEWS | {"fov": 200}, {}, "sees 200 degrees, but LichtFeld's ends"),
         ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
         ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
         ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not in EXR; give it format: exr"),
@@ -1239,13 +1264,16 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     }
     assert TypeAdapter(Scene).validate_python(content).exports.hci
     content["exports"] = {"hci": {"sources": ["views"]}}
-    with pytest.raises(ValidationError, match="views is of the rig Ball, which is not a plane"):
+    problem = r"views of the rig Ball is not .* type plane.*; or export without it: rigs: \[Plane\]"
+    with pytest.raises(ValidationError, match=problem):
         TypeAdapter(Scene).validate_python(content)
+    content["exports"] = {"hci": {"sources": ["views"], "rigs": ["Plane"]}}
+    assert TypeAdapter(Scene).validate_python(content).exports.hci
     content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
     content["reprojections"] = {}
     for name, why in (("instant_ngp", "cameras at one place"), ("colmap", "only one view")):
         content["exports"] = {name: {"sources": ["views"]}}
-        with pytest.raises(ValidationError, match=f"views is of the rig One, which has {why}"):
+        with pytest.raises(ValidationError, match=f"views of the rig One has {why}"):
             TypeAdapter(Scene).validate_python(content)
     content["exports"] = {"instant_ngp": {"sources": ["views"], "bounds": "depth"}}
     assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp
@@ -1280,7 +1308,7 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
         ("nerf_synthetic", "fisheye", "is not a pinhole camera"),
         ("miv", "fisheye", "has a lens that MIV lacks"),
         ("scannetpp", "perspective", "is not an equidistant fisheye"),
-        ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
+        ("colmap", "views", "sees 180 degrees, but COLMAP's fisheye ends below 180"),
         ("ncore", "panorama", "is not an equidistant fisheye or a pinhole"),
         ("lichtfeld", "opencv", "has a fourth coefficient, which LichtFeld drops; reproject"),
     ],

@@ -471,7 +471,7 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
         (
             "panorama",
             {"exports": {"poses_csv": {"sources": ["views"]}}},
-            "views is of the rig one, whose views have no centre",
+            "views of the rig one has views without a centre",
         ),
     ],
 )

@@ -481,6 +481,9 @@ ROUNDS = {
         ),
         "brought": ("depth: true}", "depth: true, points: 9}", {"export"}),
     },
+    "an export of one rig": {
+        "built": ("points: 9", "points: 9, rigs: [LFPlane]", {"LFInner validate", "LFInner costs"}),
+    },
     "a split, and a frame": {
         "built": ("split: odd", "split: {every: 3}", {"LFPlane lightfield", "probe_cameras"}),
         "brought": (

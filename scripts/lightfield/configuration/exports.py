@@ -43,8 +43,21 @@ class Export(Settings):
 
     sources: list[str] = Field(
         min_length=1,
-        description=f"Names of reprojections to export. `{VIEWS}` stands for the rendered views.",
+        description=f"What to export: names of reprojections, or `{VIEWS}` for the views as they "
+        "were rendered. Each becomes an export of its own.",
     )
+    # This changes no file of an export.
+    rigs: list[str] | None = Field(
+        None,
+        min_length=1,
+        exclude=True,
+        description="Rigs whose views are exported. Without this key, all rigs.",
+    )
+
+    @property
+    def joins_split(self) -> bool:
+        """Whether an export of a rig that trains concerns the rigs that test, and vice versa."""
+        return self.is_for_training
 
     @property
     def recorded(self) -> dict[str, Any]:
@@ -148,6 +161,11 @@ class InstantNgp(Export):
         return None
 
     @property
+    def joins_split(self) -> bool:
+        # Test views get the scale and offset of the training views.
+        return True
+
+    @property
     def recorded(self) -> dict[str, Any]:
         options = super().recorded
         del options["offset"]
@@ -177,7 +195,7 @@ class Colmap(Developed):
         if isinstance(lens, Equidistant | KannalaBrandt):
             # COLMAP projects only points in front of the camera.
             if lens.fov >= math.pi:
-                return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
+                return f"{_angle(lens)}, but COLMAP's fisheye ends below 180; give it a smaller fov"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
                 return f"is a part of a panorama; COLMAP takes whole ones; {_TO_RECTILINEAR}"
@@ -258,13 +276,19 @@ class Miv(Developed):
 class Hci(Developed):
     """The layout of the HCI 4D light field benchmark, with disparities."""
 
+    disparity: Literal["exr"] | None = Field(
+        None,
+        description="exr: also write the disparity maps as EXR, with a channel Y of 32-bit floats, "
+        "in pixels between neighbouring views.",
+    )
+
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return _centred_pinhole(lens) or (None if has_depth else NO_DEPTH)
 
     def rig_refusal(self, rig: Rig) -> str | None:
         if isinstance(rig, Plane) and not rig.cube_map and rig.look_at is None:
             return None
-        return "is not a plane of parallel cameras, which HCI's layout needs; export only planes"
+        return "is not a rig of type plane with parallel cameras, which HCI's layout needs"
 
 
 class ScanNetPP(Developed):
@@ -279,8 +303,10 @@ class ScanNetPP(Developed):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant) and lens.fov < math.pi:
-            return None
+        if isinstance(lens, Equidistant):
+            if lens.fov < math.pi:
+                return None
+            return f"{_angle(lens)}, but this layout ends below 180; give it a smaller fov"
         return "is not an equidistant fisheye below 180 degrees; reproject to one"
 
 
@@ -321,7 +347,7 @@ class LichtFeld(Developed):
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | KannalaBrandt):
             if lens.fov >= math.pi:
-                return "sees 180 degrees, where LichtFeld's fisheye ends; give it a smaller fov"
+                return f"{_angle(lens)}, but LichtFeld's ends below 180; give it a smaller fov"
             if isinstance(lens, KannalaBrandt) and lens.coefficients[3] != 0:
                 return "has a fourth coefficient, which LichtFeld drops; reproject to equidistant"
         elif isinstance(lens, Equirectangular):
@@ -490,6 +516,10 @@ class Exports(Settings):
     def selected(self) -> dict[str, Export]:
         """The exports that the scene YAML selects, by name."""
         return {name: export for name, export in self if export}
+
+
+def _angle(lens: Equidistant | KannalaBrandt) -> str:
+    return f"sees {math.degrees(lens.fov):g} degrees"
 
 
 def _odd_size_refusal(lens: Lens) -> str | None:

@@ -7,7 +7,7 @@ config_file.py. With the schemas, editors complete and check the files.
 import difflib
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -261,7 +261,7 @@ class Scene(Credits):
         if self.sensor:
             self._check_sensor(self.sensor)
         for name, export in self.exports.selected.items():
-            self._check_export(f"exports.{name}.sources", export)
+            self._check_export(f"exports.{name}", export)
         for key in ("flow", "mesh"):
             if getattr(self, key) is not None and self.scene.followed_camera == "view":
                 raise ValueError(
@@ -413,17 +413,28 @@ class Scene(Credits):
                 if getattr(rig, key) != getattr(split_rigs[training], key):
                     raise ValueError(f"rigs.{name}.{key}: must be as in {training}, which trains")
         for name, reprojection in self.developments.items():
-            missing_rigs = split_rigs.keys() - set(reprojection.rigs or self.rigs)
-            if missing_rigs and missing_rigs != split_rigs.keys():
-                rigs = ", ".join(sorted(missing_rigs))
-                key = f"reprojections.{name}" if name in self.reprojections else "sensor"
-                raise ValueError(
-                    f"{key}.rigs: lacks {rigs}; must have all rigs of the split, the one that "
-                    "trains and the ones that test, or none"
-                )
+            key = f"reprojections.{name}" if name in self.reprojections else "sensor"
+            self._check_whole_split(f"{key}.rigs", split_rigs.keys(), reprojection.rigs)
+        for name, export in self.exports.selected.items():
+            if export.joins_split:
+                self._check_whole_split(f"exports.{name}.rigs", split_rigs.keys(), export.rigs)
 
-    def _check_export(self, key: str, export: Export) -> None:
-        """Check that an export's sources exist, and that its consumer can take them."""
+    def _check_whole_split(
+        self, key: str, split_rigs: Set[str], chosen_rigs: list[str] | None
+    ) -> None:
+        """Check that the chosen rigs, or all without a choice, have a whole split or none of it."""
+        missing_rigs = split_rigs - set(chosen_rigs or self.rigs)
+        if missing_rigs and missing_rigs != split_rigs:
+            rigs = ", ".join(sorted(missing_rigs))
+            raise ValueError(
+                f"{key}: lacks {rigs}; must have all rigs of the split, the one that trains and "
+                "the ones that test, or none"
+            )
+
+    def _check_export(self, export_key: str, export: Export) -> None:
+        """Check that an export's rigs and sources exist, and that its consumer can take them."""
+        self._check_rig_names(f"{export_key}.rigs", export.rigs or ())
+        key = f"{export_key}.sources"
         developments = self.developments
         allowed_sources = [VIEWS, *developments]
         for source in export.sources:
@@ -445,17 +456,30 @@ class Scene(Credits):
                     f"{key}: {source} mixes the rows of a rolling shutter, whose times the export "
                     f"has; export {VIEWS}"
                 )
-            for name in (reprojection and reprojection.rigs) or self.rigs:
-                rig = self.rigs[name]
-                camera = (reprojection and reprojection.camera) or rig.camera
-                if refusal := export.refusal(camera.make(), has_depth):
-                    raise ValueError(f"{key}: {source} {refusal}")
-                if rig.is_omnidirectional:
-                    raise ValueError(
-                        f"{key}: {source} is of the rig {name}, whose views have no centre"
-                    )
-                if refusal := export.rig_refusal(rig):
-                    raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
+            self._check_exported_rigs(export_key, export, source, has_depth)
+
+    def _check_exported_rigs(
+        self, export_key: str, export: Export, source: str, has_depth: bool
+    ) -> None:
+        """Check that an export's consumer can take the views of each chosen rig of a source."""
+        reprojection = self.developments.get(source)
+        rigs_of_source = (reprojection and reprojection.rigs) or [*self.rigs]
+        for name in export.rigs or ():
+            if name not in rigs_of_source:
+                raise ValueError(
+                    f"{export_key}.rigs: {name} is not a rig of the reprojection {source}"
+                )
+        refusals = {
+            name: _export_refusal(export, self.rigs[name], reprojection, has_depth)
+            for name in export.rigs or rigs_of_source
+        }
+        accepted = ", ".join(name for name, refusal in refusals.items() if not refusal)
+        for name, refusal in refusals.items():
+            if refusal:
+                hint = f"; or export without it: rigs: [{accepted}]" if accepted else ""
+                raise ValueError(
+                    f"{export_key}.sources: {source} of the rig {name} {refusal}{hint}"
+                )
 
     def _check_passes_of(self, key: str, source: str, export: Export) -> None:
         """Check that the views of a source have the passes that an export needs."""
@@ -531,6 +555,18 @@ class Scene(Credits):
         for reprojection_name, reprojection in self.reprojections.items():
             if reprojection.camera and name in (reprojection.rigs or self.rigs):
                 raise ValueError(f"reprojections.{reprojection_name}: {refusal}")
+
+
+def _export_refusal(
+    export: Export, rig: Rig, reprojection: Reprojection | None, has_depth: bool
+) -> str | None:
+    """Return why an export's consumer cannot take the views of a rig, and what to do. Or None."""
+    camera = (reprojection and reprojection.camera) or rig.camera
+    if refusal := export.refusal(camera.make(), has_depth):
+        return refusal
+    if rig.is_omnidirectional:
+        return "has views without a centre, as omnidirectional stereo has"
+    return export.rig_refusal(rig)
 
 
 def _check_blender_limits(key: str, lens: Lens) -> None:

@@ -3,10 +3,11 @@
 - ``input_Cam000.png`` and so on: the views row by row, from the top left as the cameras see it.
 - ``parameters.cfg``: the cameras.
 - ``gt_depth_lowres_Cam….pfm``: Z in metres, for each view.
-- ``gt_disp_lowres_Cam….pfm``: disparity, for each view.
+- ``gt_disp_lowres_Cam….pfm``: disparity, for each view. Also ``.exr``, if the settings ask for it.
 
-The middle view's maps also exist without a number. A disparity is the number of pixels that a point
-moves between neighbours, d = b f (1 / Z − 1 / F). Parallel cameras have F = ∞, written as `_FOCUS`.
+The middle view's ``.pfm`` maps also exist without a number. A disparity is the number of pixels
+that a point moves between neighbours, d = b f (1 / Z − 1 / F). Parallel cameras have F = ∞, written
+as `_FOCUS`.
 Source: Honauer et al. 2016, and the benchmark's parameters.
 """
 
@@ -23,6 +24,7 @@ from lightfield.export import cameras
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
 
 _FOCUS = 1e9  # metres
 
@@ -45,6 +47,9 @@ def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
             _write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
             if number == middle:
                 _write_pfm(folder / f"gt_{name}_lowres.pfm", values)
+        if settings.disparity == "exr":
+            plane = disparity.astype(np.float32)
+            images.write_exr(folder / f"gt_disp_lowres_Cam{number:03}.exr", {"Y": plane})
         disparities += [float(np.min(disparity)), float(np.max(disparity))]
         progress.done()
     write_text(
@@ -71,8 +76,8 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
     )
     if not regular:
         raise UserError(
-            f"{lightfield.path}: frames: are not a grid of cameras that look in parallel, "
-            "with equal distances across and down; this layout needs one"
+            f"{lightfield.path}: frames: are not a grid of cameras that look in parallel, with "
+            "equal distances across and down; this layout needs one: give the plane a baseline"
         )
     order = np.lexsort((places[:, 0].round(9), -places[:, 1].round(9)))
     return [views[index] for index in order], len(x), float(steps.mean())

@@ -196,8 +196,9 @@ class Sensor(SensorOptions):
     sources: list[str] = Field(
         [VIEWS],
         min_length=1,
-        description=f"Names of reprojections to which the sensor is applied. `{VIEWS}` stands for "
-        "the rendered views. They get the folder sensor, and perspective gets perspective_sensor.",
+        description="What the sensor is applied to: names of reprojections, or "
+        f"`{VIEWS}` for the views as they were rendered. The folder of these views is sensor. The "
+        "folder of perspective is perspective_sensor.",
     )
     rigs: list[str] | None = Field(
         None,

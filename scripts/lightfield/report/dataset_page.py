@@ -198,7 +198,7 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     kind = rig.type
     if isinstance(rig, rigs.Grid):
         kind += " " + " × ".join(map(str, rig.cameras))
-    size = tuple(np.ptp(places, axis=0).tolist()) if rig.is_loose else rig.size
+    size = tuple(np.ptp(places, axis=0).tolist()) if rig.is_loose else rig.extent
     if isinstance(size, tuple):
         return f"{kind}, {' × '.join(f'{side:.4g}' for side in size)} m"
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"

@@ -149,7 +149,7 @@ def datasets_of(
                 reprojections=reprojections,
                 flow=written.flow,
                 mesh=_mesh_of(name, written),
-                exports=_exports_of(rig, written, reprojections),
+                exports=_exports_of(name, written, reprojections),
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
                 shard_count=shard_count,
@@ -198,19 +198,21 @@ def _reprojections_of(
 
 
 def _exports_of(
-    rig: Rig, written: scene_yaml.Scene, reprojections: dict[str, Reprojection]
+    name: str, written: scene_yaml.Scene, reprojections: dict[str, Reprojection]
 ) -> Exports:
     """Return the exports of a rig's views and ``reprojections``.
 
     A rig that tests another rig's training has no training exports of its own. The other rig's
     exports include its views.
     """
-    is_tested_elsewhere = rig.split in _TESTED_WITH
+    is_tested_elsewhere = written.rigs[name].split in _TESTED_WITH
     exports = {}
     for key, export in written.exports.selected.items():
         sources = [source for source in export.sources if source in (VIEWS, *reprojections)]
+        is_chosen = name in (export.rigs or written.rigs)
         belongs_elsewhere = is_tested_elsewhere and export.is_for_training
-        exports[key] = None if belongs_elsewhere else export.model_copy(update={"sources": sources})
+        is_made = is_chosen and not belongs_elsewhere
+        exports[key] = export.model_copy(update={"sources": sources}) if is_made else None
     return written.exports.model_copy(update=exports)
 
 

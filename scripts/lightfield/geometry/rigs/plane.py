@@ -1,10 +1,10 @@
 """A plane: an upright wall of cameras that look along +Y."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, grid, quads, square_outline
@@ -20,6 +20,28 @@ class Plane(Grid):
     cameras: Annotated[tuple[Count, Count], as_list(2)] = Field(
         description="Number of cameras along x and along z."
     )
+
+    baseline: float | None = Field(
+        None,
+        gt=0,
+        le=1000,
+        description="Distance between neighbouring cameras, along x and along z, in place of size. "
+        "A preset that leaves out cameras keeps it.",
+        json_schema_extra={"unit": "m"},
+    )
+
+    @model_validator(mode="after")
+    def _one_size(self) -> Self:
+        if self.baseline is not None and "size" in self.model_fields_set:
+            raise ValueError("baseline: does not go with size, which follows from it; give one")
+        return self
+
+    @property
+    def extent(self) -> float | tuple[float, float, float]:
+        if self.baseline is None:
+            return self.size
+        columns, rows = self.cameras
+        return (self.baseline * (columns - 1), 0.0, self.baseline * (rows - 1))
 
     def unit_poses(self) -> UnitPoses:
         across, down = grid(axis(self.cameras[0]), -axis(self.cameras[1]))

@@ -277,9 +277,14 @@ class Rig(Settings):
         return placed
 
     @property
+    def extent(self) -> float | tuple[float, float, float]:
+        """The size in metres, as the scene YAML gives it, or as it follows from other keys."""
+        return self.size
+
+    @property
     def sides(self) -> Floats:
         """The size (3,) along x, y and z, in metres."""
-        return np.broadcast_to(np.asarray(self.size, dtype=float), 3)
+        return np.broadcast_to(np.asarray(self.extent, dtype=float), 3)
 
     @property
     def turn(self) -> Floats:
