@@ -204,3 +204,60 @@ def test_a_holdout_is_no_surface(transparent, tmp_path):
     assert is_cube.sum() > 500
     assert np.isinf(image["Z"][is_cube]).all()
     assert not planes(tmp_path, "object", view)["Y"][is_cube].any()
+
+
+def as_object(cube):
+    cube.is_holdout = True
+
+
+def as_collection(cube):
+    import bpy
+
+    holes = bpy.data.collections.new("holes")
+    bpy.context.scene.collection.children.link(holes)
+    holes.objects.link(cube)
+    bpy.context.scene.collection.objects.unlink(cube)
+    bpy.context.view_layer.layer_collection.children["holes"].holdout = True
+
+
+def as_material(cube):
+    nodes = cube.active_material.node_tree.nodes
+    output = next(node for node in nodes if node.bl_idname == "ShaderNodeOutputMaterial")
+    hole = nodes.new("ShaderNodeHoldout")
+    cube.active_material.node_tree.links.new(hole.outputs[0], output.inputs["Surface"])
+
+
+@pytest.mark.parametrize("make", [as_object, as_collection, as_material])
+@pytest.mark.parametrize("transparent", [True, False])
+def test_views_around_a_holdout_agree(transparent, make, reproject_dataset, tmp_path):
+    """A view shows nothing of the ground that the holdout hides, and other views show it."""
+    import bpy
+
+    from lightfield.rendering import blend_file
+
+    path = tmp_path / "holdout.blend"
+    write_scene(path)
+    bpy.data.objects["ground"].is_shadow_catcher = False
+    make(bpy.data.objects["cube"])
+    blend_file.save_scene(path)
+    rig = {"type": "ring", "count": 5, "size": 6, "elevation": 25, "look_at": [0, 0, 0.5]}
+    lightfield = LightField.from_rig(
+        rigs.from_settings(rig),
+        lenses.from_camera(CAMERA),
+        frame=1,
+        render=RENDER | {"transparent": transparent, "passes": []},
+        depth="z",
+    )
+    one_shard.render(lightfield, tmp_path, path)
+    camera = {"lens": "equidistant", "fov": 40, "resolution": [SIZE, SIZE]}
+    reproject_dataset(tmp_path, tmp_path / "fisheye", {"camera": camera, "formats": ["exr"]})
+    checks = {check.name: check for check in validation.validate(tmp_path, ["fisheye"]).checks}
+    for name in ("geometry", "colour", "fisheye/geometry", "fisheye/colour", "fisheye/source"):
+        assert checks[name].passed, (name, checks[name].problems)
+    # The check still finds a view with wrong depth.
+    bad = tmp_path / "exr" / f"{lightfield.views[1].name}.exr"
+    image = images.read_image(bad)
+    channels = image.channels | {"Z": image.channels["Z"] * np.float32(1.1)}
+    images.write_exr(bad, channels, image.attributes)
+    checks = {check.name: check for check in validation.validate(tmp_path, []).checks}
+    assert not checks["geometry"].passed

@@ -584,11 +584,6 @@ BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
     "colour not a number": (pixel("G", np.nan), "colour", "1 values are not a number"),
     "infinite colour": (pixel("B", -np.inf), "colour", "1 values are infinite"),
     "black": (painted(lambda c: {**c, **{n: c[n] * 0 for n in "RGB"}}, ONE), "colour", "is black"),
-    "one colour": (
-        painted(lambda c: {**c, **{n: (c[n] > 0) * np.float16(0.3) for n in "RGB"}}, ONE),
-        "colour",
-        "one colour",
-    ),
     "colour outside the circle": (painted(outside, ONE), "colour", "sees nothing"),
     "depth outside the circle": (painted(wide_circle, ONE), "depth", "sees nothing"),
     "depth not a number": (pixel("Z", np.nan), "depth", "1 depths are not a number"),
@@ -618,11 +613,11 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     assert str(small_dataset) not in json.dumps(result.to_json())
 
 
-def grey(but: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+def grey(but: int, level: float = 0.3) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
     """Give a view one colour, except for a number of pixels."""
 
     def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        colour = (channels["R"] > 0) * np.float16(0.3)
+        colour = (channels["R"] > 0) * np.float16(level)
         colour[30, 20 : 20 + but] = 0.4
         return {**channels, **dict.fromkeys("RGB", colour)}
 
@@ -661,8 +656,8 @@ def depth_outside(within: int) -> Callable[[dict[str, np.ndarray]], dict[str, np
     ("change", "check_name", "passed"),
     [
         # A five-hundredth of the lens's pixels is 5 pixels here.
-        (grey(4), "colour", False),
-        (grey(8), "colour", True),
+        (grey(4, level=0), "colour", False),
+        (grey(8, level=0), "colour", True),
         (light_outside(0.0009), "colour", True),
         (light_outside(0.0011), "colour", False),
         (light_outside(1, part=0.04), "colour", True),
@@ -961,6 +956,14 @@ def one_speck(channels: Any) -> dict[str, np.ndarray]:
     return seen
 
 
+def black_object(channels: Any) -> dict[str, np.ndarray]:
+    """Show a black object that covers half of the view."""
+    seen = nothing_seen(channels)
+    seen["A"][:, :32] = 1
+    seen["Z"][:, :32] = 7
+    return seen
+
+
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
@@ -968,6 +971,7 @@ def one_speck(channels: Any) -> dict[str, np.ndarray]:
         (nothing_seen, None),
         (opaque_rim, None),
         (one_speck, None),
+        (black_object, None),
         (alpha(1.001), "1 values of alpha are not between 0 and 1"),
         (alpha(-0.001), "1 values of alpha are not between 0 and 1"),
         (alpha(np.nan), "1 values of alpha are not between 0 and 1"),
@@ -1140,6 +1144,48 @@ def test_reprojected_views_are_as_coarse_as_their_source(small_dataset: Path) ->
     (rendered_set, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
     assert grain_of(rendered_set) == 0
     assert grain_of(reprojected) == pytest.approx(math.pi / 64)
+
+
+def test_a_view_of_a_flat_wall_is_a_warning(small_dataset: Path) -> None:
+    """No failed render has a colour: Cycles leaves black."""
+    painted(grey(0), ONE)(small_dataset)
+    colour_check = check(validate(small_dataset), "colour")
+    assert colour_check.passed
+    assert colour_check.warnings == ["1 images in exr have one colour"]
+
+
+@pytest.mark.parametrize("sees_surfaces", [True, False])
+def test_a_black_view_may_show_a_black_sky_but_no_surface(
+    sees_surfaces: bool, small_dataset: Path
+) -> None:
+    def night(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        depth = channels["Z"] if sees_surfaces else np.full_like(channels["Z"], np.inf)
+        return {**grey(0, level=0)(channels), "Z": depth}
+
+    painted(night, ONE)(small_dataset)
+    colour_check = check(validate(small_dataset), "colour")
+    assert colour_check.passed is not sees_surfaces
+    assert colour_check.warnings == ([] if sees_surfaces else ["1 images in exr have one colour"])
+
+
+def test_a_reprojected_view_may_show_the_black_part_of_its_source(small_dataset: Path) -> None:
+    def black(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return channels | {name: np.zeros_like(channels[name]) for name in "RGB"}
+
+    def find(*failing: str) -> None:
+        result = validate(small_dataset, ["panorama"])
+        for name in ("colour", "panorama/colour", "panorama/source"):
+            assert check(result, name).passed is (name not in failing), name
+
+    add_panoramas(small_dataset, black)
+    find("panorama/colour")
+    reprojection = {"reprojection": {"exposure": 0}}
+    rewrite(small_dataset / "panorama", lambda held: held.update(reprojection))
+    find("panorama/source")
+    painted(lambda c: black({**c, "Z": np.full_like(c["Z"], np.inf)}), slice(None))(small_dataset)
+    add_panoramas(small_dataset, lambda c: black({**c, "Z": c["Z"] * np.float32(np.inf)}))
+    rewrite(small_dataset / "panorama", lambda held: held.update(reprojection))
+    find()
 
 
 def test_a_reprojected_view_of_one_colour_is_a_warning(small_dataset: Path) -> None:

@@ -35,8 +35,9 @@ MACHINE_ATTRIBUTE = "plenoforge:machine"
 CLAMPED_ATTRIBUTE = "plenoforge:clamped"
 # How many values were not a number.
 NAN_ATTRIBUTE = "plenoforge:nan"
-# In how many pixels the first surface is a shadow catcher that the picture does not show. Only
-# transparent views of scenes with shadow catchers have it.
+# In how many pixels the first surface is a shadow catcher that the picture does not show, or may be
+# a holdout. Only transparent views of scenes with shadow catchers, and views of scenes with
+# holdouts, have it.
 UNSHOWN_ATTRIBUTE = "plenoforge:unshown"
 
 # A surface that covers a smaller part of a pixel counts as absent.
@@ -223,12 +224,15 @@ def read_image(
 def may_hide(path: Path) -> np.ndarray[Any, Any]:
     """Return where (height, width) a view shows nothing, and may hide what other views see.
 
-    Shadow catchers hide what is behind them, although the picture does not show them there.
+    Shadow catchers and holdouts hide what is behind them, although the picture does not show them.
+    In a view without alpha, what has no depth may be a holdout.
     """
     header = read_header(path)
     if not header.attributes.get(UNSHOWN_ATTRIBUTE):
         return np.zeros((header.height, header.width), bool)
-    return np.asarray(read_image(path, ["A"]).channels["A"] < LEAST_ALPHA)
+    channels = read_image(path).channels
+    hides = channels["A"] < LEAST_ALPHA if "A" in channels else np.isposinf(channels["Z"])
+    return np.asarray(hides)
 
 
 def attribute(path: Path, name: str) -> Attribute | None:

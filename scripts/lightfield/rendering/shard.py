@@ -206,7 +206,8 @@ class _Rendered:
     """One view as Cycles rendered it. ``geometry`` is None if neither depth nor a pass needs it.
 
     ``geometry_seconds`` is the time of the geometry's render. ``unshown_pixels`` is the number of
-    pixels in which `unshown` left a surface out. None if the scene has no shadow catchers.
+    pixels in which `unshown` left a surface out, or of all without depth if a holdout may be in
+    them. None if the scene has neither shadow catchers nor holdouts.
     """
 
     colour: "Colour"
@@ -239,7 +240,7 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
 
     ``visible`` are the places from `_visible_places`.
     """
-    from lightfield.rendering import shadow_catchers, unshown, visible_part
+    from lightfield.rendering import holdouts, shadow_catchers, unshown, visible_part
     from lightfield.rendering.colour_pass import render_colour
     from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
@@ -263,6 +264,8 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     unshown_pixels = None
     if catches:
         colour, geometry, unshown_pixels = unshown.left_out(colour, geometry, view_passes)
+    if geometry and holdouts.exist():
+        unshown_pixels = int(np.isinf(geometry.depth).sum())
     if part:
         colour = replace(colour, pixels=part.in_whole(colour.pixels, 0))
         geometry = geometry and replace(geometry, depth=part.in_whole(geometry.depth, np.inf))

@@ -54,7 +54,9 @@ class Facts:
     - ``machine``: the machine that rendered the view.
     - ``marked``: whether the pixels without a source could be checked.
     - ``compared``: whether a reprojected view was compared with the rendered one.
-    - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
+    - ``colour_compared``: whether its colours were, too.
+    - ``constant``: whether the view has one colour and one alpha, as sky or a wall may.
+    - ``black``: whether this colour is black.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
     - ``sum_error``: by which part of the colour the sum of the light groups differs from it.
@@ -69,7 +71,9 @@ class Facts:
     machine: str | None = None
     marked: bool = False
     compared: bool = False
+    colour_compared: bool = False
     constant: bool = False
+    black: bool = False
     missed: float = 0.0
     patches: Patches | None = None
     sum_error: float | None = None
@@ -197,13 +201,10 @@ class Examiner:
         facts.fault("colour", f"{infinite} values are infinite", infinite)
         shows_nothing = transparent and _shows_nothing(image, in_circle, is_rendered)
         # A light may be off, or reach nothing that the view shows.
-        may_be_black = shows_nothing or image_set.lightfield.is_relit
-        facts.fault("colour", "is black", not colour.any() and not may_be_black)
-        if not shows_nothing and _has_one_colour(colour, in_circle):
-            depth = image.channels.get("Z")
-            is_empty = depth is not None and bool(np.isposinf(depth).all())
-            facts.constant = not is_rendered and not image_set.lightfield.is_relit
-            facts.fault("colour", "has one colour everywhere", is_rendered and not is_empty)
+        if not shows_nothing and not image_set.lightfield.is_relit:
+            pixels = np.stack([*colour, image.channels["A"]]) if transparent else colour
+            facts.constant = _has_one_colour(pixels, in_circle)
+            facts.black = facts.constant and not _middle(colour).any()
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
             is_lit = (colour[:, outside] > _FAINT).mean() > _MOST_LIT_OUTSIDE
@@ -360,6 +361,7 @@ class Examiner:
         if problem or (width, height) != (lens.width, lens.height):
             return
         facts.compared = True
+        facts.colour_compared = reprojected.has_same_light(target)
         for text in reprojected.faults(target, file.view, image, source, number, original):
             facts.fault("source", f"{text} {name}")
 
@@ -405,6 +407,13 @@ def checks(
     ``volumes`` are the names of the scene's volumes. Depth does not see them.
     """
     readable = {file: fact for file, fact in facts.items() if "images" not in fact.faults}
+    for fact in readable.values():
+        # A failed render is black. But the sky may be black, too, which has no depth, and so may
+        # the part of its source that a reprojection shows.
+        failed = fact.black and fact.missed < 1 and not fact.colour_compared
+        fact.fault(
+            "colour", "is black: the render failed, or no light reaches what it shows", failed
+        )
     checks = [
         _outcome(image_set, "images", facts, "are whole, of the right size and channels"),
         _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
@@ -413,7 +422,7 @@ def checks(
     checks.append(_outcome(image_set, "depth", with_depth, "have positive depths, misses +inf"))
     if image_set.lightfield.light_groups:
         checks.append(_of_light_groups(image_set, readable))
-    constant = sum(fact.constant for fact in readable.values())
+    constant = sum(fact.constant and "colour" not in fact.faults for fact in readable.values())
     if constant:
         checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
     if image_set.name:
@@ -527,13 +536,16 @@ def _inner(region: Bools, *, outside: bool = True) -> Bools:
     return inner
 
 
+def _middle(colour: NDArray[Any]) -> NDArray[Any]:
+    return colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
+
+
 def _has_one_colour(colour: NDArray[Any], in_circle: Bools) -> bool:
     """Return whether almost all pixels in the image circle have the middle pixel's colour.
 
-    ``colour`` is (3, height, width).
+    ``colour`` is (channels, height, width).
     """
-    middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
-    differs = (colour != middle[:, np.newaxis, np.newaxis]) & in_circle
+    differs = (colour != _middle(colour)[:, np.newaxis, np.newaxis]) & in_circle
     return bool(differs.sum(axis=(1, 2)).max() <= FEW * in_circle.sum())
 
 

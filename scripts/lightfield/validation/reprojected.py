@@ -81,7 +81,7 @@ def faults(
 ) -> Iterator[str]:
     """Yield how the ``image`` of a reprojected view differs from the ``original``, its source."""
     rays = _Rays(target, view, source, source_view)
-    if _has_same_light(target):
+    if has_same_light(target):
         wrong = _wrong_colours(target, image, original, rays)
         if len(wrong) >= _FEWEST and wrong.mean() > _MOST_WRONG:
             yield f"{wrong.mean():.0%} of its colours are not those around their places in"
@@ -89,7 +89,7 @@ def faults(
         yield from _depth_faults(target, image, source, original, rays)
 
 
-def _has_same_light(target: ImageSet) -> bool:
+def has_same_light(target: ImageSet) -> bool:
     """Return whether the views show the light of their source, with a known tone mapping."""
     lightfield = target.lightfield
     is_changed = lightfield.is_relit or lightfield.transparent or target.sensor is not None
