@@ -8,12 +8,17 @@ from pathlib import Path
 
 from lightfield.core.units import duration
 from lightfield.planning.cost import Cost, cost
-from lightfield.planning.forecast import Work, forecast
+from lightfield.planning.forecast import Work, forecast, requests_table
 from lightfield.planning.phases import KINDS, ORDER, SENSOR_PHASE
 from lightfield.workflow.run_display import RunDisplay, Task
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
+# What stands below the table of what jobs request of a cluster.
+REQUESTS_NOTE = """\
+mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the cluster's default.
+A limit is several times the expected time. Jobs of seconds run beside Snakemake, and are not listed.
+To change one: --set-resources render:mem_mb=16000. See docs/how-to/tune-a-cluster.md."""
 # The message if a run ends early, and no job has failed.
 UNFINISHED = "error: the run was stopped before its last job: the same command goes on"
 
@@ -189,6 +194,18 @@ def print_forecast():
     announce_refusals()
     jobs = sorted(planned_jobs(), key=lambda planned: ORDER[planned[0]])
     print(forecast([work_of(job, names) for job, names in jobs]))
+    if CLUSTER:
+        print_requests(jobs)
+
+
+def print_requests(jobs):
+    """Print what the jobs of a dry run would request of the cluster."""
+    logs = [
+        log_of(job.format(**names)) for job, names in jobs if not KINDS[job].is_local
+    ]
+    requests = [DISPLAY.requests[log] for log in logs if log in DISPLAY.requests]
+    if requests:
+        print(f"\n{requests_table(requests)}\n\n{REQUESTS_NOTE}")
 
 
 # Snakemake's logger plugin tells it what Snakemake does.

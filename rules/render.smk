@@ -50,7 +50,9 @@ rule render:
     resources:
         **GPU,
         mem_mb=memory_of("render"),
-        runtime=lambda wildcards: cost_at("render", wildcards).most_minutes,
+        runtime=lambda wildcards, threads: cost_at("render", wildcards).most_minutes(
+            threads
+        ),
         stall_seconds=stall_seconds,
     params:
         folder=PATHS.views,

@@ -42,7 +42,9 @@ rule render_panorama:
     resources:
         **GPU,
         mem_mb=memory_of("render_panorama"),
-        runtime=120,
+        runtime=lambda wildcards, threads: cost_at(
+            "render_panorama", wildcards
+        ).most_minutes(threads),
     params:
         folder=PATHS.panorama_views,
         device=SETTINGS.device,

@@ -51,6 +51,23 @@ def check_device():
             raise UserError(lines[-1].removeprefix("error: "))
 
 
+def check_slurm():
+    """Raise `UserError` if jobs go to Slurm, and no Slurm answers here."""
+    if not DISPLAY.uses_slurm:
+        return
+    try:
+        asked_slurm = subprocess.run(["sinfo"], capture_output=True, text=True)
+    except OSError:
+        problem = "there is no command sinfo"
+    else:
+        lines = asked_slurm.stderr.strip().splitlines()
+        problem = lines[-1] if asked_slurm.returncode and lines else ""
+    if problem:
+        raise UserError(
+            f"--executor slurm: no Slurm answers: {problem}: run this on a login node"
+        )
+
+
 def check_memory():
     """Raise `UserError` for a limit of memory with which Blender cannot start."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
@@ -108,6 +125,7 @@ def explain_full_disk():
 def check_start():
     """Raise `UserError` for a run that cannot work, before the first job."""
     DISPLAY.at_close(explain_full_disk)
+    check_slurm()
     check_device()
     check_memory()
     check_disk_space()

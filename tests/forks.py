@@ -255,7 +255,10 @@ def import_libraries():
     for name in ("snakemake.cli", *LIBRARIES):
         importlib.import_module(name)
     # Finds and imports the plugins, also that of this folder. Snakemake searches once in a process.
+    # The checkout's own plugin comes before its copy in the environment, which may be older.
+    sys.path.insert(0, str(CHECKOUT / "envs"))
     sys.modules["snakemake.cli"].get_argument_parser()
+    sys.path.remove(str(CHECKOUT / "envs"))
     # The folder of this file is not on the path of other programs.
     sys.path.remove(str(Path(__file__).parent))
     # These libraries import most of themselves at the first model and at the first image.

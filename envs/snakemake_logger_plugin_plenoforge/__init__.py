@@ -67,7 +67,13 @@ class LogHandler(LogHandlerBase):
             display.planned(is_dry_run=self.common_settings.dryrun, is_shown=is_shown)
         elif event == LogEvent.GROUP_INFO:
             self.submission = display.submission(record.group_id)
-        elif event == LogEvent.JOB_INFO and not self.common_settings.dryrun:
+        elif event is None and record.getMessage().startswith("SLURM run ID"):
+            # Nothing else tells which executor runs the jobs.
+            display.uses_slurm = True
+        elif event == LogEvent.JOB_INFO and self.common_settings.dryrun:
+            resources = dict(record.resources.items())
+            display.requested(record.rule_name, paths(record.log), record.threads, resources)
+        elif event == LogEvent.JOB_INFO:
             # Jobs of a group are indented, and follow their group.
             submission = self.submission if record.indent else display.submission()
             logs, outputs = paths(record.log), paths(record.output)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from checkouts import checkout, planned
+from checkouts import checkout, planned, snakemake
 
 from lightfield.configuration.config_file import Energy
 from lightfield.configuration.dataset import Cluster, shard_bounds
@@ -17,6 +17,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.planning.cost import ProbedViews, cost, read_probe
+from lightfield.planning.forecast import Request, requests_table
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Probe, ProbeSettings
 from lightfield.workflow import shard_log
@@ -156,6 +157,44 @@ def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     assert on_cluster["render"] == 575
     begin(folder / "work", "garden/LFSphere_e100cm_d170cm", shard_bounds(642, 300)[:100])
     assert planned(folder, *arguments)["render"] == 300
+
+
+def test_a_plan_for_a_cluster_lists_what_jobs_request(tmp_path):
+    folder = checkout(tmp_path)
+    (folder / "profiles/slurm/config.yaml").write_text(
+        (folder / "profiles/slurm/config.yaml")
+        .read_text()
+        .replace("default-resources:\n", "default-resources:\n  slurm_partition: long\n")
+    )
+    arguments = (
+        "--config",
+        "preset=full",
+        "scenes=[garden]",
+        "rigs=LFCuboid_8panos",
+        "device=optix",
+    )
+    more = ("--set-resources", "render:mem_mb=9000", "--cores", "2", "--dry-run")
+    plan = snakemake(folder, "--profile", "profiles/slurm", *more, *arguments)
+    assert plan.returncode == 0, plan.stderr
+    rows = dict(line.split(maxsplit=1) for line in plan.stdout.splitlines() if line)
+    assert rows["rule"].split() == ["jobs", "CPUs", "mem_mb", "runtime", "slurm_partition", "gpu"]
+    jobs, cpus, memory, _, *others = rows["render"].split()
+    assert (jobs, cpus, memory, others) == ("8", "2", "9,000", ["long", "1"])
+    assert rows["validate"].split() == ["1", "2", "4,000", "120", "long", "–"]
+    # It runs on the login node.
+    assert "lightfield" not in rows
+    # This machine's own jobs are not submitted.
+    here = snakemake(folder, "--dry-run", *arguments)
+    assert "slurm_partition" not in here.stdout and "phase" in here.stdout
+
+
+def test_ranges_of_requests_have_the_least_and_the_largest():
+    requests = [
+        Request("render", 16, {"mem_mb": memory, "runtime": 30, "gpu": 0})
+        for memory in (8000, 4000, 6000)
+    ]
+    row = requests_table(requests).splitlines()[1]
+    assert row.split("  ", 1)[1].split() == ["3", "16", "4,000", "to", "8,000", "30", "–", "–"]
 
 
 ENERGY = Energy(watts=100, cores=4)

@@ -130,6 +130,18 @@ def test_each_job_with_a_receipt_has_a_phase_and_a_log_of_its_name():
     assert jobs <= set(re.findall(r'log_of\(\s*"(.+?)"', rules))
 
 
+def test_the_jobs_that_run_beside_snakemake_are_known():
+    text = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
+    rules = re.split(r"^(?=rule |use rule )", text, flags=re.M)
+    local_jobs = {
+        job
+        for rule in rules
+        if re.search(r"^    localrule: True$", rule, re.M)
+        for job in re.findall(r'receipt_of\(\s*"(.+?)"', rule)
+    }
+    assert local_jobs == {job for job, kind in KINDS.items() if kind.is_local}
+
+
 # Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 MODULES = r"\b(?:from|import) snakemake\b(?!\.utils import min_version)"

@@ -305,6 +305,17 @@ def test_the_end_says_why_slurm_refuses_a_job(failing, tmp_path, monkeypatch, ac
     assert ends_before_jobs or lines[-2].startswith("render failed: "), terminal
 
 
+def test_a_run_without_slurm_ends_before_its_first_job(failing, tmp_path, monkeypatch):
+    problem = "sinfo: fatal: Could not establish a configuration source"
+    (tmp_path / "sinfo").write_text(f"#!/bin/sh\necho '{problem}' >&2; exit 1\n")
+    (tmp_path / "sinfo").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    terminal = failing.fail("render", options=["--executor", "slurm", "--jobs=1"])
+    *_, last = terminal.splitlines()
+    assert last == f"error: --executor slurm: no Slurm answers: {problem}: run this on a login node"
+    assert "Traceback" not in terminal and "failed" not in terminal
+
+
 @pytest.mark.parametrize(
     ("signal", "advice"),
     [("KILL", "memory ran out: lower --cores"), ("BUS", "free some space in /dev/shm and TMPDIR")],

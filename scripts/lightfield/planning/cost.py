@@ -108,10 +108,12 @@ class Cost:
         """Return the memory that a job requests. Each further attempt requests more."""
         return math.ceil(self.memory_bytes / 1e6) * attempt
 
-    @property
-    def most_minutes(self) -> int:
-        """A job's time limit: several times its estimate, and at least half an hour."""
-        return 30 + math.ceil(5 * self.seconds / 60)
+    def most_minutes(self, cores: int) -> int:
+        """Return a job's time limit: several times its estimate, and at least half an hour.
+
+        Its work is shared by ``cores``.
+        """
+        return 30 + math.ceil(5 * self.seconds / 60 / cores)
 
     @property
     def stall_seconds(self) -> int:

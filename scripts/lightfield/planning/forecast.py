@@ -1,7 +1,8 @@
 """Writes the forecast of a run, which a dry run prints at its end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from lightfield.core import units
 from lightfield.planning import cost
@@ -35,6 +36,52 @@ class Work:
     dataset: str | None
     views: int
     cost: Cost
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a job requests of a cluster: its cores, and Snakemake's resources by their names."""
+
+    rule: str
+    cores: int
+    resources: Mapping[str, Any]
+
+
+# The columns of the table of requests, and how a request says each.
+_REQUESTED: dict[str, Callable[[Request], Any]] = {
+    "CPUs": lambda request: request.cores,
+    "mem_mb": lambda request: request.resources.get("mem_mb"),
+    "runtime": lambda request: request.resources.get("runtime"),
+    "slurm_partition": lambda request: request.resources.get("slurm_partition"),
+    "gpu": lambda request: request.resources.get("gpu") or None,
+}
+
+
+def requests_table(requests: Sequence[Request]) -> str:
+    """Return a table of what the jobs of each rule request of a cluster, in the order given.
+
+    Jobs that request several amounts have the least and the largest.
+    """
+    rules: dict[str, list[Request]] = {}
+    for request in requests:
+        rules.setdefault(request.rule, []).append(request)
+    rows = [("rule", "jobs", *_REQUESTED)]
+    for rule, jobs in rules.items():
+        amounts = [_range({of(job) for job in jobs}) for of in _REQUESTED.values()]
+        rows.append((rule, f"{len(jobs):,}", *amounts))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
+    )
+
+
+def _range(amounts: set[Any]) -> str:
+    """Return an amount, or the least and the largest. A dash stands for the cluster's default."""
+    numbers = sorted(amount for amount in amounts if isinstance(amount, int | float))
+    if numbers and len(numbers) == len(amounts):
+        ends = dict.fromkeys((numbers[0], numbers[-1]))
+        return " to ".join(f"{number:,}" for number in ends)
+    return ", ".join(sorted(str(amount) for amount in amounts if amount is not None)) or "–"
 
 
 def forecast(works: Sequence[Work]) -> str:

@@ -12,10 +12,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from lightfield.core import progress
 from lightfield.core.units import count, duration
+from lightfield.planning.forecast import Request
 from lightfield.workflow.failures import Job, Submission, failure_report, first_sentence
 
 if TYPE_CHECKING:
@@ -120,6 +121,10 @@ class RunDisplay:
         self._live: Live | None = None
         # Whether Snakemake's logger plugin calls this.
         self.is_told = False
+        # Whether Snakemake submits the jobs to Slurm.
+        self.uses_slurm = False
+        # What the jobs of a dry run would request, by their logs.
+        self.requests: dict[str, Request] = {}
         self._is_shown = False
         self._folder = Path.cwd()
         self._at_close: list[Callable[[], object]] = []
@@ -166,6 +171,13 @@ class RunDisplay:
         if is_dry_run and self._forecast not in self._at_close:
             self._at_close.append(self._forecast)
         self._is_shown = is_shown
+
+    def requested(
+        self, rule: str, logs: Sequence[str], cores: int, resources: Mapping[str, Any]
+    ) -> None:
+        """Take notice of what a job in a dry run would request of a cluster."""
+        if logs:
+            self.requests[logs[0]] = Request(rule, cores, resources)
 
     def submission(self, group: str | None = None) -> Submission:
         """Return the jobs that start next as one: a single job, or a group by its name."""
