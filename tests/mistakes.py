@@ -224,7 +224,12 @@ REFUSED = [
     *(("rigs", {name: SPHERE}) for name in NOT_A_NAME),
     *(
         ("rigs", {name: SPHERE})
-        for name in ("trials", "published", "scene.blend", "inventory.json", "f00001")
+        for name in (
+            *("trials", "published", "scene.blend", "inventory.json", "f00001"),
+            # The package of the rig x, a run's lock, a log, a benchmark, and a receipt.
+            *("tarclash_x.tar", "run.lock", "splits.log", "x.tsv", "splits.jsonl", "splits.part"),
+            "settings",
+        )
     ),
     *(("reprojections", {name: PERSPECTIVE}) for name in NOT_A_NAME),
     *(
@@ -239,6 +244,8 @@ REFUSED = [
             "f00001",
             "a.json",
             "a.txt",
+            "lightfield.log",
+            "settings",
         )
     ),
     ("reprojections.perspective.samples", HUGE),
@@ -844,7 +851,11 @@ SETTINGS = [
     {"results": str(ROOT / "README.md")},
     *(
         {"scenes": [value]}
-        for value in ("a.b", "tables", "logs", "benchmarks", "removed", *NOT_A_NAME)
+        for value in (
+            "a.b",
+            *("tables", "logs", "benchmarks", "removed", "receipts", "settings"),
+            *NOT_A_NAME,
+        )
     ),
     {"scenes": ["a", "a"]},
     {"scenes": []},
