@@ -465,9 +465,16 @@ REFUSED = [
     *((key, value) for key in ("description", "licence", "credit") for value in (7, ["a"])),
     *(("publish", PUBLISH | {"creators": value}) for value in ([], "Ada", [{"orcid": "1"}])),
     *(("publish", PUBLISH | {"date": value}) for value in (2026, "soon", "2026-13-01")),
-    *(("publish", PUBLISH | {"url": value}) for value in ("example.org", 7)),
+    *(
+        ("publish", PUBLISH | {"url": value})
+        for value in ("example.org", 7, "https://a.org/'", "https://a.org/<b>", "https://a.org/ b")
+    ),
+    ("publish", PUBLISH | {"derived_from": ['https://a.org/"><script>']}),
     *(("publish", PUBLISH | {"licence": value}) for value in ("CC BY", "")),
-    *(("publish", PUBLISH | {"doi": value}) for value in ("https://doi.org/10.1/2", 10.1)),
+    *(
+        ("publish", PUBLISH | {"doi": value})
+        for value in ("https://doi.org/10.1/2", 10.1, '10.1234/"><script>')
+    ),
     *(("publish", PUBLISH | {key: "1"}) for key in ("contact", "publisher_ror", "publisher_url")),
     *(
         ("publish", PUBLISH | {"creators": [{"name": "A", key: "1"}]})
@@ -612,6 +619,11 @@ EXPLAINED = [
         "publish",
         PUBLISH | {"date": "soon"},
         'publish.date: is "soon"; must be a date such as 2026-11-30',
+    ),
+    (
+        "publish",
+        PUBLISH | {"url": 'https://a.org/"><script>'},
+        "must be an address that begins with http:// or https://, without blanks, quotes, < and >",
     ),
     (
         "publish",
