@@ -76,6 +76,7 @@ def write(job: ReportHtml) -> None:
         passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,
+        transparent=lightfield.transparent,
         validation=validation,
         faults={
             (group, check["short"]): faults.collect(folder / (group or IMAGES), check["views"])
