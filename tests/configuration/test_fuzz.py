@@ -516,7 +516,7 @@ def assert_read_or_refused(read, path, dataset, data, listed=None):
         try:
             read(path, dataset)
         except UserError as error:
-            assert str(error).isprintable()
+            assert all(line.isprintable() for line in str(error).splitlines())
             assert path.name in str(error) or (listed and listed in str(error))
         except Exception as error:
             pytest.fail(f"{type(error).__name__}: {error}: {data[:2000]!r}")

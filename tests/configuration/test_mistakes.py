@@ -1,4 +1,4 @@
-"""The table's mistakes: each is refused in one line, before anything is made."""
+"""The table's mistakes: each is refused, before anything is made."""
 
 import json
 import re
@@ -60,19 +60,60 @@ def read_with_mistake(mistake, file):
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=str)
-def test_a_mistake_is_refused_in_one_line_with_file_and_key(mistake, tmp_path, monkeypatch):
+def test_a_mistake_is_refused_with_file_and_key(mistake, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = tmp_path / mistake.file
     with pytest.raises(UserError) as caught:
         read_with_mistake(mistake, file)
     message = str(caught.value)
-    assert message.isprintable() and len(message) <= 2001
+    lines = message.splitlines()
+    assert all(line.isprintable() and len(line) <= 2001 for line in lines)
+    assert len(lines) <= 11
     # A user must not see a regular expression.
     assert not re.search(r"\^[\[\\\w]|\]\*?\$", message), message
     # Settings of config.yaml may come from the command line, so its folder may be missing.
     named = file if mistake.file != "config.yaml" or str(file) in message else file.name
     assert message.startswith(f"{named}: {mistake.said}")
+    assert all(line.startswith(f"{named}: ") for line in lines)
     assert mistake.allowed in message
+
+
+def test_all_mistakes_of_a_scene_yaml_are_told_at_once(tmp_path):
+    content = changed("reprojection", {})
+    content["scene"] |= {"sed": 7, "frame": "x"}
+    content["render"] |= {"seed": None, "samples": 0}
+    content["rigs"]["LFSphere"] |= {"size": "1m", "look_at": [0, 0]}
+    content["rigs"]["LFCuboid"]["type"] = "box"
+    del content["reprojections"]["perspective"]["camera"]["resolution"]
+    file = tmp_path / "scene.yaml"
+    file.write_text(yaml.safe_dump(content))
+    with pytest.raises(UserError) as caught:
+        scene_yaml.read_scene(file)
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith(f"{file}: ") for line in lines)
+    problems = [line.removeprefix(f"{file}: ") for line in lines]
+    starts = [
+        "reprojection: unknown key; did you mean reprojections?",
+        "scene.sed: unknown key",
+        'scene.frame: is "x"; must be a whole number or file',
+        "render.seed: is null; must have a value",
+        "render.samples: is 0; must be",
+        'rigs.LFSphere.size: is "1m"; must be a number or a list of 3',
+        "rigs.LFSphere.look_at: is [0, 0]; must be a list of 3",
+        'rigs.LFCuboid.type: is "box"; must be one of',
+        "reprojections.perspective.camera: is missing the key resolution",
+    ]
+    assert len(problems) == len(starts)
+    for start in starts:
+        assert any(problem.startswith(start) for problem in problems), (start, problems)
+    # More than ten are counted.
+    content["sensor"] = {f"key_{number}": 1 for number in range(9)}
+    file.write_text(yaml.safe_dump(content))
+    with pytest.raises(UserError) as caught:
+        scene_yaml.read_scene(file)
+    *lines, last = str(caught.value).splitlines()
+    assert len(lines) == 10
+    assert last == f"{file}: 8 more mistakes"
 
 
 # Runs a command and prints its peak memory. In a process of its own, because Linux counts the

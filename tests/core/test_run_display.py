@@ -1,13 +1,17 @@
 """The terminal during a run: bars that stay in view, warnings, failures, phases."""
 
+import importlib.util
 import io
+import logging
 import re
 import time
 from pathlib import Path
 
 import pytest
+import snakemake
 
 from lightfield.core import progress
+from lightfield.core.names import ROOT
 from lightfield.workflow import run_display
 from lightfield.workflow.run_display import RunDisplay, Task
 
@@ -206,6 +210,21 @@ def test_logs_of_other_runs_are_not_read(run):
     run.now += 60
     run.begin()
     assert not any("of old" in line for line in run.shown(running=["a"]))
+
+
+def test_the_terminal_does_not_say_that_containers_are_not_used():
+    remark = "Singularity containers: ignored"
+    source = Path(snakemake.__file__).with_name("workflow.py").read_text(encoding="utf-8")
+    assert remark in source
+    path = ROOT / "envs" / "snakemake_logger_plugin_plenoforge" / "__init__.py"
+    spec = importlib.util.spec_from_file_location("plugin", path)
+    plugin = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(plugin)
+    handler = plugin.LogHandler.__new__(plugin.LogHandler)
+    handler.has_started = False
+    for message, is_shown in ((remark, False), ("a rule of the lint", True)):
+        record = logging.LogRecord("snakemake", logging.INFO, "", 1, message, (), None)
+        assert handler.is_worth_a_line(record) == is_shown
 
 
 def test_progress_lines_can_be_parsed(capsys):

@@ -16,7 +16,7 @@ from lightfield.core.setting_types import (
     Folder,
     unique_names,
 )
-from lightfield.core.settings import Name, Settings, checked, pattern
+from lightfield.core.settings import Name, Settings, checked_yaml, pattern
 
 # Folders of the project, of a user's inputs, and of programs such as Snakemake.
 _RESERVED = {
@@ -34,7 +34,7 @@ _RESERVED = {
     "tests",
 }
 # Names that a scene's folder cannot have, because other folders beside it have them.
-_SCENE_NEIGHBOURS = {"benchmarks", "logs", "receipts", "removed", "settings", "tables"}
+_SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 
 
 def _listed(value: Any) -> Any:
@@ -227,7 +227,7 @@ _CONFIGURATION = TypeAdapter(Configuration)
 
 def load_config(content: Any) -> Configuration:
     """Return the top-level configuration. Raises `UserError`."""
-    return checked(_CONFIGURATION, content, "config.yaml")
+    return checked_yaml(_CONFIGURATION, content, "config.yaml")
 
 
 def read_config(path: Path) -> dict[str, Any]:

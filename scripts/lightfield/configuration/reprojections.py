@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import TypeAliasType
 
-from lightfield.core.setting_types import Primaries, Stops, White
+from lightfield.core.setting_types import REINHARD, Primaries, Stops, White
 from lightfield.core.settings import Name, Settings, Vector, as_list
 from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
@@ -71,7 +71,7 @@ class ReprojectionOptions(Settings):
     )
     reinhard: White = Field(
         1.0,
-        description="Reinhard tone mapping: the value that becomes white. 1: no tone mapping.",
+        description=f"Tone mapping: the {REINHARD}",
         json_schema_extra={"unit": "light"},
     )
 

@@ -32,7 +32,7 @@ from lightfield.configuration.scene_source import FILE, SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, PARTS, ROOT, VIEWS
 from lightfield.core.setting_types import Auto, unique_names
-from lightfield.core.settings import Name, Settings, checked, suggestion
+from lightfield.core.settings import Name, Settings, checked, checked_yaml, suggestion
 from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
@@ -47,7 +47,7 @@ SCENES = ROOT / "configs" / "scenes"
 OWN_SCENES = Path("configs", "scenes")
 FLOW_PLACES = "needs views from two or more places"
 # Names that a rig's folder cannot have, because other folders beside it have them.
-_RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "settings", "trials"}
+_RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
 # Names that a reprojection's folder cannot have.
 _REPROJECTION_NEIGHBOURS = {
     "exr",
@@ -56,12 +56,11 @@ _REPROJECTION_NEIGHBOURS = {
     "panorama",
     "render",
     "report",
-    "settings",
     FLOW.name,
     *PASSES,
 }
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
-_OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|jsonl?|lock|log|part|tar|tsv|txt)")
+_OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
 # For keys of a camera in lightfield.json: Blender's least and largest value, the unit of messages,
 # and the name in messages.
 _BLENDER_LIMITS = {
@@ -661,4 +660,4 @@ def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
         # The check below reports a block `family` that is wrong itself.
         with suppress(ValidationError, TypeError):
             content = stand_in(content)
-    return checked(_SCENE, content, file)
+    return checked_yaml(_SCENE, content, file)

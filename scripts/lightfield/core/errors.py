@@ -1,21 +1,25 @@
 """The one exception that the programs show to the user without a traceback."""
 
-# Longer messages are cut, because they may quote a damaged file.
+# Longer lines are cut, because they may quote a damaged file.
 LONGEST = 2000
 
 
 class UserError(Exception):
     """An error that the user can mend. The message says what is wrong, where, and what is right.
 
-    It is always one line, with line breaks and terminal codes as escapes.
+    It has one line for each mistake, with line breaks and terminal codes in it as escapes.
     """
 
-    def __init__(self, message: str) -> None:
-        line = "".join(
-            letter if letter.isprintable() else letter.encode("unicode_escape").decode()
-            for letter in message[:LONGEST]
-        )
-        super().__init__(line + ("…" if len(message) > LONGEST else ""))
+    def __init__(self, *lines: str) -> None:
+        super().__init__("\n".join(map(_printable, lines)))
+
+
+def _printable(line: str) -> str:
+    printable = "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in line[:LONGEST]
+    )
+    return printable + ("…" if len(line) > LONGEST else "")
 
 
 # What the user can do if memory ran out.

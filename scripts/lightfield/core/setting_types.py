@@ -35,6 +35,10 @@ QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
 Stops = Annotated[float, Field(ge=-100, le=100)]
 # The value of light that Reinhard tone mapping makes white.
 White = Annotated[float, Field(ge=1e-9, le=1e9)]
+REINHARD = (
+    "value of light that becomes white. If it is above 1, Reinhard tone mapping compresses light "
+    "up to it. If it is 1, light stays as it is, and values above 1 are clipped."
+)
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Auto = Literal["auto"]
 DenoisePrefilter = Literal["accurate", "fast", "none"]

@@ -12,12 +12,13 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    ModelWrapValidatorHandler,
     TypeAdapter,
     ValidationError,
     WrapValidator,
     model_validator,
 )
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, InitErrorDetails
 from typing_extensions import TypeAliasType
 
 from lightfield.core import units
@@ -43,21 +44,44 @@ class Settings(BaseModel):
     # Keys of earlier versions, with what to do instead.
     removed_keys: ClassVar[Mapping[str, str]] = {}
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _check_keys(cls, content: Any) -> Any:
+    def _check_keys(cls, content: Any, check_values: ModelWrapValidatorHandler[Self]) -> Self:
+        """Check the keys, and then the values. Reports the wrong keys with the wrong values."""
         if not isinstance(content, Mapping):
-            return content
+            return check_values(content)
+        problems = {
+            key: problem for key, value in content.items() if (problem := cls._problem(key, value))
+        }
+        if not problems:
+            return check_values(content)
+        errors = [
+            InitErrorDetails(
+                type="value_error",
+                loc=(),
+                input=content,
+                ctx={"error": ValueError(f"{key}: {problem}")},
+            )
+            for key, problem in problems.items()
+        ]
+        try:
+            check_values({key: value for key, value in content.items() if key not in problems})
+        except ValidationError as error:
+            errors += _errors_of_values(error)
+        raise ValidationError.from_exception_data(cls.__name__, errors)
+
+    @classmethod
+    def _problem(cls, key: Any, value: Any) -> str | None:
+        """Return what is wrong with a key, whatever its value. Or None."""
         allowed_keys = cls.model_fields
-        for key, value in content.items():
-            if key in cls.removed_keys:
-                raise ValueError(f"{key}: is no longer a key; {cls.removed_keys[key]}")
-            if key not in allowed_keys:
-                hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
-                raise ValueError(f"{key}: unknown key{hint}")
-            if value is None:
-                raise ValueError(f"{key}: is null; must have a value, or be left out")
-        return content
+        if key in cls.removed_keys:
+            return f"is no longer a key; {cls.removed_keys[key]}"
+        if key not in allowed_keys:
+            hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
+            return f"unknown key{hint}"
+        if value is None:
+            return "is null; must have a value, or be left out"
+        return None
 
     @classmethod
     def of(cls, **values: Any) -> Self:
@@ -67,6 +91,23 @@ class Settings(BaseModel):
     def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
         """Return the content of a settings file: all keys with a value, or the keys in ``keys``."""
         return self.model_dump(mode="json", include=keys, exclude_none=True)
+
+
+def _errors_of_values(error: ValidationError) -> list[InitErrorDetails]:
+    """Return a model's errors of its values, without those that follow from wrong keys.
+
+    A wrong key may be a missing one that is misspelt.
+    """
+    return [
+        InitErrorDetails(
+            type=details["type"],
+            loc=details["loc"],
+            input=details["input"],
+            ctx=details.get("ctx", {}),
+        )
+        for details in error.errors()
+        if details["loc"] and not (details["type"] == "missing" and len(details["loc"]) == 1)
+    ]
 
 
 class ReaderSettings(Settings):
@@ -105,6 +146,8 @@ _Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
 Vector = TypeAliasType(
     "Vector", Annotated[tuple[_Coordinate, _Coordinate, _Coordinate], as_list(3)]
 )
+# A file that has more mistakes is probably another kind of file.
+_MOST_PROBLEMS = 10
 # What messages and the reference say instead of a regular expression.
 MEANINGS: dict[str, str] = {}
 
@@ -116,13 +159,7 @@ def pattern(expression: str, meaning: str) -> str:
 
 
 Address = Annotated[
-    str,
-    Field(
-        pattern=pattern(
-            r"""^https?://[^\s"'<>]+$""",
-            "an address that begins with http:// or https://, without blanks, quotes, < and >",
-        )
-    ),
+    str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
 ]
 # The name of a folder.
 Name = Annotated[
@@ -148,7 +185,23 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
     try:
         return model.validate_python(content)
     except ValidationError as error:
-        raise UserError(f"{file}: {_first_problem(error.errors(), content)}") from None
+        first, *_ = _problems(error.errors(), content)
+        raise UserError(f"{file}: {first}") from None
+
+
+def checked_yaml(model: TypeAdapter[Model], content: Any, file: str) -> Model:
+    """Return the content of a file that a user wrote as ``model``.
+
+    Raises `UserError` with a line for each mistake, so that the user can mend them at once.
+    """
+    try:
+        return model.validate_python(content)
+    except ValidationError as error:
+        problems = _problems(error.errors(), content)
+    lines = [f"{file}: {problem}" for problem in problems[:_MOST_PROBLEMS]]
+    if problems[_MOST_PROBLEMS:]:
+        lines.append(f"{file}: {len(problems) - _MOST_PROBLEMS} more mistakes")
+    raise UserError(*lines)
 
 
 def read_settings(model: type[Model], path: Path) -> Model:
@@ -156,8 +209,39 @@ def read_settings(model: type[Model], path: Path) -> Model:
     return checked(TypeAdapter(model), read_json(path), str(path))
 
 
-def _first_problem(errors: list[ErrorDetails], content: Any) -> str:
-    """Return in one line what is wrong with the first wrong key."""
+def _problems(errors: list[ErrorDetails], content: Any) -> list[str]:
+    """Return in one line each what is wrong with the wrong keys."""
+    errors_by_place: dict[tuple[int | str, ...], list[ErrorDetails]] = {}
+    for error in errors:
+        place = _place(error, content)
+        # A value that may have several types has an error for each type.
+        near = next((p for p in errors_by_place if _is_within(p, place)), place)
+        errors_by_place.setdefault(near, []).append(error)
+    return [_problem(of_place, content) for of_place in errors_by_place.values()]
+
+
+def _is_within(place: tuple[int | str, ...], other: tuple[int | str, ...]) -> bool:
+    """Return whether one place is within the other."""
+    length = min(len(place), len(other))
+    return place[:length] == other[:length]
+
+
+def _place(error: ErrorDetails, content: Any) -> tuple[int | str, ...]:
+    """Return the keys that lead to a mistake, with the key that is missing or wrong."""
+    path, value = _locate(error, content)
+    context = error.get("ctx", {})
+    if error["type"] == "missing":
+        return (*path, error["loc"][-1])
+    if "discriminator" in context:
+        return (*path, context["discriminator"].strip("'"))
+    if error["type"] == "value_error" and isinstance(value, Mapping):
+        key = re.match(r"[\w.-]+(?=: )", str(context["error"]))
+        return (*path, *key[0].split(".")) if key else path
+    return path
+
+
+def _problem(errors: list[ErrorDetails], content: Any) -> str:
+    """Return in one line what is wrong with a key, or with one of the keys below it."""
     located_errors = [(*_locate(error, content), error) for error in errors]
     # A value that may have several types has an error for each type. The deepest says most.
     start = located_errors[0][0]

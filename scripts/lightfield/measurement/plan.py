@@ -38,9 +38,10 @@ FORMULAS = f"""\
 - time = views × s a view
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
 probe, ± its standard error
-- denoised = time × seconds to the same error with the denoiser / seconds without it
-- calibrated = time × seconds to the error {_TARGET_ERROR:g}, by the cheaper of both / seconds of \
-the samples
+- denoised = time × (seconds of denoised views) / (seconds of views without denoising), both with \
+the same error
+- calibrated = time × (seconds to the error {_TARGET_ERROR:g}, denoised or not, whichever is \
+cheaper) / (seconds of the samples in the YAML)
 - size = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the \
 probe
 """

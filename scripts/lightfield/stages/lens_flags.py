@@ -19,7 +19,7 @@ from lightfield.configuration.reprojections import (
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.flags import checked_flags
-from lightfield.core.setting_types import Stops, White
+from lightfield.core.setting_types import REINHARD, Stops, White
 from lightfield.core.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import named_numbers
@@ -233,7 +233,7 @@ class ReprojectFlags(LensMapFlags):
     )
     exposure: Stops = option("exposure in stops", 0.0, group="Colour")
     reinhard: White = option(
-        "Reinhard tone mapping: the value that becomes white (default: 1, no tone mapping)",
+        f"tone mapping: the {REINHARD}",
         1.0,
         group="Colour",
     )

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.configuration.config_file import Energy
 from lightfield.core.names import INVENTORY, VIEWS
-from lightfield.core.setting_types import AtLeastOne, Stops, White
+from lightfield.core.setting_types import REINHARD, AtLeastOne, Stops, White
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
@@ -279,8 +279,7 @@ class EvaluationSettings(Settings):
     )
     reinhard: White = Field(
         1.0,
-        description="Tone mapping of EXR views, as in the export: the value that becomes white. 1: "
-        "no tone mapping.",
+        description=f"Tone mapping of EXR views, as in the export: the {REINHARD}",
         json_schema_extra={"unit": "light"},
     )
     background: Annotated[str, AfterValidator(_colour)] = Field(
