@@ -20,22 +20,34 @@ envvars:
 FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
+from lightfield.core.interrupts import interrupt_once
+
+if IS_MAIN_PROCESS:
+    interrupt_once()
+
 from lightfield.configuration.config_file import read_config
-from lightfield.core.disk_space import obstacle
+from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.yaml_files import as_written
 
-# Snakemake ends with a traceback if it cannot write its notes.
-if problem := obstacle(Path(".snakemake")):
-    sys.exit(f"error: .snakemake: cannot be written: {problem}")
+if {"{", "}"} & {*str(FOLDER)}:
+    sys.exit(
+        f"error: {FOLDER}: the path of Plenoforge's folder has a brace, which Snakemake takes for "
+        "a wildcard: rename the folder, or move it"
+    )
+
+# Jobs start in the folder of the run. Bash would first run this script, which may leave the folder.
+os.environ.pop("BASH_ENV", None)
 
 # The keys from the command line, or from the workflow whose module this is. config.yaml fills in
 # the others.
 GIVEN_KEYS = set(config)
 HAS_OWN_CONFIG = Path("config.yaml").exists() and Path.cwd() != FOLDER
 
-# Snakemake loads both files without a limit of size, and does not name the line of a mistake.
+# Snakemake ends with a traceback if it cannot write its notes. It loads both files without a limit
+# of size, and does not name the line of a mistake.
 try:
+    check_folder(Path(".snakemake"))
     # The defaults, and the values of the user's own folder.
     DEFAULTS = read_config(FOLDER / "config.yaml")
     USER_CONFIG = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
@@ -148,7 +160,11 @@ rule report_html:
 
 rule smoke:
     input:
-        [[*dataset.files, *dataset.intermediates] for dataset in BUILD.smoke],
+        of_build(
+            lambda _: [
+                path for d in BUILD.smoke for path in (*d.files, *d.intermediates)
+            ]
+        ),
 
 
 rule package:

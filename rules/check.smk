@@ -76,6 +76,11 @@ def reads(job, stage=None, are_noted=False, **inputs):
             return files | settings | {"mark": ancient(MARK)}
         noted = [*flat(files.values())] if are_noted else ()
         is_fine = CHECK.verdict(receipt, content, noted).is_fine
+        if not is_fine:
+            # Snakemake would name read-only files in many lines, or end with a traceback.
+            part = os.path.dirname(receipt.removeprefix(f"{RECEIPTS}/"))
+            for root in (RESULTS, WORK):
+                end_unless_writable(os.path.join(root, part))
         if not os.path.exists(MARK):
             new_mark()
         files = {name: unless_newer(receipt, each) for name, each in files.items()}

@@ -6,6 +6,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from lightfield.core.interrupts import was_interrupted
 from lightfield.core.units import duration
 from lightfield.planning.cost import Cost, cost
 from lightfield.planning.forecast import Work, forecast, requests_table
@@ -141,7 +142,8 @@ def print_results():
 def print_failures():
     """Print the end of a run that did not make all that it should."""
     print_summary()
-    print(DISPLAY.failures() or UNFINISHED, file=sys.stderr, flush=True)
+    failures = "" if was_interrupted() else DISPLAY.failures()
+    print(failures or UNFINISHED, file=sys.stderr, flush=True)
 
 
 def print_pages():

@@ -17,7 +17,7 @@ shell.prefix(
     # numpy would start a thread for each core, also in jobs that have one core.
     " export OPENBLAS_NUM_THREADS=1;"
     # A signal to the whole group must not end the shell first.
-    " trap : TERM;"
+    " trap : TERM INT;"
     ' python() {{ command python "${{@#"$copies"}}" || {{ local status=$?; if ((status > 128)); then'
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lightfield.configuration.blend_lock import expected_blend
 from lightfield.core import disk_space, leftovers, units
-from lightfield.core.disk_space import obstacle
+from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.planning.cost import light_group_count, temporary_bytes, view_cost
@@ -118,8 +118,19 @@ def check_disk_space():
 
 def explain_full_disk():
     """Explain that Snakemake cannot write its notes, if it ended because of that."""
-    if problem := obstacle(Path(".snakemake")):
-        print(f"error: .snakemake: cannot be written: {problem}", file=sys.stderr)
+    try:
+        check_folder(Path(".snakemake"))
+    except UserError as error:
+        print(f"error: {error}", file=sys.stderr)
+
+
+@functools.cache
+def end_unless_writable(folder):
+    """End the run with one line if nothing can be written in the folder of a job."""
+    try:
+        check_folder(Path(folder))
+    except UserError as error:
+        sys.exit(f"error: {error}")
 
 
 def check_start():

@@ -1,7 +1,7 @@
 """Compare renders of a dataset's test views with the truth. Write errors as CSV, and a page.
 
-RENDERS has <view>.png or <view>.exr for each test view of the dataset's split. Without a split,
-every eighth view tests. RENDERS may also have normal/<view>.exr. The rig's name may precede each
+RENDERS has <view>.png or <view>.exr for each test view of the dataset's split. Without a split, an
+eighth of the views tests. RENDERS may also have normal/<view>.exr. The rig's name may precede each
 view's, as in exports: <rig>_<view>.png. See docs/how-to/evaluate-renders.md.
 """
 

@@ -224,7 +224,12 @@ REFUSED = [
     *(("rigs", {name: SPHERE}) for name in NOT_A_NAME),
     *(
         ("rigs", {name: SPHERE})
-        for name in ("trials", "published", "scene.blend", "inventory.json", "f00001")
+        for name in (
+            *("trials", "published", "scene.blend", "inventory.json", "f00001"),
+            # The package of the rig x, a run's lock, a log, a benchmark, and a receipt.
+            *("tarclash_x.tar", "run.lock", "splits.log", "x.tsv", "splits.jsonl", "splits.part"),
+            "settings",
+        )
     ),
     *(("reprojections", {name: PERSPECTIVE}) for name in NOT_A_NAME),
     *(
@@ -239,6 +244,8 @@ REFUSED = [
             "f00001",
             "a.json",
             "a.txt",
+            "lightfield.log",
+            "settings",
         )
     ),
     ("reprojections.perspective.samples", HUGE),
@@ -458,9 +465,16 @@ REFUSED = [
     *((key, value) for key in ("description", "licence", "credit") for value in (7, ["a"])),
     *(("publish", PUBLISH | {"creators": value}) for value in ([], "Ada", [{"orcid": "1"}])),
     *(("publish", PUBLISH | {"date": value}) for value in (2026, "soon", "2026-13-01")),
-    *(("publish", PUBLISH | {"url": value}) for value in ("example.org", 7)),
+    *(
+        ("publish", PUBLISH | {"url": value})
+        for value in ("example.org", 7, "https://a.org/'", "https://a.org/<b>", "https://a.org/ b")
+    ),
+    ("publish", PUBLISH | {"derived_from": ['https://a.org/"><script>']}),
     *(("publish", PUBLISH | {"licence": value}) for value in ("CC BY", "")),
-    *(("publish", PUBLISH | {"doi": value}) for value in ("https://doi.org/10.1/2", 10.1)),
+    *(
+        ("publish", PUBLISH | {"doi": value})
+        for value in ("https://doi.org/10.1/2", 10.1, '10.1234/"><script>')
+    ),
     *(("publish", PUBLISH | {key: "1"}) for key in ("contact", "publisher_ror", "publisher_url")),
     *(
         ("publish", PUBLISH | {"creators": [{"name": "A", key: "1"}]})
@@ -605,6 +619,11 @@ EXPLAINED = [
         "publish",
         PUBLISH | {"date": "soon"},
         'publish.date: is "soon"; must be a date such as 2026-11-30',
+    ),
+    (
+        "publish",
+        PUBLISH | {"url": 'https://a.org/"><script>'},
+        "must be an address that begins with http:// or https://, without blanks, quotes, < and >",
     ),
     (
         "publish",
@@ -844,7 +863,11 @@ SETTINGS = [
     {"results": str(ROOT / "README.md")},
     *(
         {"scenes": [value]}
-        for value in ("a.b", "tables", "logs", "benchmarks", "removed", *NOT_A_NAME)
+        for value in (
+            "a.b",
+            *("tables", "logs", "benchmarks", "removed", "receipts", "settings"),
+            *NOT_A_NAME,
+        )
     ),
     {"scenes": ["a", "a"]},
     {"scenes": []},

@@ -4,7 +4,10 @@ The display is `lightfield.workflow.run_display`. The Snakefile sets it. `make` 
 into the environment, because Snakemake finds logger plugins only there.
 """
 
+import builtins
 import logging
+import os
+import re
 import sys
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -56,7 +59,9 @@ class LogHandler(LogHandlerBase):
                 return
             is_of_jobs = event in OF_JOBS and self.common_settings.printshellcmds
             is_message = event in (None, LogEvent.ERROR)
-            if is_of_jobs or (is_message and self.is_worth_a_line(record)):
+            if refusal := refusal_of(record):
+                self.say(refusal)
+            elif is_of_jobs or (is_message and self.is_worth_a_line(record)):
                 self.say(self.format(record))
         except Exception:
             self.handleError(record)
@@ -104,6 +109,18 @@ class LogHandler(LogHandlerBase):
         if display:
             display.close()
         super().close()
+
+
+def refusal_of(record):
+    """Return in one line what the system has refused to Snakemake. None for other messages."""
+    kind = getattr(builtins, str(getattr(record, "exception", None)), None)
+    cause = re.search(r"\[Errno \d+\] (.+)", record.getMessage())
+    if not (isinstance(kind, type) and issubclass(kind, OSError) and cause):
+        return None
+    caches = (os.environ.get("XDG_CACHE_HOME"), "/.cache")
+    is_cache = any(cache and cache in cause[1] for cache in caches)
+    hint = ": set XDG_CACHE_HOME to a folder that you may write in" if is_cache else ""
+    return f"error: {cause[1]}{hint}"
 
 
 def paths(files):

@@ -122,6 +122,15 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     assert all("settings" in path.parts or path.name in notes for path in written)
 
 
+def test_a_file_in_place_of_a_folder_is_named_in_place_of_a_quota(tmp_path):
+    (tmp_path / "removed").touch()
+    cause = f"{tmp_path / 'removed'} is a file, and must be a folder"
+    with pytest.raises(UserError, match=re.escape(cause)):
+        files.write_text(tmp_path / "removed/results/view.exr", "text")
+    with pytest.raises(UserError, match=re.escape(cause)):
+        list(disk_space.check([disk_space.Need(tmp_path / "removed", 1)]))
+
+
 @pytest.mark.parametrize(
     ("options", "causes"),
     [
@@ -133,12 +142,12 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
         ),
     ],
 )
-@pytest.mark.parametrize("name", ["work", "results"])
+@pytest.mark.parametrize("name", ["work", "results", "results/one"])
 @pytest.mark.slow
 def test_a_disk_that_takes_nothing_ends_a_run_with_one_line(name, options, causes, tmp_path):
     folder = checkout(tmp_path, one=ONE)
     disk = folder / name
-    disk.mkdir()
+    disk.mkdir(parents=True)
     mounted = mount_disk(disk, options)
     if not mounted:
         # Without the right to mount, the folder itself is read-only.

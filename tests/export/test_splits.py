@@ -47,9 +47,79 @@ def test_a_rig_says_the_purpose_of_its_views(split, validation, test):
     assert purposes == [parts.get(number, "train") for number in range(12)]
 
 
+HEMISPHERE = {"type": "hemisphere", "count": 40}
+SPREAD_RIGS = {
+    "fibonacci": HEMISPHERE,
+    "rings": HEMISPHERE | {"pattern": "rings"},
+    "sphere": {"type": "sphere", "subdivisions": 2},
+    "plane": {"type": "plane", "cameras": [16, 8]},
+    "lattice": {"type": "lattice", "cameras": [8, 4, 4]},
+    "cuboid": {"type": "cuboid", "cameras": [4, 4, 4]},
+    "cylinder": {"type": "cylinder", "cameras": [16, 5]},
+    "random": {"type": "random", "count": 50},
+    "ring": {"type": "ring", "count": 40},
+    "spiral": {"type": "spiral", "count": 60},
+    "path": {
+        "type": "path",
+        "count": 40,
+        "keys": [{"position": place} for place in ([0, 0, 0], [1, 0, 0], [1, 1, 0])],
+    },
+}
+
+
+def largest_gap(positions, tests):
+    """Return the largest distance from a camera to the nearest test camera."""
+    distances = np.linalg.norm(positions[:, None] - positions[None, tests], axis=-1)
+    return distances.min(axis=1).max()
+
+
+@pytest.mark.parametrize("name", SPREAD_RIGS)
+def test_test_views_are_spread_better_than_by_chance(name):
+    whole_rig = SPREAD_RIGS[name] | {"camera": PERSPECTIVE}
+    lightfield = LightField.from_rig(whole_rig, rigs.from_settings(whole_rig).camera.make())
+    positions = lightfield.world_from_cameras[:, :3, 3]
+    poses = rigs.from_settings(whole_rig | {"split": {"every": 8}}).poses()
+    of_split = [number for number, pose in enumerate(poses) if pose.split == "test"]
+    exported_names = {view.name for view in splits(lightfield).test}
+    of_export = [n for n, view in enumerate(lightfield.views) if view.name in exported_names]
+    draw = np.random.default_rng(1).choice
+    count = -(-len(positions) // 8)
+    drawn_gaps = [
+        largest_gap(positions, draw(len(positions), count, replace=False)) for _ in range(99)
+    ]
+    for tests in (of_split, of_export):
+        assert len(tests) == count
+        assert largest_gap(positions, tests) <= np.quantile(drawn_gaps, 0.1)
+
+
+def test_test_views_of_a_hemisphere_are_on_all_sides():
+    poses = rigs.from_settings(HEMISPHERE | {"split": {"every": 8}}).poses()
+    tests = np.array([pose.position for pose in poses if pose.split == "test"])
+    azimuths = np.sort(np.degrees(np.arctan2(tests[:, 0], tests[:, 1])))
+    assert np.diff(azimuths, append=azimuths[0] + 360).max() < 180
+
+
+@pytest.mark.parametrize("name", ["ring", "spiral"])
+def test_every_eighth_view_tests_where_none_are_spread_better(name):
+    poses = rigs.from_settings(SPREAD_RIGS[name] | {"split": {"every": 8}}).poses()
+    tests = [number for number, pose in enumerate(poses) if pose.split == "test"]
+    assert tests == [*range(0, len(poses), 8)]
+
+
+def test_test_views_at_one_place_look_in_different_directions(tmp_path):
+    # A tripod: eight directions, four pictures of each.
+    rows = [f"view_{n},0,0,0,1.5,0,{n // 4 * 0.7}" for n in range(32)]
+    (tmp_path / "poses.csv").write_text("\n".join(["name,x,y,z,rx,ry,rz", *rows]))
+    rig = {"type": "poses", "file": str(tmp_path / "poses.csv"), "split": {"every": 4}}
+    tests = [n for n, pose in enumerate(rigs.from_settings(rig).poses()) if pose.split == "test"]
+    assert {number // 4 for number in tests} == {*range(8)}
+
+
 def test_the_faces_of_a_cube_map_stay_together():
     rig = rigs.from_settings(PLANE | {"cube_map": True, "split": {"every": 4}})
-    assert [pose.split for pose in rig.poses()] == 3 * (6 * ["test"] + 18 * ["train"])
+    parts = np.reshape([pose.split for pose in rig.poses()], (12, 6))
+    assert (parts == parts[:, :1]).all()
+    assert (parts[:, 0] == "test").sum() == 3
 
 
 def test_a_thinned_rig_has_no_list_of_removed_views():

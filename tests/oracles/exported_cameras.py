@@ -33,8 +33,7 @@ GRID = 33
 # this many pixels, and by this many times the error of the fit that is made here.
 FITTED_PIXELS = 0.25
 FITTED_TIMES = 3.0
-# Without a split, every eighth view in the order of names is a test view. Most trainers' own
-# examples do the same.
+# Without a split, an eighth of the views tests.
 EVERY = 8
 
 
@@ -94,21 +93,47 @@ class Expected:
         return any(view.split for view in self.image_set.lightfield.views)
 
     @cached_property
-    def parts(self) -> Mapping[str, set[str]]:
-        """The names of the views of each part. Without a split, every eighth view tests."""
+    def _parts_of_split(self) -> dict[str, set[str]]:
+        """The names of the views of each part of the split."""
         views = dict(zip(self.numbers, self.image_set.lightfield.views, strict=True))
-        if self.has_split:
-            views |= self.views_of_other_rigs
-            parts: dict[str, set[str]] = {str(part): set() for part in PARTS}
-            for name, view in views.items():
-                if view.split in parts:
-                    parts[view.split].add(name)
-        else:
-            tests = set(sorted(views)[::EVERY])
-            parts = {"train": views.keys() - tests, "validation": set(), "test": tests}
-        # Without views for validation, the test views validate.
-        parts["validation"] = parts["validation"] or parts["test"]
+        views |= self.views_of_other_rigs
+        parts: dict[str, set[str]] = {str(part): set() for part in PARTS}
+        for name, view in views.items():
+            if view.split in parts:
+                parts[view.split].add(name)
         return parts
+
+    def parts(self, exported: Exported) -> Mapping[str, set[str]]:
+        """Return the names of the views that each part of an export must have.
+
+        Without a split, the export chooses the test views.
+        """
+        if self.has_split:
+            parts = self._parts_of_split
+        else:
+            listed = {name for part in exported.parts if part.part == "test" for name in part.names}
+            tests = listed & self.numbers.keys()
+            parts = {"train": self.numbers.keys() - tests, "validation": set(), "test": tests}
+        # Without views for validation, the test views validate.
+        return parts | {"validation": parts["validation"] or parts["test"]}
+
+    def choice_fault(self, tests: Collection[str]) -> str | None:
+        """Return what is wrong with the test views that an export chose, for a rig without a split.
+
+        They are an eighth, and leave no larger gap than every eighth view.
+        """
+        count = -(-len(self.numbers) // EVERY)
+        if len(tests) != count:
+            return f"has {len(tests)} test views, not {count}"
+        if self._largest_gap(tests) > (1 + 1e-6) * self._largest_gap(sorted(self.numbers)[::EVERY]):
+            return "has test views that are spread worse than every eighth view"
+        return None
+
+    def _largest_gap(self, tests: Collection[str]) -> float:
+        """Return the largest distance from a view to the nearest test view, in metres."""
+        places = self.image_set.lightfield.world_from_cameras[:, :3, 3]
+        chosen = places[[self.numbers[name] for name in tests]]
+        return float(np.linalg.norm(places[:, None] - chosen, axis=-1).min(axis=1).max())
 
     def view(self, name: str) -> View | None:
         """Return the view with a name from an export. None if it is not here."""
@@ -178,8 +203,13 @@ def faults(exported: Exported, expected: Expected) -> Iterator[str]:
         yield from _pose_faults(exported.views, expected)
         yield from _exposure_faults(exported.views, expected)
         yield from _name_faults(exported, expected)
+    parts = expected.parts(exported)
     for part in exported.parts:
-        yield from _different_names(part.place, part.names, expected.parts[part.part], expected)
+        yield from _different_names(part.place, part.names, parts[part.part], expected)
+        if part.part == "test" and not expected.has_split:
+            fault = expected.choice_fault(parts["test"])
+            if fault:
+                yield f"{part.place}: {fault}"
 
 
 def _missing_parts(path: Path, expected: Expected) -> Iterator[str]:
@@ -311,7 +341,7 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
     if all(view.file == first.file for view in exported.views):
         expected_names = set(expected.numbers)
         if exported.views_of and expected.has_split:
-            expected_names &= expected.parts[exported.views_of]
+            expected_names &= expected.parts(exported)[exported.views_of]
         yield from _different_names(str(first.file), names, expected_names, expected)
 
 

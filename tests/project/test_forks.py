@@ -37,8 +37,8 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
     lines = snakefile.read_text().splitlines()
     # An unchanged file of rules calls a changed function.
     with (folder / "scripts/lightfield/core/disk_space.py").open("a") as file:
-        file.write("def obstacle(path): raise TypeError('mistaken')\n")
-    (line,) = (n for n, text in enumerate(lines, 1) if "obstacle(Path(" in text)
+        file.write("def check_folder(folder): raise TypeError('mistaken')\n")
+    (line,) = (n for n, text in enumerate(lines, 1) if "check_folder(Path(" in text)
     error = f'TypeError in file "{snakefile}", line {line}:\nmistaken'
     assert error in snakemake(folder, "--dry-run").stderr
     snakefile.write_text("\n".join(["assert GIVEN_KEYS", *lines]))

@@ -477,7 +477,8 @@ ROUNDS = {
         "built": (
             "  nerfstudio: {sources: [perspective], points: 9}\n",
             "",
-            {"validate", "costs"},
+            # The drawing of a rig without a split shows the test views that exports choose.
+            {"validate", "costs", "LFInner figures"},
         ),
         "brought": ("depth: true}", "depth: true, points: 9}", {"export"}),
     },
@@ -626,7 +627,7 @@ ROUNDS = {
 # a .blend's camera has frames. Only instant-ngp places a rig that tests like the trained one; other
 # formats take its views. No scene YAML asks reproject.py for masks, or sets the number of compared
 # synthesised views. A scene with another name is another scene. A panorama has no neighbour.
-CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
+CONSTANT = {"version", "spread_version", "bpy", "command", "camera_frames", "reproject.json mask"}
 CONSTANT |= {"synthesis.json views", "lightfield.json scene", "panorama.json scene"}
 CONSTANT |= {"probes.json scene", "panorama.json flow"}
 # The sequence is of rendered views, and no other rig tests it.

@@ -122,7 +122,7 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
     assert card["loaders"]["perspective/exports/colmap"].endswith(
         "Reconstruction('perspective/exports/colmap/sparse/0')"
     )
-    assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
+    assert card["loaders"]["exr"].endswith("'exr/view_0000f.exr').channels()")
     # This reader does not use nerfstudio's file.
     instant_ngp_files = {
         path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")

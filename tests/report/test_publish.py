@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from markdown_it import MarkdownIt
 from sphere import LENSES, write_views
 
 from lightfield.configuration.publication import DOCUMENTS
@@ -20,6 +21,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
+from lightfield.report import package
 from lightfield.report.publish import publish
 
 NAME = "smoke_LFPlane"
@@ -242,6 +244,40 @@ def test_the_card_has_the_front_matter_of_hugging_face(folder, tmp_path, licence
         assert [*output.glob(data_files["path"])]
     assert "Few pixels." in text
     assert "Ada Lovelace" in text
+
+
+HOSTILE = '"><script>alert(1)</script>\n\n<img src=x onerror=alert(1)>\n\n```\n\n<b>'
+
+
+def html_and_links(markdown):
+    """Return the HTML that a text holds, and the addresses of its links."""
+    tokens = MarkdownIt("commonmark").parse(markdown)
+    tokens += [child for token in tokens for child in token.children or ()]
+    html = [token.content for token in tokens if token.type in ("html_block", "html_inline")]
+    return html, [token.attrs["href"] for token in tokens if token.type == "link_open"]
+
+
+def test_texts_of_the_scene_yaml_put_markdown_but_no_html_into_the_cards(folder, tmp_path):
+    creators = [{"name": f"Ada {HOSTILE}"}]
+    texts = dict.fromkeys(("title", "publisher", "limitations", "biases", "use_cases"), HOSTILE)
+    links = ["https://example.org/a", "https://example.org/b"]
+    scene = {
+        "description": f"[A room]({links[0]}), see <{links[1]}> {HOSTILE}",
+        "licence": f"CC-BY-4.0 {HOSTILE}",
+        "credit": HOSTILE,
+        "publish": PUBLISH | texts | {"creators": creators, "licence": "CC-BY-4.0"},
+    }
+    output = published(folder, tmp_path / NAME, **scene)
+    _, front_matter, text = (output / "README.md").read_text().split("---\n", 2)
+    assert yaml.safe_load(front_matter)["pretty_name"] == HOSTILE
+    html, found_links = html_and_links(text)
+    assert html == []
+    assert {*links} <= {*found_links}
+    card = package.card(folder, NAME, Credits.model_validate(scene))
+    (archive,) = package.pack(folder, card, tmp_path / "package.tar", None)
+    html, found_links = html_and_links(members(archive)[f"{NAME}/README.md"].decode())
+    assert html == []
+    assert {*links} <= {*found_links}
 
 
 def test_the_licence_of_the_data_may_differ_from_that_of_the_scene(folder, tmp_path):

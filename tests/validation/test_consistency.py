@@ -321,8 +321,8 @@ def test_displacement_is_the_motion_in_pixels_that_brings_surfaces_together():
     pixels = np.linalg.norm(moved, axis=1) / footprint
     assert motion == pytest.approx(np.sqrt((pixels**2).mean()), rel=0.01)
     # A few points of another surface hardly count.
-    residual = measured.residual + 3 * (np.arange(80) % 20 == 0)
-    robust, _ = consistency.displacement(replace(measured, residual=residual), camera)
+    residual = measured.curved_residual + 3 * (np.arange(80) % 20 == 0)
+    robust, _ = consistency.displacement(replace(measured, curved_residual=residual), camera)
     assert robust == pytest.approx(motion, rel=0.1)
 
 
@@ -337,6 +337,13 @@ def test_displacement_has_the_deviation_expected_from_noise():
         motions.append(consistency.displacement(measured, at()))
     moved, expected = np.sqrt((np.array(motions) ** 2).mean(axis=0))
     assert moved == pytest.approx(expected, rel=0.1)
+    # Noise that is larger than expected shows in what the motion leaves.
+    noise = random.normal(0, 0.2, 60)
+    measured = compared(points, points, normals, footprint, noise, expected=0.01)
+    told = compared(points, points, normals, footprint, noise, expected=0.2)
+    assert consistency.displacement(measured, at())[1] == pytest.approx(
+        consistency.displacement(told, at())[1], rel=0.25
+    )
     # A motion along the wall does not show, so nothing moves.
     flat = on_wall(ROW, rows=np.tile([20, 28, 36, 44], 10))
     along = compared(flat.points + np.array([0.1, 0, 0]), flat.points, flat.normals, flat.footprint)

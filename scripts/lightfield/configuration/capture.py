@@ -19,7 +19,7 @@ from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import OMNIDIRECTIONAL
 from lightfield.formats.render_block import RenderBlock
-from lightfield.geometry import rigs
+from lightfield.geometry import rigs, spread
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are not
@@ -209,6 +209,9 @@ class LightfieldSettings(Settings):
     poses_sha256: str | None = cause(
         "SHA-256 of the rig's file of poses. If it changes, the file is read again."
     )
+    spread_version: int | None = cause(
+        "Version of the choice of test views, if the rig's split has the key every."
+    )
 
     @classmethod
     def of_capture(cls, capture: Capture, panorama_width: int | None = None, **keys: Any) -> Self:
@@ -223,6 +226,7 @@ class LightfieldSettings(Settings):
             render=capture.render.to_json(),
             rig=rig,
             panorama_width=panorama_width,
+            spread_version=spread.VERSION if rig.tests_one_of else None,
             **keys,
         )
 

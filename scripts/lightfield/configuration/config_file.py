@@ -34,7 +34,7 @@ _RESERVED = {
     "tests",
 }
 # Names that a scene's folder cannot have, because other folders beside it have them.
-_SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
+_SCENE_NEIGHBOURS = {"benchmarks", "logs", "receipts", "removed", "settings", "tables"}
 
 
 def _listed(value: Any) -> Any:

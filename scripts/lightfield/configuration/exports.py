@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.setting_types import REINHARD, Stops, White
 from lightfield.core.settings import ReaderSettings, Settings, Vector, as_list
+from lightfield.core.stage import cause
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -36,6 +37,8 @@ class Export(Settings):
 
     # Whether the export includes other rigs' views, which test the trained models.
     is_for_training: ClassVar[bool] = False
+    # Whether the export lists test views also if the rig has no split.
+    chooses_tests: ClassVar[bool] = False
     # Whether the export is made of all frames of a sequence.
     is_of_sequence: ClassVar[bool] = False
     # Whether the export has the times of a rolling shutter's rows.
@@ -209,6 +212,7 @@ class Nerfstudio(Developed):
     """A nerfstudio dataset, for nerfstudio and Brush."""
 
     is_for_training: ClassVar[bool] = True
+    chooses_tests: ClassVar[bool] = True
 
     points: _PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
@@ -236,6 +240,7 @@ class NerfSynthetic(Developed):
     """The layout of NeRF's synthetic scenes: RGBA images, and a list for each part of the split."""
 
     is_for_training: ClassVar[bool] = True
+    chooses_tests: ClassVar[bool] = True
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return _centred_pinhole(lens)
@@ -294,6 +299,7 @@ class ScanNetPP(Developed):
     """ScanNet++'s layout of a fisheye camera, for 3DGRUT and Fisheye-GS."""
 
     is_for_training: ClassVar[bool] = True
+    chooses_tests: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000,
@@ -329,6 +335,7 @@ class LichtFeld(Developed):
     """A dataset for LichtFeld Studio."""
 
     is_for_training: ClassVar[bool] = True
+    chooses_tests: ClassVar[bool] = True
 
     format: Literal["png", "exr"] = Field(
         "png", description="Format of the images. exr keeps linear light, for HDR training."
@@ -365,6 +372,7 @@ class Dnerf(Developed):
     """D-NeRF's layout of a sequence: NeRF's synthetic layout with a time for each picture."""
 
     is_for_training: ClassVar[bool] = True
+    chooses_tests: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
 
     points: _PointCount = Field(
@@ -561,6 +569,9 @@ class ExportSettings(ReaderSettings, Generic[Options]):
         None,
         description="Path of the transforms.json of the training views, whose scale and offset "
         "these views get.",
+    )
+    spread_version: int | None = cause(
+        "Version of the choice of test views, if the rig has no split."
     )
 
     @model_validator(mode="after")

@@ -136,7 +136,7 @@ class Publication(Settings):
     )
     doi: str | None = Field(
         None,
-        pattern=pattern(r"^10\.[0-9]{4,9}/\S+$", "a DOI such as 10.5281/zenodo.1234"),
+        pattern=pattern(r"""^10\.[0-9]{4,9}/[^\s"'<>]+$""", "a DOI such as 10.5281/zenodo.1234"),
         description="DOI of the dataset, if one is reserved.",
     )
     version: str = Field(

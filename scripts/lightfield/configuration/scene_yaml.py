@@ -47,7 +47,7 @@ SCENES = ROOT / "configs" / "scenes"
 OWN_SCENES = Path("configs", "scenes")
 FLOW_PLACES = "needs views from two or more places"
 # Names that a rig's folder cannot have, because other folders beside it have them.
-_RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "trials"}
+_RIG_NEIGHBOURS = {PUBLISHED_FOLDER, "settings", "trials"}
 # Names that a reprojection's folder cannot have.
 _REPROJECTION_NEIGHBOURS = {
     "exr",
@@ -56,11 +56,12 @@ _REPROJECTION_NEIGHBOURS = {
     "panorama",
     "render",
     "report",
+    "settings",
     FLOW.name,
     *PASSES,
 }
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
-_OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
+_OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|jsonl?|lock|log|part|tar|tsv|txt)")
 # For keys of a camera in lightfield.json: Blender's least and largest value, the unit of messages,
 # and the name in messages.
 _BLENDER_LIMITS = {

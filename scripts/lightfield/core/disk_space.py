@@ -46,15 +46,19 @@ class Need:
     files: int = 0
 
 
-def _nearest_folder(path: Path) -> Path:
-    """Return the path if it exists, or else the nearest parent that does."""
-    return next(part for part in (path, *path.absolute().parents) if part.exists())
+def _nearest(path: Path) -> Path:
+    """Return the path if something lies there, or else the nearest parent."""
+    # `Path.exists` raises an error below a folder that may not be searched.
+    return next(part for part in (path, *path.absolute().parents) if os.path.lexists(part))
 
 
 def obstacle(path: Path) -> str | None:
-    """Return why no file can be written below a path, and what to do. Return None if one can."""
-    folder = _nearest_folder(path)
-    folder = folder if folder.is_dir() else folder.parent
+    """Return why no file can be written at a path, and what to do. Return None if one can."""
+    nearest = _nearest(path)
+    folder = nearest.parent if nearest == path and not path.is_dir() else nearest
+    if not folder.is_dir():
+        kind = "is a file" if folder.exists() else "is a link that leads nowhere"
+        return f"{folder} {kind}, and must be a folder: remove it, or give it another name"
     disk = os.statvfs(folder)
     if disk.f_flag & os.ST_RDONLY:
         return f"the disk of {folder} is read-only: {REMEDIES[errno.EROFS]}"
@@ -69,12 +73,18 @@ def obstacle(path: Path) -> str | None:
     return None
 
 
+def check_folder(folder: Path) -> None:
+    """Raise `UserError` for a folder in which no file can be written. It may be missing."""
+    if problem := obstacle(folder / "file"):
+        raise UserError(f"{folder}: cannot be written: {problem}")
+
+
 def write_problem(path: Path, error: OSError) -> str:
     """Return why writing a path raised ``error``, and what to do."""
     # Some libraries raise errors without a number, so ask the disk first.
     if cause := obstacle(path):
         return cause
-    free = units.size(shutil.disk_usage(_nearest_folder(path)).free)
+    free = units.size(shutil.disk_usage(_nearest(path)).free)
     remedy = REMEDIES.get(error.errno or 0, "look for a quota, or a limit of files' sizes")
     return f"{error.strerror or error}; {free} are free on its disk: {remedy}"
 
@@ -93,10 +103,9 @@ def check(needs: Iterable[Need]) -> Iterator[str]:
     """
     needs_of_disk: dict[int, list[Need]] = {}
     for need in needs:
-        device = _nearest_folder(need.folder).stat().st_dev
+        check_folder(need.folder)
+        device = _nearest(need.folder).stat().st_dev
         needs_of_disk.setdefault(device, []).append(need)
-        if cause := obstacle(need.folder):
-            raise UserError(f"{need.folder}: cannot be written: {cause}")
     for disk_needs in needs_of_disk.values():
         if warning := _space_warning(disk_needs):
             yield warning
@@ -108,7 +117,7 @@ def _space_warning(needs: list[Need]) -> str | None:
     All ``needs`` are on one disk.
     """
     folder = needs[0].folder
-    existing_folder = _nearest_folder(folder)
+    existing_folder = _nearest(folder)
     size = sum(need.size for need in needs)
     files = sum(need.files for need in needs)
     disk = os.statvfs(existing_folder)

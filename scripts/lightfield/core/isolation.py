@@ -12,6 +12,8 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
+from lightfield.core.interrupts import report_interrupts
+
 _SCRIPTS = Path(__file__).resolve().parents[2]
 _PROGRAM_FOLDERS = {_SCRIPTS, _SCRIPTS.parent / "benchmarks"}
 
@@ -59,6 +61,7 @@ def isolate() -> None:
     """
     if not _is_program():
         return
+    report_interrupts()
     own_variables = {
         "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
         "PYDANTIC_DISABLE_PLUGINS": "__all__",

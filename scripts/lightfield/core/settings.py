@@ -159,7 +159,13 @@ def pattern(expression: str, meaning: str) -> str:
 
 
 Address = Annotated[
-    str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
+    str,
+    Field(
+        pattern=pattern(
+            r"""^https?://[^\s"'<>]+$""",
+            "an address that begins with http:// or https://, without blanks, quotes, < and >",
+        )
+    ),
 ]
 # The name of a folder.
 Name = Annotated[

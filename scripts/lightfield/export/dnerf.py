@@ -33,13 +33,15 @@ def export(source: SourceSequence, settings: Dnerf, folder: Path) -> None:
     angle = 2 * math.atan(lens.width / 2 / cameras.focal_pixels(lens)[0])
     lists: dict[str, list[dict[str, Any]]] = {"train": [], "val": [], "test": []}
     progress = Progress(len(source.frames), "dnerf", "frames")
+    # A view has the same part at each frame, also if the rig moves.
+    parts = splits(source.lightfield)
+    # Without validation views, the test views validate, too.
+    by_list = {"train": parts.train, "test": parts.test, "val": parts.validation}
     for frame, time in zip(source.frames, source.times, strict=True):
-        parts = splits(frame.lightfield)
+        view_of_name = {view.name: view for view in frame.lightfield.views}
         entries: dict[str, dict[str, Any]] = {}
-        # Without validation views, the test views validate, too.
-        by_list = {"train": parts.train, "test": parts.test, "val": parts.validation}
         for part, views in by_list.items():
-            for view in views:
+            for view in (view_of_name[each.name] for each in views):
                 if view.name not in entries:
                     path = f"{part}/{frame.dataset.name}_{view.name}"
                     pixels = np.dstack([frame.colour(view), frame.alpha(view)])

@@ -3,11 +3,14 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from lightfield.core.errors import UserError
 from lightfield.core.names import PARTS
 from lightfield.formats.lightfield import LightField, View
+from lightfield.geometry.spread import spread
 
-# Most trainers' own examples test with every eighth view. Used for rigs without a split.
+# Most trainers' own examples test with an eighth of the views. Used for rigs without a split.
 EVERY = 8
 
 
@@ -20,7 +23,7 @@ class TrainerSplits(NamedTuple):
 
 
 def splits(lightfield: LightField) -> TrainerSplits:
-    """Return the views of each part of the rig's split. Without a split, every eighth view tests.
+    """Return the views of each part of the rig's split. Without a split, an eighth tests.
 
     Raises `UserError` if no view trains, or no view tests.
     """
@@ -28,8 +31,12 @@ def splits(lightfield: LightField) -> TrainerSplits:
     if any(view.split for view in views):
         part = {view.name: view.split for view in views}
     else:
-        tests = {*sorted(view.name for view in views)[::EVERY]}
-        part = {view.name: "test" if view.name in tests else "train" for view in views}
+        by_name = sorted(views, key=lambda view: view.name)
+        poses = np.array([view.world_from_camera for view in by_name])
+        tests = {*spread(poses[:, :3, 3], poses[:, :3, 2], EVERY)}
+        part = {
+            view.name: "test" if number in tests else "train" for number, view in enumerate(by_name)
+        }
     train, validation, test = (
         [view for view in views if part[view.name] == name] for name in PARTS
     )

@@ -17,6 +17,7 @@ from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.errors import UserError
+from lightfield.export.trainer_splits import splits
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.overview import middle_view
@@ -61,6 +62,9 @@ def draw(job: ReportFigures) -> None:
     sheet = contact_sheet.sheet(thinned, lens.width, lens.height)
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
+    if job.settings.chooses_tests:
+        tests = {view.name for view in splits(lightfield).test}
+        parts = ["test" if view.name in tests else "train" for view in lightfield.views]
     draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts)
     if job.panorama:
         overview = _read_panorama(job.panorama)
@@ -132,7 +136,13 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
         )
         colours = [_PART_COLOURS[parts[view]] for view in order]
         dots = [(*to_rgb(colour), alpha) for colour, alpha in zip(colours, near, strict=True)]
-        axes.scatter(*start.T, s=min(20.0, 350 / np.sqrt(len(poses))), c=dots, linewidths=0)
+        area = min(20.0, 350 / np.sqrt(len(poses)))
+        axes.scatter(*start.T, s=area, c=dots, linewidths=0)
+        # The few views that validate or test are larger, and never pale.
+        held_out = [row for row, view in enumerate(order) if parts[view] in ("validation", "test")]
+        if held_out:
+            held_out_colours = [colours[row] for row in held_out]
+            axes.scatter(*start[held_out].T, s=2 * area, c=held_out_colours, linewidths=0)
         for part in sorted({part for part in parts if part}, reverse=True):
             axes.scatter(
                 [], [], s=20, color=_PART_COLOURS[part], label=f"{part} {parts.count(part)}"

@@ -5,12 +5,12 @@ Source: huggingface.co/docs/hub/datasets-cards.
 
 from typing import Any
 
-import jinja2
 import yaml
 
 from lightfield.core.names import VIEWS
+from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW, PASSES
-from lightfield.report.page import TEMPLATES
+from lightfield.report.markdown import markdown, one_line
 from lightfield.report.published import Published
 
 # Licences that Hugging Face knows by their names. They are the short names in small letters.
@@ -60,12 +60,10 @@ def describe(published: Published) -> str:
         "tags": ["webdataset", *published.publication.keywords],
         "configs": [{"config_name": "default", "data_files": data_files}],
     }
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("published.md.j2").render(
+    return markdown(
+        "published.md.j2",
         front_matter=yaml.safe_dump(front_matter, sort_keys=False, allow_unicode=True),
-        title=published.title,
+        title=one_line(published.title),
         description=published.credits.description,
         name=published.name,
         card=published.card,
@@ -75,19 +73,21 @@ def describe(published: Published) -> str:
         shards=published.shards,
         first_shard=next(iter(published.shards.values()))[0]["file"],
         fields=published.fields,
-        meanings={name: _meaning(name) for name in published.fields},
+        meanings={name: _meaning(name, published.lightfield) for name in published.fields},
         publish=published.publication,
         citation=published.citation,
     )
 
 
-def _meaning(field: str) -> str:
+def _meaning(field: str, lightfield: LightField) -> str:
     """Describe a member of a sample by its name without the sample's key."""
     if field == "json":
         return "pose, camera and checksum of each picture"
     stem = field.rpartition(".")[0]
     if stem == VIEWS:
-        return "the view: colour in R, G, B, and depth in Z"
+        alpha = ", opacity in A" if lightfield.transparent else ""
+        depth = ", depth in Z" if lightfield.depth else ""
+        return f"the view: colour in R, G, B{alpha}{depth}"
     *reprojection, last = stem.split("+")
     view_pass = FLOW if last == FLOW.name else PASSES.get(last)
     if view_pass is None:

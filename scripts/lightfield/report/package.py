@@ -12,8 +12,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
@@ -27,7 +25,7 @@ from lightfield.formats.layout import CARD, IMAGES, README, REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
-from lightfield.report.page import TEMPLATES
+from lightfield.report.markdown import markdown
 from lightfield.stages.publishing import Package
 
 SILVR = (
@@ -37,7 +35,7 @@ SILVR = (
 
 # How to load each format. {} stands for the folder that holds it.
 LOADERS = {
-    "exr": "import OpenEXR\npixels = OpenEXR.File('{}/exr/{view}.exr').channels()",
+    "exr": "import OpenEXR\npixels = OpenEXR.File('{}/{view}.exr').channels()",
     "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
     "nerfstudio": "ns-train nerfacto --data {}",
     "nerf_synthetic": "ns-train nerfacto --data {} blender-data",
@@ -83,11 +81,8 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
 
     The folder of a sequence has a folder for each frame. The first one counts.
     """
-    lightfields = [path for path in files_below(folder) if path.name == NAME]
-    lightfields.sort(key=lambda path: (len(path.parts), path))
-    if not lightfields:
-        raise UserError(f"{folder}: has no {NAME}")
-    first = lightfields[0].parent
+    frames = [] if (folder / NAME).is_file() else _frames(folder)
+    first = frames[0] if frames else folder
     lightfield = LightField.read(first / NAME)
     view = lightfield.views[0].name
     bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
@@ -100,6 +95,7 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
             "credit": scene.credit,
         },
         "rig": lightfield.content["lf_type"],
+        **({"frames": [frame.name for frame in frames]} if frames else {}),
         "views": len(lightfield.views),
         "lens": lightfield.lens.description,
         "resolution": [lightfield.lens.width, lightfield.lens.height],
@@ -112,42 +108,49 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
         "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
         "software": f"Cycles in bpy {bpy}" if bpy else None,
         "cite": [SILVR, *([scene.credit] if scene.credit else [])],
-        "loaders": dict([*_loaders(first, view), *_loaders_of_sequence(folder, first)]),
+        "loaders": dict(_loaders(folder, first, view)),
     }
 
 
-def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
-    """Yield the folder of the views and of each export, and how to load it."""
-    yield ".", LOADERS["exr"].replace("{view}", view).replace("{}", ".")
-    for path in transforms(folder):
-        place = path.parent.relative_to(folder).as_posix()
-        yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
-    for path in files_below(folder):
-        if path.name == MANIFEST:
-            yield _loader(path, folder)
+def _frames(folder: Path) -> list[Path]:
+    """Return the folders of a sequence's frames. Raises `UserError` if there are none."""
+    frames = sorted(path.parent for path in folder.glob(f"*/{NAME}"))
+    if not frames:
+        raise UserError(f"{folder}: has no {NAME}")
+    return frames
 
 
-def _loaders_of_sequence(folder: Path, first: Path) -> Iterator[tuple[str, str]]:
-    """Yield each export of a whole sequence, and how to load it.
+def _loaders(folder: Path, first: Path, view: str) -> Iterator[tuple[str, str]]:
+    """Yield the places in ``folder`` of the views and of each export, and how to load it.
 
-    ``first`` is the folder of the first frame. It is ``folder`` itself if there is no sequence.
+    ``first`` is the folder of a sequence's first frame. Without a sequence, it is ``folder``.
     """
-    if first == folder:
-        return
+
+    def loader(name: str, place: Path) -> str:
+        text = LOADERS[name].replace("{view}", view).replace("{frame}", first.name)
+        return text.replace("{}", place.relative_to(folder).as_posix())
+
+    views = first / IMAGES
+    yield views.relative_to(folder).as_posix(), loader("exr", views)
+    for path in transforms(first):
+        yield path.relative_to(folder).as_posix(), loader("instant_ngp", path.parent)
+    lists = [path for path in files_below(first) if path.name == MANIFEST]
+    for path in [*lists, *(_lists_of_sequence(folder) if first != folder else ())]:
+        yield path.parent.relative_to(folder).as_posix(), loader(_format(path), path.parent)
+
+
+def _lists_of_sequence(folder: Path) -> Iterator[Path]:
+    """Yield the list of each export of a whole sequence."""
     lists = [*folder.glob(f"exports/*/{MANIFEST}"), *folder.glob(f"*/exports/*/{MANIFEST}")]
-    for path in sorted(lists):
-        name = read_keys(path, "export.py", "format")["format"]
-        if name in SEQUENCE_EXPORTS:
-            yield _loader(path, folder)
+    yield from (path for path in sorted(lists) if _format(path) in SEQUENCE_EXPORTS)
 
 
-def _loader(path: Path, folder: Path) -> tuple[str, str]:
-    """Return the place of an export in ``folder``, and how to load it. ``path`` is its list."""
-    place = path.parent.relative_to(folder).as_posix()
+def _format(path: Path) -> str:
+    """Return the format of an export from its list. Raises `UserError` if nothing loads it."""
     name = read_keys(path, "export.py", "format")["format"]
     if name not in LOADERS:
         raise UserError(f"{path}: format: is {name!r}; must be one of {', '.join(LOADERS)}")
-    return place, LOADERS[name].replace("{}", place)
+    return str(name)
 
 
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
@@ -156,10 +159,7 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     Further parts are named <target's stem>.2.tar and so on. Removes the parts of an earlier
     package.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True
-    )
-    readme = environment.get_template("card.md.j2").render(**content)
+    readme = markdown("card.md.j2", **{"frames": None, **content})
     texts = {CARD: json.dumps(content, indent=1) + "\n", README: readme}
     paths = [
         path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]

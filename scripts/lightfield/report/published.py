@@ -6,6 +6,7 @@ from typing import Any
 from lightfield.configuration.publication import Creator, Publication
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.formats.lightfield import LightField
+from lightfield.report.markdown import one_line
 
 
 @dataclass(frozen=True)
@@ -66,5 +67,5 @@ class Published:
             "doi": publication.doi,
             "url": publication.url,
         }
-        entries = [f"  {name} = {{{value}}}" for name, value in lines.items() if value]
+        entries = [f"  {name} = {{{one_line(value)}}}" for name, value in lines.items() if value]
         return "@misc{" + self.name + ",\n" + ",\n".join(entries) + "\n}"

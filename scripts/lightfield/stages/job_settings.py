@@ -26,6 +26,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
+from lightfield.geometry import spread
 from lightfield.geometry.rigs import Poses
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
@@ -198,7 +199,14 @@ def validate(dataset: Dataset) -> ValidationSettings:
 
 
 def _figures(dataset: Dataset) -> FiguresSettings:
-    return FiguresSettings.of(rig=dataset.placed_rig)
+    exports = [*dataset.exports.selected.values()]
+    chooses_tests = any(_chooses_tests(dataset, export) for export in exports)
+    return FiguresSettings.of(rig=dataset.placed_rig, chooses_tests=chooses_tests or None)
+
+
+def _chooses_tests(dataset: Dataset, export: Export) -> bool:
+    """Return whether an export chooses test views itself, because the rig has no split."""
+    return export.chooses_tests and dataset.rig.split is None
 
 
 _OF_DATASET: Mapping[str, Callable[[Dataset], Settings]] = {
@@ -326,6 +334,7 @@ def _export_settings(
     return export_settings_of(name).of(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
+        spread_version=spread.VERSION if _chooses_tests(dataset, options) else None,
         **roles,
     )
 

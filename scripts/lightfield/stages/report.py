@@ -15,6 +15,11 @@ class FiguresSettings(ReaderSettings):
     """The settings of scripts/report_figures.py."""
 
     rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+    chooses_tests: bool | None = Field(
+        None,
+        description="Whether an export chooses test views, because the rig has no split. The "
+        "drawing of the rig shows them.",
+    )
 
 
 class ReportFigures(Stage[FiguresSettings]):

@@ -354,9 +354,14 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
 
     The motion is a rigid motion about ``camera``, the recording view. It minimises the residuals in
     the directions that they determine. The result is its root mean square over the points, in pixel
-    footprints. The second value is the root mean square to expect if nothing is wrong.
+    footprints. The second value is the root mean square to expect if nothing is wrong: the noise of
+    the residuals, as expected or as the motion leaves it, propagated to the motion. Both grow as
+    the points become fewer.
+
+    Curvature counts. A plane lies inside a bulging surface, and deeper where it is seen at an
+    angle. So the planes of a curved model seem displaced, however many points it has.
     """
-    residual = measured.residual
+    residual = measured.curved_residual
     footprint = measured.footprint
     arms = (measured.queried.points - camera.position) / footprint[:, np.newaxis]
     # Give the unknowns a similar size: both are in pixels, the rotation at the median distance.
@@ -371,10 +376,15 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
         root = np.sqrt(_huber(residual + rows @ motion))
         solution = np.linalg.pinv(rows * root[:, np.newaxis], rcond=0.1) * root
         motion = -solution @ residual
-    spread = solution * measured.expected
     squares = np.einsum("nij,jk,nik->n", moves, np.outer(motion, motion), moves)
-    expected = np.einsum("nij,jk,nik->n", moves, spread @ spread.T, moves)
-    return float(np.sqrt(squares.mean())), float(np.sqrt(expected.mean()))
+    # Six of the residuals' degrees of freedom are in the motion.
+    remaining = (residual + rows @ motion) * np.sqrt(len(rows) / (len(rows) - 6))
+    expected = []
+    for deviations in (measured.expected, remaining):
+        spread = solution * deviations
+        variances = np.einsum("nij,jk,nik->n", moves, spread @ spread.T, moves)
+        expected.append(float(np.sqrt(variances.mean())))
+    return float(np.sqrt(squares.mean())), max(expected)
 
 
 def _huber(residual: Array) -> Array:

@@ -15,9 +15,9 @@ from lightfield.validation.result import Check
 
 # A view fails if more than half of its pairs exceed one of two limits. The first is the part of
 # contradictions among the points that are not occluded. The second is the displacement in pixels
-# that explains a pair's residuals best. A few pixels on curved surfaces determine the displacement
-# badly, so it must also exceed EXPECTED_DISPLACEMENTS times the value to expect of a right pair.
-# Right views of 40² pixels reach 2.5 times.
+# that explains a pair's residuals best. Few points determine the displacement badly, so it must
+# also exceed EXPECTED_DISPLACEMENTS times the value to expect of a right pair, which follows from
+# the points' noise and number. Right views of 40² pixels reach 2.5 times.
 # A set fails if all its pairs together indicate an error of all angles, or of all depths, above the
 # scale limit. A reprojection takes each depth from a source pixel up to half a pixel away, so its
 # limits are wider.

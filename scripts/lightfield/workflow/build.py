@@ -9,6 +9,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -77,14 +78,17 @@ class Build:
         """Load the datasets of a configuration. Raises `UserError` for a mistake in it."""
         chosen = load_datasets(config, cluster)
         every_rig = load_datasets(config.model_copy(update={"rigs": "all"}), cluster)
-        smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
+        smoke: list[Dataset] = []
+        # Other scenes need no smoke scene. `smoke` raises its error.
+        with suppress(UserError):
+            smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
         datasets = {dataset.name: dataset for dataset in [*smoke, *every_rig]}
         return cls(config, chosen, datasets, chosen_families(config))
 
     @cached_property
     def smoke(self) -> list[Dataset]:
-        """The datasets of the smoke scene."""
-        return [d for d in self.datasets.values() if d.scene_name == SMOKE]
+        """The datasets of the smoke scene. Raises `UserError` if its YAML is missing or wrong."""
+        return [self.datasets[d.name] for d in scene_datasets(SMOKE, settings=self.config)]
 
     @cached_property
     def scenes(self) -> dict[str, Dataset]:

@@ -16,6 +16,7 @@ _SIGNALS = {
     "SIGSEGV": f"Blender crashed, as it does if it gets no memory: {LESS_MEMORY}",
     "SIGBUS": "most likely a temporary folder is full: free some space in /dev/shm and TMPDIR",
     "SIGALRM": "a view took far longer than expected: it hung",
+    "SIGINT": "it was interrupted, as by Ctrl-C",
     "SIGTERM": "it was cancelled, or exceeded its time limit",
 }
 

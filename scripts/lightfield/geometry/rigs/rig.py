@@ -26,6 +26,7 @@ from lightfield.geometry.rotations import (
     looking_at,
     matrix_to_euler,
 )
+from lightfield.geometry.spread import spread
 
 # Each type of rig contains all lenses.
 build_settings()
@@ -190,7 +191,7 @@ class Rig(Settings):
         None,
         description="Which views are for training, validation and test. odd: views with odd "
         "sequence numbers are test views. train, validation or test: all views are. A mapping "
-        "selects every n-th position, or views by name.",
+        "selects one of n positions, or views by name.",
     )
     # Every rig of a scene YAML has a camera. Code that needs only the places may leave it out.
     camera: CameraSettings = Field(  # type: ignore[assignment]
@@ -255,6 +256,11 @@ class Rig(Settings):
         if self.stereo:
             return len(EYES)
         return len(CUBE_FACE_ANGLES) if self.cube_map else 1
+
+    @property
+    def tests_one_of(self) -> int | None:
+        """The split's key `every`. None without that key."""
+        return self.split.every if isinstance(self.split, Chosen) else None
 
     def thinned(self, max_views: int) -> Self:
         """Return the densest version of the rig that has at most ``max_views`` views.
@@ -324,12 +330,20 @@ class Rig(Settings):
             names = [f"{name}_{eye}" for name in names for eye in EYES]
             numbers = np.repeat(numbers, len(EYES))
             rotations = np.repeat(rotations, len(EYES), axis=0)
+        tests = self._spread_tests(unit)
         poses = []
         views = zip(names, numbers.tolist(), plain(positions), plain(rotations), strict=True)
         for index, (name, number, position, rotation) in enumerate(views):
-            part = part_of(self.split, name, number, index // self.views_a_position)
+            part = part_of(self.split, name, number, index // self.views_a_position in tests)
             poses.append(Pose(name, number, tuple(position), tuple(rotation), part))
         return poses
+
+    def _spread_tests(self, unit: UnitPoses) -> set[int]:
+        """Return the positions, by number, of the test views that the split's `every` chooses."""
+        if self.tests_one_of is None:
+            return set()
+        axes = euler_to_matrix(unit.rotations)[..., 2]
+        return {*spread(self.to_world(unit.positions), axes, self.tests_one_of)}
 
     def cells(self) -> list[tuple[int, ...]] | None:
         """Return the cells between neighbouring positions, as indices of the positions.

@@ -12,7 +12,10 @@ class Chosen(Settings):
     """Give `every`, or names of views. All other views are for training."""
 
     every: int | None = Field(
-        None, ge=2, description="The views at every n-th position, from the first, are test views."
+        None,
+        ge=2,
+        description="The views at one of n positions are test views: at every n-th position, or at "
+        "positions that are spread better.",
     )
     validation: list[str] = Field([], description="Names of the validation views.")
     test: list[str] = Field([], description="Names of the test views.")
@@ -34,8 +37,11 @@ class Chosen(Settings):
 Split = Literal["odd"] | Part | Chosen
 
 
-def part_of(split: Split | None, name: str, number: int, place: int) -> Part | None:
-    """Return the part of a view, from its name, its number, and the number of its position."""
+def part_of(split: Split | None, name: str, number: int, is_spread: bool) -> Part | None:
+    """Return the part of a view, from its name and its number.
+
+    ``is_spread`` says whether its position is one of those that ``every`` chooses.
+    """
     if split is None:
         return None
     if split == "odd":
@@ -44,5 +50,4 @@ def part_of(split: Split | None, name: str, number: int, place: int) -> Part | N
         return split
     if name in split.validation:
         return "validation"
-    tests = name in split.test if split.every is None else place % split.every == 0
-    return "test" if tests else "train"
+    return "test" if is_spread or name in split.test else "train"
