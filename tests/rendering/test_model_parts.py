@@ -764,3 +764,49 @@ def test_a_texture_on_a_server_is_refused(tmp_path):
     assert "texture" in refusal(path)
     (left_out,) = imported(path, allow_missing=True)["left_out"]
     assert "red" in left_out
+
+
+# ---- materials that Blender does not read ---------------------------------------------------
+
+MATERIALX = """def Material "oak" {
+    token outputs:mtlx:surface.connect = </oak/shader.outputs:surface>
+    def Shader "shader" {
+        uniform token info:id = "ND_standard_surface_surfaceshader"
+        color3f inputs:base_color = (1, 0, 0)
+        token outputs:surface
+    }
+    PREVIEW
+}
+def Mesh "board" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    rel material:binding = </oak>
+}
+"""
+PREVIEW = """token outputs:surface.connect = </oak/preview.outputs:surface>
+    def Shader "preview" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (0, 0, 1)
+        token outputs:surface
+    }"""
+
+
+def test_a_material_of_materialx_is_named_and_grey_if_allowed(tmp_path):
+    import bpy
+
+    path = written(tmp_path / "a.usda", usd(MATERIALX.replace("PREVIEW", "")))
+    message = refusal(path)
+    assert "left out: the shader of the material oak, which is no UsdPreviewSurface" in message
+    assert "scene: {allow_missing: true}" in message
+    record = imported(path, allow_missing=True)
+    assert len(record["left_out"]) == 1 and "oak" in record["left_out"][0]
+    assert colour(bpy.data.materials["oak"]) == pytest.approx((0.5, 0.5, 0.5))
+
+
+def test_a_material_of_materialx_with_a_preview_shows_the_preview(tmp_path):
+    import bpy
+
+    path = written(tmp_path / "a.usda", usd(MATERIALX.replace("PREVIEW", PREVIEW)))
+    assert not imported(path)["left_out"]
+    assert colour(bpy.data.materials["oak"]) == pytest.approx((0, 0, 1))

@@ -48,7 +48,7 @@ VERSIONS = {
     # Views of models in softboxes, for the same reason.
     "softboxes": 1,
     # The import of models, if it refuses other models. Views keep their keys.
-    "import": 1,
+    "import": 2,
 }
 
 

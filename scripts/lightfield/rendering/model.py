@@ -97,6 +97,12 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
     blend_file.new_scene()
     left_out += _import(path, settings.up)
+    unread_materials = _unread_materials()
+    left_out += [
+        f"the shader of the material {printable(material.name)}, which is no UsdPreviewSurface, "
+        "but MaterialX or another that Blender does not read"
+        for material in unread_materials
+    ]
     _remove_cameras_and_lamps()
     refuse_outside(path, _textures(path, references), settings.shared_folder)
     files = _read_files(path, references)
@@ -109,6 +115,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
     _pack(path)
+    for material in unread_materials:
+        _paint(material, None)
     _give_material()
     bpy.context.scene.frame_set(settings.frame)
     box = _box(path)
@@ -130,6 +138,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         model_light.add_ground(box)
     _name_caches_from(folder)
     options = settings.model_dump(include={"unit", "up", "ground", "light", "frame"})
+    if unread_materials:
+        # An earlier version left them black.
+        options["grey"] = len(unread_materials)
     names = [(entry["path"], entry["sha256"]) for entry in entries]
     return {
         "fingerprint": model_fingerprint(options, names),
@@ -366,6 +377,11 @@ def _name_caches_from(folder: Path) -> None:
         cache.filepath = bpy.path.relpath(absolute, start=str(folder.absolute()))
 
 
+def _unread_materials() -> list[Any]:
+    """Return the materials whose shader the importer of USD does not read: they have no nodes."""
+    return [material for material in bpy.data.materials if not material.node_tree.nodes]
+
+
 def _give_material() -> None:
     """Give meshes without a material one: of their own colours, or else grey."""
     plain = None
@@ -387,6 +403,12 @@ def _give_material() -> None:
 def _material(name: str, attribute: str | None) -> Any:
     """Return a new matt material, grey or with the colours of an attribute."""
     material = bpy.data.materials.new(name)
+    _paint(material, attribute)
+    return material
+
+
+def _paint(material: Any, attribute: str | None) -> None:
+    """Make a material matt, and grey or of the colours of an attribute."""
     tree = material.node_tree
     tree.nodes.clear()
     shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
@@ -397,7 +419,6 @@ def _material(name: str, attribute: str | None) -> Any:
         colours = tree.nodes.new("ShaderNodeAttribute")
         colours.attribute_name = attribute
         tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
-    return material
 
 
 def _box(path: Path) -> Box:
