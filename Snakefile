@@ -20,10 +20,11 @@ envvars:
 FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
-from lightfield.core.interrupts import interrupt_once
+from lightfield.core.terminal import interrupt_once, print_everywhere
 
 if IS_MAIN_PROCESS:
     interrupt_once()
+    print_everywhere()
 
 from lightfield.configuration.config_file import read_config
 from lightfield.core.disk_space import check_folder

@@ -103,7 +103,7 @@ class Cloud(Disk):
     def __init__(self, root: Path, views: int, store: str, settings: tuple[str, ...] = ()) -> None:
         super().__init__(root, views)
         self.store = store
-        config = json.loads((root / "config.yaml").read_text())
+        config = json.loads((root / "config.yaml").read_text(encoding="utf-8"))
         write_json(root / "config.yaml", config | {"storage": store, "cluster_jobs": 2})
         self.jobs = root.with_name("jobs")
         self.jobs.mkdir()
@@ -152,13 +152,13 @@ class Cloud(Disk):
             cwd=self.root,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
+            encoding="utf-8",
             start_new_session=True,
         )
 
     def running(self) -> list[int]:
         """Return the process groups of the jobs that are running."""
-        groups = [int(path.read_text()) for path in self.jobs.glob("*/pid")]
+        groups = [int(path.read_text(encoding="utf-8")) for path in self.jobs.glob("*/pid")]
         return [group for group in groups if psutil.pid_exists(group)]
 
     def published(self) -> dict[str, str]:
@@ -167,7 +167,7 @@ class Cloud(Disk):
         taken.mkdir()
         command = [sys.executable, ROOT / "scripts/take_dataset.py", "--store", self.store, DATASET]
         subprocess.run(command, cwd=taken, check=True)
-        lines = (taken / DATASET / "sha256sums.txt").read_text().splitlines()
+        lines = (taken / DATASET / "sha256sums.txt").read_text(encoding="utf-8").splitlines()
         return {name: sha256(taken / DATASET / name) for _, _, name in map(split_line, lines)}
 
     def render_counts(self) -> Counter[str]:
@@ -214,7 +214,7 @@ def serve(folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, str]]:
             break
         if server.poll() is not None or time.monotonic() > deadline:
             server.kill()
-            *_, last = log.read_text().splitlines() or ["it said nothing"]
+            *_, last = log.read_text(encoding="utf-8").splitlines() or ["it said nothing"]
             raise UserError(f"the S3 server does not answer: {last}")
         time.sleep(0.5)
     keys = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test"}

@@ -342,7 +342,7 @@ def broken(folder: Path) -> dict[str, str]:
     for suffix in ("glb", "obj", "usda"):
         (folder / f"empty.{suffix}").write_bytes(b"")
         causes[f"empty.{suffix}"] = "empty"
-    (folder / "not_found.glb").write_text("<html><h1>404 Not Found</h1></html>\n")
+    (folder / "not_found.glb").write_text("<html><h1>404 Not Found</h1></html>\n", encoding="utf-8")
     causes["not_found.glb"] = "a page of the web"
     for suffix in ("gltf", "obj", "usda"):
         path = sound(f"texture_missing_{suffix}.{suffix}", TEXTURED)
@@ -357,9 +357,9 @@ def broken(folder: Path) -> dict[str, str]:
     causes["a_stl.glb"] = "an STL named as a GLB"
     (folder / "wrong.glb").unlink()
     (folder / "wrong.stl").unlink()
-    (folder / "no_faces.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\n")
+    (folder / "no_faces.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\n", encoding="utf-8")
     causes["no_faces.obj"] = "has no faces"
-    (folder / "no_size.obj").write_text("v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n")
+    (folder / "no_size.obj").write_text("v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", encoding="utf-8")
     causes["no_size.obj"] = "all its vertices are at one place"
     return causes
 

@@ -185,7 +185,7 @@ def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
     images.write_exr(view, dict.fromkeys("RGB", gray))
     half = folder / "half.exr"
     images.write_exr(half, dict.fromkeys("RGB", gray.astype(np.float16)))
-    (folder / "lightfield.json").write_text(json.dumps(source.to_lightfield()))
+    (folder / "lightfield.json").write_text(json.dumps(source.to_lightfield()), encoding="utf-8")
     results = []
     for name, lens in scenarios(size).items():
         print(f"{name}: {lens.width} × {lens.height}", flush=True)
@@ -299,7 +299,7 @@ def peer_rows(
 def cpu_of(command: Sequence[str]) -> float:
     """Return the CPU time, user and system, of a command that succeeds."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    result = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if result.returncode:
         raise UserError(f"{command[0]}: failed: {result.stderr or result.stdout}")
@@ -413,7 +413,9 @@ def write_batch(folder: Path, size: int, count: int) -> None:
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (np.array([2, 1.5, 3]) / np.abs(rays)).min(axis=-1)
     z = np.where(outside, np.inf, distance * -rays[..., 2]).astype(np.float16)
-    (folder / "lightfield.json").write_text(json.dumps(lens.to_lightfield() | {"depth": "z"}))
+    (folder / "lightfield.json").write_text(
+        json.dumps(lens.to_lightfield() | {"depth": "z"}), encoding="utf-8"
+    )
     for index in range(count):
         channels = {}
         for name, tint in zip("RGB", (0.9, 0.7, 0.5), strict=True):

@@ -196,7 +196,7 @@ def row(label: str, *arguments: str) -> float:
             time.sleep(0.1)
             ended, status, usage = os.wait4(process.pid, os.WNOHANG)
     if status:
-        sys.exit(Path("output.txt").read_text())
+        sys.exit(Path("output.txt").read_text(encoding="utf-8"))
     seconds = os.times().elapsed - began
     print(
         f"| {label} | {seconds:.1f} | {usage.ru_utime + usage.ru_stime:.1f} "
@@ -208,7 +208,7 @@ def row(label: str, *arguments: str) -> float:
 
 def peak_kib(process: int) -> int:
     """Return the peak memory of a process so far, in KiB; 0 once it has ended."""
-    for line in Path(f"/proc/{process}/status").read_text().splitlines():
+    for line in Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1])
     return 0
@@ -270,7 +270,7 @@ def planned_jobs() -> list[dict[str, Any]]:
         [*command, "--logger", "jobs"],
         env=os.environ | {"PYTHONPATH": str(ROOT / "tests")},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     return jobs_on(result.stderr)

@@ -153,7 +153,7 @@ class Build:
             cwd=self.root,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
+            encoding="utf-8",
             start_new_session=True,
             preexec_fn=limit_file_size,
         )
@@ -176,7 +176,9 @@ class Build:
 
     def call(self, *command: str) -> str:
         """Run a program in the build's folder; return what it printed."""
-        result = subprocess.run(command, cwd=self.root, capture_output=True, text=True, check=False)
+        result = subprocess.run(
+            command, cwd=self.root, capture_output=True, encoding="utf-8", check=False
+        )
         return result.stdout
 
     def files(self) -> list[Path]:
@@ -196,7 +198,9 @@ class Build:
     def published(self) -> dict[str, str]:
         """Return the SHA-256 of each published file."""
         digests = {}
-        for line in (self.root / DATASET / "sha256sums.txt").read_text().splitlines():
+        for line in (
+            (self.root / DATASET / "sha256sums.txt").read_text(encoding="utf-8").splitlines()
+        ):
             digest, _, name = line.partition("  ")
             digests[name] = digest
         return digests

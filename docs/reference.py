@@ -551,7 +551,7 @@ def page_of_keys(page: Page, table: Table) -> str:
 def section_of_program(name: str) -> list[str]:
     """Return the lines about one program."""
     file = PROGRAMS / f"{name}.py"
-    text = (ast.get_docstring(ast.parse(file.read_text())) or "").strip()
+    text = (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").strip()
     parser = flags.parser_of(BY_NAME[name], text)
     lines = [f"## {file.name}", ""]
     for paragraph in text.split("\n\n"):

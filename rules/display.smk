@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from lightfield.core.interrupts import was_interrupted
+from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import duration
 from lightfield.planning.cost import Cost, cost
 from lightfield.planning.forecast import Work, forecast, requests_table
@@ -169,7 +169,7 @@ def print_families():
     for job, names in planned_jobs():
         if KINDS[job].stage == "count_members":
             log = Path(log_of(job.format(**names)))
-            print(log.read_text().strip(), file=sys.stderr)
+            print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
 
 
 def dataset_name_of(names):

@@ -14,6 +14,8 @@ OWN_PYTHON = (
 # ended a program into the job's log. Programs get the paths of the rules: see use_copies().
 shell.prefix(
     f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)}; copies={COPIES};{OWN_PYTHON}"
+    # Their messages are read as UTF-8, wherever the user is.
+    " export PYTHONUTF8=1;"
     # numpy would start a thread for each core, also in jobs that have one core.
     " export OPENBLAS_NUM_THREADS=1;"
     # A signal to the whole group must not end the shell first.

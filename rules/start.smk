@@ -45,7 +45,9 @@ def check_device():
     renders = any(job in RENDERING for job in jobs)
     if renders and RUNS_HERE and (GPUS or device == "gpu"):
         command = [sys.executable, FOLDER / "scripts/check_device.py", device]
-        checked = subprocess.run(command, capture_output=True, text=True)
+        checked = subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace"
+        )
         if checked.returncode:
             lines = checked.stderr.strip().splitlines() or ["it said nothing"]
             raise UserError(lines[-1].removeprefix("error: "))
@@ -56,7 +58,9 @@ def check_slurm():
     if not DISPLAY.uses_slurm:
         return
     try:
-        asked_slurm = subprocess.run(["sinfo"], capture_output=True, text=True)
+        asked_slurm = subprocess.run(
+            ["sinfo"], capture_output=True, encoding="utf-8", errors="replace"
+        )
     except OSError:
         problem = "there is no command sinfo"
     else:

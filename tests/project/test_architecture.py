@@ -1,6 +1,7 @@
 """The packages are those of docs/explanation/architecture.md, and import only those above them."""
 
 import ast
+import itertools
 import re
 import subprocess
 import sys
@@ -62,6 +63,36 @@ def test_no_files_import_each_other_in_a_circle():
         for name in free:
             del arrows[name]
     assert not arrows
+
+
+def without_encoding(file):
+    """Yield the calls of a file whose text has the encoding of the user's locale."""
+    for call in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(call, ast.Call) and isinstance(call.func, (ast.Attribute, ast.Name)):
+            name = ast.unparse(call.func).rpartition(".")[2]
+            keywords = {keyword.arg for keyword in call.keywords}
+            texts = [n.value for n in ast.walk(call) if isinstance(n, ast.Constant)]
+            is_text = {
+                "read_text": not call.args,
+                "write_text": len(call.args) == 1,
+                "open": any(re.fullmatch(r"[rwax]\+?", str(text)) for text in texts),
+            }.get(name, "text" in keywords)
+            is_other = ast.unparse(call.func) in OTHER_CALLS
+            if is_text and not is_other and "encoding" not in keywords:
+                yield f"{file}:{call.lineno}: {ast.unparse(call)}"
+
+
+# Functions with the names of those that read and write text.
+OTHER_CALLS = ("model(source, settings.points).write_text", "tarfile.open", "write_text")
+
+
+def test_code_names_the_encoding_of_each_text():
+    folders = ("scripts", "benchmarks", "docs", "envs")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    assert [*itertools.chain(*map(without_encoding, files))] == []
+    for path in (ROOT / "rules").glob("*.smk"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"\.(read|write)_text\((?!encoding)|text=True", text), path
 
 
 def test_reading_the_rules_imports_nothing_heavy():

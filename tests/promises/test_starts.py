@@ -1,5 +1,6 @@
 """Runs that cannot start, or are stopped: each ends with one line that says what is wrong."""
 
+import json
 import os
 import signal
 import subprocess
@@ -70,6 +71,29 @@ def test_other_scenes_need_no_smoke_scene(tmp_path):
     assert planned(folder, *CHOSEN)["lightfield"] == 1
     said = last_line(snakemake(folder, "--dry-run", "smoke"))
     assert said.startswith("error: config.yaml: scenes: there is no scene 'smoke'")
+
+
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+def test_a_locale_without_utf8_changes_no_letter(tmp_path):
+    scene = f"description: Café\n{SCENE}"
+    folder = checkout(tmp_path / "plenoforge")
+    (folder / "configs/scenes/tiny.yaml").write_text(scene, encoding="utf-8")
+    command = [Path(sys.executable).with_name("snakemake"), "--cores", "1", "-n", *CHOSEN]
+    run = subprocess.run(
+        command, cwd=folder, env=os.environ | ASCII, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    settings = json.loads((folder / "work/tiny/LFPlane/settings/page.json").read_bytes())
+    assert settings["yaml"] == scene
+
+
+def test_a_locale_without_utf8_shows_every_help():
+    command = [sys.executable, ROOT / "scripts/reproject.py", "--help"]
+    run = subprocess.run(command, env=os.environ | ASCII, capture_output=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert b"--settings" in run.stdout
 
 
 @pytest.mark.parametrize("times", [1, 2])

@@ -90,7 +90,9 @@ def _builder_folders(builder: str) -> list[str]:
     folders = ["library", builder]
     for folder in folders:
         for file in _sources(folder):
-            imported = re.findall(r"^from scenes\.(\w+)", file.read_text(), re.MULTILINE)
+            imported = re.findall(
+                r"^from scenes\.(\w+)", file.read_text(encoding="utf-8"), re.MULTILINE
+            )
             folders += [name for name in dict.fromkeys(imported) if name not in folders]
     return folders
 

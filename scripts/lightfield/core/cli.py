@@ -11,6 +11,7 @@ from pathlib import Path
 from lightfield.core.disk_space import REMEDIES, write_problem
 from lightfield.core.errors import LESS_MEMORY, UserError
 from lightfield.core.files import read_problem
+from lightfield.core.terminal import print_everywhere
 
 # Imports make many objects that are never garbage. Searching them takes a tenth of the time of
 # --help. So Python rarely collects garbage from here on, and never at its exit.
@@ -24,6 +25,7 @@ def run(main: Callable[[], None]) -> None:
     Do the same if memory runs out, or if the system refuses access to a file or folder.
     """
     sys.argv[1:] = map(_as_value, sys.argv[1:])
+    print_everywhere()
     guarded(main)
 
 

@@ -43,7 +43,9 @@ def _nvidia() -> list[str]:
     """Return the UUIDs of NVIDIA's GPUs, as their driver lists them."""
     try:
         command = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
-        output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+        output = subprocess.run(
+            command, capture_output=True, encoding="utf-8", check=True, timeout=30
+        )
     except (OSError, subprocess.SubprocessError):
         return []
     return [line for line in output.stdout.split() if line.startswith("GPU-")]
@@ -51,7 +53,7 @@ def _nvidia() -> list[str]:
 
 def _amd() -> list[str]:
     """Return the numbers of AMD's GPUs. The driver also lists processors, whose id is 0."""
-    ids = [path.read_text().strip() for path in _KFD.glob("*/gpu_id")]
+    ids = [path.read_text(encoding="utf-8").strip() for path in _KFD.glob("*/gpu_id")]
     gpu_count = len([name for name in ids if name != "0"])
     return [str(number) for number in range(gpu_count)]
 

@@ -12,7 +12,7 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
-from lightfield.core.interrupts import report_interrupts
+from lightfield.core.terminal import report_interrupts
 
 _SCRIPTS = Path(__file__).resolve().parents[2]
 _PROGRAM_FOLDERS = {_SCRIPTS, _SCRIPTS.parent / "benchmarks"}

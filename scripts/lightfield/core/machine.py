@@ -37,6 +37,6 @@ def _first_processor(cpuinfo: Path) -> dict[str, str]:
     """Return the keys and values of the first processor in /proc/cpuinfo."""
     if not cpuinfo.exists():
         return {}
-    first, _, _ = cpuinfo.read_text().partition("\n\n")
+    first, _, _ = cpuinfo.read_text(encoding="utf-8").partition("\n\n")
     pairs = (line.partition(":") for line in first.splitlines())
     return {name.strip(): value.strip() for name, _, value in pairs}

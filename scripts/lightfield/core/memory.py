@@ -18,7 +18,7 @@ def available() -> int:
     """
     limits: list[int] = [psutil.virtual_memory().total]
     for file in _limit_files():
-        text = file.read_text().strip()
+        text = file.read_text(encoding="utf-8").strip()
         if text.isdecimal():
             limits.append(int(text))
     return min(limits)
@@ -27,7 +27,7 @@ def available() -> int:
 def _limit_files() -> list[Path]:
     """Return the files that may hold a limit, of control groups in version 1 and 2."""
     files = []
-    for line in OWN_GROUPS.read_text().splitlines() if OWN_GROUPS.exists() else ():
+    for line in OWN_GROUPS.read_text(encoding="utf-8").splitlines() if OWN_GROUPS.exists() else ():
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             name = "memory.limit_in_bytes" if controllers else "memory.max"
@@ -43,7 +43,7 @@ def peak() -> int:
     Reads /proc: getrusage also counts the process that started this one.
     """
     try:
-        for line in Path("/proc/self/status").read_text().splitlines():
+        for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     except OSError:

@@ -12,7 +12,7 @@ def quiet() -> Iterator[None]:
     """Discard what Blender itself prints to standard output."""
     sys.stdout.flush()
     saved = os.dup(1)
-    with Path(os.devnull).open("w") as nothing:
+    with Path(os.devnull).open("wb") as nothing:
         os.dup2(nothing.fileno(), 1)
         try:
             yield

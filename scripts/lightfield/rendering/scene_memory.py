@@ -59,7 +59,7 @@ def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str,
         result = subprocess.run(
             [sys.executable, PROGRAM, *command],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         if result.returncode < 0:

@@ -253,7 +253,7 @@ def _page(build: Build, dataset: Dataset) -> PageSettings:
     ]
     return PageSettings.of(
         rig=dataset.placed_rig,
-        yaml=scene_path(dataset.scene_name).read_text(),
+        yaml=scene_path(dataset.scene_name).read_text(encoding="utf-8"),
         command=_rebuilding(dataset),
         panorama=bool(dataset.panorama),
         measurements=measured,

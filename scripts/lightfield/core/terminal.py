@@ -1,5 +1,6 @@
-"""Ends a process after Ctrl-C with one line."""
+"""What a terminal shows after Ctrl-C, and of letters that its encoding lacks."""
 
+import io
 import signal
 import sys
 import time
@@ -9,6 +10,13 @@ from types import FrameType, TracebackType
 _PATIENCE = 10.0
 # When Ctrl-C last interrupted this process. None without one.
 _interrupted: float | None = None
+
+
+def print_everywhere() -> None:
+    """Print a letter that the terminal's encoding lacks as its code, in place of an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.encoding.lower() != "utf-8":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def report_interrupts() -> None:
