@@ -13,7 +13,7 @@ from pathlib import Path
 from lightfield.core import bundles
 from lightfield.core.errors import UserError
 from lightfield.core.files import set_aside, unreadable, write_text
-from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX
+from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX, name_of
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import run_lock
@@ -215,13 +215,39 @@ def scene_folders():
     return [Path(RECEIPTS, scene) for scene in sorted(scenes)]
 
 
+def check_folders():
+    """Raise `UserError` if the receipts are of files in other folders than the chosen ones."""
+    chosen = tuple(f"{name_of(folder)}/" for folder in (RESULTS, WORK))
+    for receipt, verdict in CHECK.verdicts.items():
+        if verdict.example and not verdict.example.startswith(chosen):
+            raise UserError(
+                f"results: is {RESULTS}, and work is {WORK}, but {receipt} is the receipt of "
+                f"{verdict.example}: after a move, leave a link in the old place, and keep the key; "
+                "a second build needs a folder work of its own"
+            )
+
+
 def announce_changes():
     """Say which files this run makes again, and why. Another run may be replacing them now."""
     if any(map(run_lock.is_held, scene_folders())):
         return
-    for verdict in CHECK.verdicts.values():
+    with contextlib.suppress(UserError):
+        check_folders()
+        announce_outdated()
+
+
+def announce_outdated():
+    """Say which files are made again because they are damaged or outdated."""
+    for receipt, verdict in CHECK.verdicts.items():
         for path in verdict.damaged:
             print(f"{path}: {damage_of(path)}; it is made anew", file=sys.stderr)
+            if is_of_another_build(path, receipt):
+                print(
+                    f"note: {path} is newer than its receipt: if runs with another folder work "
+                    "make this dataset, too, each run makes the other's files again: give each "
+                    "folder work a folder results",
+                    file=sys.stderr,
+                )
     outdated = {
         receipt: verdict.outdated
         for receipt, verdict in CHECK.verdicts.items()
@@ -232,6 +258,15 @@ def announce_changes():
         print(f"outdated: {job_of(receipt)}: {changes}", file=sys.stderr)
     if len(outdated) > MOST_REASONS:
         print(f"outdated: and {len(outdated) - MOST_REASONS} more", file=sys.stderr)
+
+
+def is_of_another_build(path, receipt):
+    """Return whether another build seems to have written a file with what a dataset has cost.
+
+    These files are never equal in two builds.
+    """
+    is_of_costs = Path(path).name == Path(PATHS.costs).name and os.path.isfile(path)
+    return is_of_costs and os.path.getmtime(path) > os.path.getmtime(receipt)
 
 
 def damage_of(path):

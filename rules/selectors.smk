@@ -45,6 +45,10 @@ def status_arguments(wildcards):
     for dataset in CHOSEN_DATASETS:
         reprojections = ",".join(dataset.reprojections)
         arguments += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
+        if not STORE and CHECK.will_run(
+            f"{RECEIPTS}/{dataset.name}/lightfield{SUFFIX}"
+        ):
+            arguments += ["--outdated", dataset.name]
     for folder, batches in BUILD.batches.items():
         members = sum(map(len, batches.values()))
         arguments += ["--family", folder, str(members)]

@@ -140,6 +140,7 @@ def end_unless_writable(folder):
 def check_start():
     """Raise `UserError` for a run that cannot work, before the first job."""
     DISPLAY.at_close(explain_full_disk)
+    check_folders()
     check_slurm()
     check_device()
     check_memory()
@@ -161,7 +162,7 @@ def check_input(job, names):
 
 def announce_refusals():
     """Print in a dry run what the real run would refuse."""
-    checks = [check_device, check_memory, check_disk_space]
+    checks = [check_folders, check_device, check_memory, check_disk_space]
     checks += [functools.partial(check_input, *planned) for planned in planned_jobs()]
     problems = {}
     for check in checks:

@@ -90,6 +90,14 @@ def test_views_of_other_settings_are_not_counted(dataset):
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
 
 
+def test_views_of_an_outdated_scene_are_not_counted(dataset):
+    dataset.render("a", "b")
+    assert "rendered: 2 of 4" in dataset()[1]
+    outdated = dataset(("--outdated", "scene/rig"))
+    assert "rendered: 0 of 4" in outdated[1]
+    assert "  outdated: 2 views of an earlier scene, or of earlier settings" in outdated
+
+
 def test_a_view_counts_while_its_file_is_as_its_receipt_says(dataset):
     dataset.render("a", "b")
     dataset.seal("render/0-4")

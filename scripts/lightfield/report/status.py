@@ -1,7 +1,8 @@
 """Tells the progress of a dataset from the receipts of its shards, also during a build.
 
 A rendered view counts if a receipt has it with the key of the settings in lightfield.json, and if
-its file is as the job left it. A reprojected view counts if it is also no older than its source.
+its file is as the job left it. A reprojected view counts if it is also no older than its source. No
+view counts if lightfield.json itself is outdated: only the workflow can tell.
 """
 
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from lightfield.configuration import keys
 from lightfield.configuration.family import RECORD
-from lightfield.core import receipts
+from lightfield.core import receipts, units
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
 from lightfield.core.receipts import FOLDER, Output
@@ -46,6 +47,8 @@ def _show_datasets(job: Status) -> None:
         folder = job.results / name
         shards = job.work / FOLDER / name
         rendering = look(folder, shards, now)
+        if name in job.outdated:
+            rendering.outdated, rendering.finished = len(rendering.finished), {}
         reprojections = reprojection_list.split(",") if reprojection_list else []
         print("\n".join(lines(name, folder, shards, views, reprojections, rendering)))
         renderings.append(rendering)
@@ -73,11 +76,14 @@ class RenderProgress:
     """The rendering of one dataset.
 
     - ``finished``: when each rendered view was made, in nanoseconds since 1970, by its name.
+    - ``outdated``: the number of views of an earlier scene, or of earlier settings. They do not
+      count as finished, but the next run may keep some of them.
     - ``recent``: the number of views finished in the last ``seconds``, at most `WINDOW`.
     - ``running``, ``silent``, ``killed``: the shards by the state of their processes.
     """
 
     finished: dict[str, int] = field(default_factory=dict)
+    outdated: int = 0
     recent: int = 0
     seconds: float = 0.0
     running: list[str] = field(default_factory=list)
@@ -171,6 +177,9 @@ def lines(
         reprojected = _reprojected(shards / reprojection, folder / reprojection, rendering)
         parts.append(f"  {reprojection}: {reprojected} of {count}")
     parts.append(f"  validated: {_validated(folder, count, rendering)}")
+    if rendering.outdated:
+        views = units.count(rendering.outdated, "view")
+        parts.append(f"  outdated: {views} of an earlier scene, or of earlier settings")
     for title, names in (
         ("shards at work", rendering.running),
         ("shards killed, the next run goes on with them", rendering.killed),

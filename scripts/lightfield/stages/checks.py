@@ -134,6 +134,11 @@ class Status(PlainStage):
         [],
         metavar=("NAME", "VIEWS", "REPROJECTIONS"),
     )
+    outdated: list[str] = option(
+        "a dataset whose scene or settings have changed since its cameras were placed: scene/rig",
+        [],
+        metavar="NAME",
+    )
     family: list[tuple[str, AtLeastOne]] = option(
         "a family: its folder, and its number of members", [], metavar=("NAME", "MEMBERS")
     )

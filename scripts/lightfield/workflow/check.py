@@ -28,12 +28,14 @@ NAME = "sums.json"
 class Verdict:
     """What the check found out about a job. A job without a reason to run is fine.
 
-    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files.
+    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files. ``example`` is
+    one of the files that the job made.
     """
 
     has_receipt: bool = True
     outdated: list[str] = field(default_factory=list)
     damaged: list[str] = field(default_factory=list)
+    example: str | None = None
 
     @property
     def is_fine(self) -> bool:
@@ -147,7 +149,7 @@ class JobCheck:
                 if self.sums.of(name) != output.stamp.sha256:
                     damaged.append(name)
         self._oldest[path] = oldest
-        return Verdict(True, outdated, damaged)
+        return Verdict(True, outdated, damaged, next(iter(receipt.outputs), None))
 
     def _changed_settings(self, receipt: Receipt, settings: Mapping[str, Any]) -> Iterator[str]:
         """Yield the settings that are not as the receipt says, and the version of the stage."""
