@@ -18,7 +18,7 @@ from lightfield.formats.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency, light_sums, reprojected
+from lightfield.validation import clipping, consistency, light_sums, reprojected
 from lightfield.validation.cameras import camera_of
 from lightfield.validation.consistency import Answer, Patches
 from lightfield.validation.result import Check
@@ -58,6 +58,7 @@ class Facts:
     - ``constant``: whether the view has one colour and one alpha, as sky or a wall may.
     - ``black``: whether this colour is black.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
+    - ``light``: how many pixels have which light, if the view is an EXR file: see `clipping`.
     - ``patches``: the surface patches that `geometry` compares, if the view has depth.
     - ``sum_error``: by which part of the colour the sum of the light groups differs from it.
     - ``not_summed``: why the light groups need not add up to the colour.
@@ -75,6 +76,7 @@ class Facts:
     constant: bool = False
     black: bool = False
     missed: float = 0.0
+    light: clipping.Counts | None = None
     patches: Patches | None = None
     sum_error: float | None = None
     not_summed: str | None = None
@@ -199,6 +201,8 @@ class Examiner:
         facts.fault("colour", f"{nan} values are not a number", nan)
         infinite = int(np.isinf(colour).sum())
         facts.fault("colour", f"{infinite} values are infinite", infinite)
+        if file.path.endswith(".exr"):
+            facts.light = clipping.count(colour, image.channels.get("A"), in_circle)
         shows_nothing = transparent and _shows_nothing(image, in_circle, is_rendered)
         # A light may be off, or reach nothing that the view shows.
         if not shows_nothing and not image_set.lightfield.is_relit:

@@ -28,7 +28,7 @@ from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import File, ImageSet
 from lightfield.formats.lightfield import MACHINE, LightField
-from lightfield.validation import files, geometry, pixels, splits_check
+from lightfield.validation import clipping, files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
@@ -74,6 +74,7 @@ def validate(
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
     checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
+    checks += _clipping_checks(dataset, sets, facts, export_lists)
     digests, files_checks = _check_files(dataset, sets, facts, export_files, made or {})
     if len(sets) <= len(reprojections):
         files_checks[0] = _UNLISTED
@@ -92,6 +93,21 @@ _Sums = dict[str, tuple[int, str]]
 
 # Stands for the check of the files while a lightfield.json cannot be read.
 _UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+
+
+def _clipping_checks(
+    dataset: Path,
+    sets: Sequence[ImageSet],
+    facts: Mapping[File, Facts],
+    export_lists: Collection[Path] | None,
+) -> list[Check]:
+    """Return a check of the pictures in which light is lost, if there are any."""
+    lights: dict[int, clipping.Counts] = {}
+    for file, fact in facts.items():
+        if fact.light is not None:
+            lights[file.set] = lights.get(file.set, 0) + fact.light
+    sets_of_png = {file.set for file in facts if file.is_view and file.path.endswith(".png")}
+    return clipping.checks(dataset, sets, lights, sets_of_png, export_lists)
 
 
 def _sensor_checks(dataset: Path, sets: Sequence[ImageSet]) -> list[Check]:

@@ -12,7 +12,7 @@ from lightfield.core.receipts import made_in
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
-from lightfield.validation import sequence
+from lightfield.validation import clipping, sequence
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import Result
 from lightfield.validation.validate import validate
@@ -82,5 +82,9 @@ def _check_paths(job: Validate | ValidateSequence, folder: Path) -> None:
 
 def _print(result: Result) -> None:
     print(result.summary())
+    # The terminal shows lines with this word. No picture of the page shows what is lost.
+    for check in result.checks:
+        for warning in check.warnings if check.name == clipping.NAME else ():
+            print(f"warning: {warning}", file=sys.stderr)
     for line in result.failures():
         print(line, file=sys.stderr)
