@@ -78,9 +78,10 @@ def reads(job, stage=None, are_noted=False, **inputs):
         is_fine = CHECK.verdict(receipt, content, noted).is_fine
         if not is_fine:
             # Snakemake would name read-only files in many lines, or end with a traceback.
-            part = os.path.dirname(receipt.removeprefix(f"{RECEIPTS}/"))
-            for root in (RESULTS, WORK):
-                end_unless_writable(os.path.join(root, part))
+            name = job_of(receipt)
+            made = (f"{RESULTS}/{name}", f"{WORK}/{name}", log_of(name), times_of(name))
+            for path in (*made, receipt):
+                end_unless_writable(os.path.dirname(path))
         if not os.path.exists(MARK):
             new_mark()
         files = {name: unless_newer(receipt, each) for name, each in files.items()}

@@ -41,6 +41,17 @@ def test_snakemakes_folder_that_is_none_is_named(kind, tmp_path):
     assert said.startswith("error: .snakemake: cannot be written: ") and f"{notes} {kind}" in said
 
 
+@pytest.mark.parametrize(
+    "name", ["results/tiny", "work/tiny", "work/logs", "work/benchmarks/tiny", "work/receipts"]
+)
+def test_a_file_in_place_of_a_folder_is_named(name, tmp_path):
+    folder = checkout(tmp_path, tiny=SCENE)
+    (folder / name).parent.mkdir(parents=True)
+    (folder / name).touch()
+    said = last_line(snakemake(folder, *CHOSEN))
+    assert said.startswith("error: ") and f"{folder / name} is a file, and must be" in said
+
+
 def test_a_home_that_takes_no_files_is_named(tmp_path):
     folder = checkout(tmp_path / "plenoforge", tiny=SCENE)
     home = tmp_path / "home"
