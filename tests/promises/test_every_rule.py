@@ -133,7 +133,7 @@ from pathlib import Path
 sys.path.insert(0, "scripts")
 from lightfield.core.files import write_json
 from lightfield.core.flags import parsed
-from lightfield.core.receipts import input_sum, is_receipt, note_inputs
+from lightfield.core.receipts import input_sum, is_receipt, note_inputs, note_shared_inputs
 from lightfield.core.stage import Stage
 from lightfield.stages.registry import BY_NAME
 
@@ -149,6 +149,9 @@ def write(job=None):
     if job and job.name == "import_model":
         # A model is only in the settings. Its program notes it with the files that it names.
         note_inputs([Path(job.settings.model)])
+    if job and job.name == "report_index":
+        # It finds the pages itself.
+        note_shared_inputs(work["input"])
     outputs = [Path(name) for name in work["output"] if not is_receipt(name)]
     if job and not outputs:
         # A shard declares its receipt, and writes files into a folder.
