@@ -12,8 +12,11 @@ from conftest import SMALL_WALK
 from PIL import Image
 from sphere import RADIUS, colour_of, look
 
+from lightfield import export
+from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import FLOW, PASSES
 from lightfield.geometry import lenses, overview, rigs
@@ -90,6 +93,26 @@ def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
     )
     ReportHtml(settings=settings, dataset=folder, dataset_name=name, output=output).run()
     return output
+
+
+def test_the_list_of_files_names_the_exports(tmp_path):
+    lightfield = write_dataset(tmp_path, LINE)
+    lightfield.write(tmp_path / "again" / "lightfield.json")
+    for name, source, options in (
+        ("hci", "", {"disparity": "exr"}),
+        ("poses_csv", "again", {}),
+    ):
+        settings = settings_of(name)(sources=[source or "views"], **options)
+        folder = tmp_path / source / "exports" / name
+        export.run(name, SourceDataset(tmp_path, source, ".exr"), settings, folder)
+    write_json(tmp_path / "mesh" / "export.json", {})
+    listed = dict(dataset_page.files(tmp_path, lightfield, valid=True))
+    assert "HCI" in listed["exports/hci/"]
+    assert "poses" in listed["again/exports/poses_csv/"]
+    assert "mesh/" in listed
+    # Each place is there.
+    places = [place for place in listed if not place.endswith("…") and place != "sha256sums.txt"]
+    assert [place for place in places if not (tmp_path / place).exists()] == ["validation.json"]
 
 
 def draw(folder, rig, output, panorama=None):

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.exports import Exports
 from lightfield.core import units
 from lightfield.core.files import absolute_path
-from lightfield.core.names import SPLITS
+from lightfield.core.names import MESH, SPLITS
 from lightfield.export import transforms
 from lightfield.formats import blend
+from lightfield.formats.export_lists import FOLDER, MANIFEST
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import IMAGES, REPORT, SUMS
 from lightfield.formats.lightfield import NAME, LightField
@@ -234,6 +236,17 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
         yield path.parent.name, title, count, len(shown), sheet
 
 
+def _exported_files(folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield the folder of each export of a dataset, and of its surface, with what it holds."""
+    for pattern in (f"{FOLDER}/*/{MANIFEST}", f"*/{FOLDER}/*/{MANIFEST}"):
+        for path in sorted(folder.glob(pattern)):
+            place = path.parent
+            meaning = str(Exports.model_fields[place.name].description).removesuffix(".")
+            yield f"{place.relative_to(folder)}/", f"export: {meaning}"
+    if (folder / MESH / MANIFEST).is_file():
+        yield f"{MESH}/", "the surface that the cameras can see, as meshes"
+
+
 def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, str]]:
     """Return the dataset's files, and what each holds. Only a valid dataset has checksums."""
     depth = {
@@ -260,6 +273,7 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         change = "under other lights" if reprojected.is_relit else "through another lens"
         meaning = f"the same views {change}: {reprojected.lens.description}"
         meanings.append((f"{reprojection.parent.name}/", meaning))
+    meanings += _exported_files(folder)
     meanings.append(("validation.json", "the checks and their results"))
     if valid:
         meanings.append((SUMS, f"checksums of all files: sha256sum -c {SUMS}"))
