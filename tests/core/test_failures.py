@@ -1,6 +1,11 @@
 """The messages of failures: their cause, and what the user can do, in one line."""
 
+import signal
+import subprocess
+import sys
+
 import pytest
+from conftest import SCRIPTS
 
 from lightfield.core import files
 from lightfield.core.cli import run
@@ -22,6 +27,35 @@ def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
     assert cause(log) == "error: no such scene"
     log.write_bytes(b"tar: a: Cannot open: \xff\ntar: Exiting with failure status due to\n")
     assert cause(log) == "tar: a: Cannot open: �"
+
+
+def test_a_crash_of_blender_names_the_file_that_it_was_reading(tmp_path):
+    log = tmp_path / "log"
+    crash = "terminate called\n  what():  too long\nerror: killed by SIGABRT\n"
+    log.write_text(f"Blender reads chair.ply\n{crash}")
+    said = cause(log)
+    assert said.startswith("error: chair.ply: killed by SIGABRT: too long: Blender crashed")
+    log.write_text(f"Blender reads chair.ply\nBlender has read chair.ply\n{crash}")
+    assert "chair.ply" not in cause(log)
+
+
+@pytest.mark.slow
+def test_the_file_is_in_the_log_before_blender_crashes(tmp_path):
+    """A line of a text that is longer than 64 kB crashes Blender 5.2."""
+    path = tmp_path / "a.ply"
+    corners = 20000
+    head = f"ply\nformat ascii 1.0\nelement vertex {corners}\n"
+    head += "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+    head += "property list int int vertex_indices\nend_header\n"
+    places = "".join(f"{n} 0 0\n" for n in range(corners))
+    path.write_text(f"{head}{places}{corners} {' '.join(map(str, range(corners)))}\n")
+    program = [sys.executable, SCRIPTS / "import_model.py", "--model", path]
+    program += ["--output", tmp_path / "a.blend", "--record", tmp_path / "a.json"]
+    result = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert result.returncode == -signal.SIGABRT
+    log = tmp_path / "log"
+    log.write_text(f"{result.stdout}{result.stderr}error: killed by SIGABRT\n")
+    assert cause(log).startswith(f"error: {path}: killed by SIGABRT: PLY text line did not fit")
 
 
 @pytest.mark.parametrize(

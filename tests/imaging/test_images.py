@@ -1,5 +1,7 @@
 """Images in and out, compared with OpenImageIO, Blender and the files' own bytes."""
 
+import struct
+import zlib
 from pathlib import Path
 
 import bpy
@@ -50,6 +52,17 @@ def test_a_picture_that_ends_too_soon_is_not_finished(tmp_path, suffix):
     for size in (0, len(content) // 2, len(content) * 9 // 10):
         path.write_bytes(content[:size])
         assert not is_readable(path)
+
+
+def test_a_picture_that_would_fill_the_memory_is_refused_by_its_header(tmp_path):
+    path = tmp_path / "a.png"
+    oiio.ImageBuf(np.zeros((8, 8, 3), np.uint8)).write(str(path))
+    content = bytearray(path.read_bytes())
+    content[16:24] = struct.pack(">2I", 60000, 60000)
+    content[29:33] = struct.pack(">I", zlib.crc32(content[12:29]))
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=rf"^{path}: has 60000 × 60000 pixels"):
+        is_readable(path)
 
 
 def test_a_picture_with_only_a_decoders_warning_is_finished(tmp_path):

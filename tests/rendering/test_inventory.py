@@ -1,6 +1,7 @@
 """What a scene contains, what pruning leaves out, and that this changes no pixel."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -271,6 +272,53 @@ def test_the_library_of_packed_objects_is_not_read(run_program, tmp_path):
     arguments = ("--blend", tmp_path / "also_linked.blend", "--output", output)
     result = run_program("inventory.py", *arguments, check=False)
     assert f"the library library.blend at {tmp_path}/library.blend (missing)" in result.stderr
+
+
+SPECIAL = """
+import sys
+import bpy
+
+blend, sources, kind, path = sys.argv[1:]
+sys.path.insert(0, sources)
+from scenes import room
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+room.build({})
+if kind == "geometry":
+    tree = bpy.data.node_groups.new("part", "GeometryNodeTree")
+    tree.nodes.new("GeometryNodeImportSTL").inputs[0].default_value = path
+    bpy.data.objects["cone"].modifiers.new("part", "NODES").node_group = tree
+else:
+    tree = bpy.data.materials["cone"].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = bpy.data.images.new("part", 4, 4)
+    texture.image.source, texture.image.filepath_raw = "FILE", path
+    tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+bpy.ops.wm.save_as_mainfile(filepath=blend)
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "path", "problem"),
+    [
+        ("geometry", "FOLDER/fifo", "the geometry part is at FOLDER/fifo, which is a FIFO"),
+        ("texture", "FOLDER/fifo", "the texture part is at FOLDER/fifo, which is a FIFO"),
+        ("texture", "/dev/zero", "dev/zero, which is a device"),
+        # All files of the disk lie below it.
+        ("texture", "/", "the texture part at / (is a folder)"),
+    ],
+)
+def test_no_texture_or_geometry_is_read_without_end(run_program, tmp_path, kind, path, problem):
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "make.py").write_text(SPECIAL)
+    blend = tmp_path / "a.blend"
+    sources = Path(pruning.__file__).parents[2]
+    path = path.replace("FOLDER", str(tmp_path))
+    run_program(tmp_path / "make.py", blend, sources, kind, path)
+    arguments = ("--blend", blend, "--output", tmp_path / "inventory.json")
+    result = run_program("inventory.py", *arguments, check=False)
+    assert result.returncode == 1
+    assert problem.replace("FOLDER", str(tmp_path)) in result.stderr.splitlines()[-1]
 
 
 MINIMAL = """

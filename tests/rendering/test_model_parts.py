@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import os
+import re
 import struct
 import subprocess
 import zipfile
@@ -152,6 +153,34 @@ def at(folder, *files):
         if isinstance(content, str):
             content = content.replace("ABSOLUTE", str(folder))
         written(folder / name, content)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.gltf", gltf("place")),
+        ("a.gltf", gltf(image="place")),
+        ("a.usda", usd(TEXTURED.replace("NAME", "./place.png"))),
+        ("a.obj", f"mtllib place\n{OBJ}"),
+        ("a.obj", f"mtllib a.mtl\n{OBJ}"),
+    ],
+)
+def test_no_importer_opens_a_fifo(tmp_path, name, content):
+    """To open one waits for ever."""
+    written(tmp_path / "a.mtl", f"{MTL}map_Kd -o 1 0 0 place\n")
+    for place in ("place", "place.png"):
+        os.mkfifo(tmp_path / place)
+    model = written(tmp_path / name, content)
+    for allow_missing in (False, True):
+        message = refusal(model, allow_missing=allow_missing)
+        assert re.search(r"names \S*place(\.png)?, which is a FIFO", message)
+
+
+@pytest.mark.parametrize("suffix", ["glb", "gltf", "obj", "ply", "stl", "usda", "usdz"])
+def test_no_importer_opens_a_model_that_is_a_fifo(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    os.mkfifo(path)
+    assert "it is a FIFO, not a file" in refusal(path)
 
 
 # Models in `own` that name a file outside: the files, what names it, and what it shows.

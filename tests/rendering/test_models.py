@@ -246,6 +246,24 @@ def test_a_ply_may_have_the_line_ends_of_windows(tmp_path, kind):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("change", [(" ", "\t"), (" ", "   "), ("\n", " \n")])
+def test_a_plys_header_may_have_tabs_and_more_blanks(tmp_path, change):
+    head = (HEAD + FACE).removeprefix("ply\n").replace(*change)
+    text = f"ply\n{head}" + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    box = imported(written(tmp_path / "a.ply", text))["box"]
+    np.testing.assert_allclose(box, [[-0.5, -0.5, 0], [0.5, 0.5, 0]], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_ply_whose_faces_repeat_corners_is_imported_without_them(tmp_path):
+    head = (HEAD + FACE).replace("face 1", "face 4")
+    faces = "3 0 1 2\n3 0 0 1\n3 0 1 2\n3 1 1 1\n"
+    record = imported(written(tmp_path / "a.ply", f"{head}0 0 0\n1 0 0\n0 1 0\n{faces}"))
+    assert record["left_out"] == ["3 of 4 faces, which repeat a corner or another face"]
+    np.testing.assert_allclose(record["box"], [[-0.5, -0.5, 0], [0.5, 0.5, 0]], atol=1e-5)
+
+
+@pytest.mark.slow
 def test_several_solids_of_an_stl_are_one_model(tmp_path):
     second = STL.replace("solid a", "solid b").replace("0 1 0", "0 4 0")
     box = imported(written(tmp_path / "a.stl", STL + second))["box"]
@@ -371,7 +389,8 @@ BROKEN = [
     ("a.obj", "mtllib gone.mtl\n" + TRIANGLE, "gone.mtl"),
     ("a.obj", b"mtllib \xe4.mtl\n" + TRIANGLE.encode(), "missing"),
     ("a.ply", HEAD + "end_header\n0 0 0\n1 0 0\n0 1 0\n", "has no faces"),
-    ("a.ply", HEAD + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", "1 faces, of which"),
+    ("a.ply", HEAD + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", "corners that do not exist"),
+    ("a.ply", HEAD + f"comment {'x' * 70000}\n" + FACE, "line 7 of its header"),
     ("a.usda", NOT_A_NUMBER, "not numbers"),
     ("a.stl", STL + STL.replace("solid a", "solid b")[:-20], "cut short"),
     ("a.gltf", UNREAD_TEXTURE, "does not read"),

@@ -10,11 +10,44 @@ import stat
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.disk_space import write_problem
 from lightfield.core.errors import UserError
+
+_SPECIAL_KINDS = {
+    stat.S_IFIFO: "a FIFO",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def special_kind(path: Path | str) -> str | None:
+    """Return what a path is that is neither a file nor a folder. None for all other paths.
+
+    Nobody may open such a path: a FIFO waits for a writer, and a device may have no end.
+    """
+    try:
+        mode = os.stat(path).st_mode  # noqa: PTH116, a `Path` is slow for many files
+    except (OSError, ValueError):
+        return None
+    return _SPECIAL_KINDS.get(stat.S_IFMT(mode))
+
+
+def open_file(path: Path | str) -> BufferedReader:
+    """Open a file to read it. Raises OSError if it is missing, or if it is no file."""
+    if kind := special_kind(path):
+        raise OSError(f"it is {kind}, not a file")
+    return Path(path).open("rb")
+
+
+def read_bytes(path: Path | str) -> bytes:
+    """Return the content of a file. Raises OSError as `open_file` does."""
+    with open_file(path) as file:
+        return file.read()
 
 
 class Stamp(NamedTuple):
@@ -27,7 +60,7 @@ class Stamp(NamedTuple):
     @classmethod
     def of(cls, path: str | Path) -> Self:
         """Return the stamp of a file. Reads it. Raises OSError if it is missing, or no file."""
-        with Path(path).open("rb") as file:
+        with open_file(path) as file:
             status = os.fstat(file.fileno())
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         return cls(digest, status.st_size, status.st_mtime_ns)
@@ -58,12 +91,12 @@ def read_problem(error: OSError) -> str:
 
 
 def check_readable(path: Path | str) -> None:
-    """Raise `UserError` for a file that is missing, or that the user may not read.
+    """Raise `UserError` for a file that is missing, no file, or one that the user may not read.
 
     Call this before a library reads the file: many libraries would report a wrong format.
     """
     try:
-        Path(path).open("rb").close()
+        open_file(path).close()
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
 
@@ -116,7 +149,7 @@ def link_or_copy(file: Path, target: Path) -> None:
 
 def sha256(path: Path | str) -> str:
     """Return the SHA-256 of a file as 64 hexadecimal digits."""
-    with Path(path).open("rb") as file:
+    with open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -188,7 +221,7 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
     """Return the objects of a file with one JSON object a line. Skips all other lines."""
     entries = []
     try:
-        content = path.read_bytes()
+        content = read_bytes(path)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     for line in content.splitlines():
@@ -205,6 +238,8 @@ def unreadable(path: Path | str) -> str | None:
     """Return why a path cannot be read as a file. None if it can, or if nothing is there."""
     if os.path.isdir(path):  # noqa: PTH112, a `Path` is slow for 100,000 files
         return "is a folder"
+    if kind := special_kind(path):
+        return f"is {kind}, not a file"
     if os.path.lexists(path) and not os.access(path, os.R_OK):
         if not os.path.exists(path):  # noqa: PTH110
             return "is a link that leads to no file"
@@ -307,7 +342,8 @@ def read_text(path: Path | str) -> str:
     """Read a text in UTF-8. Raises `UserError` if it is missing, or not UTF-8."""
     try:
         # Some programs begin a file with a byte order mark.
-        return Path(path).read_text(encoding="utf-8-sig")
+        with TextIOWrapper(open_file(path), encoding="utf-8-sig") as file:
+            return file.read()
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except UnicodeDecodeError:

@@ -17,7 +17,7 @@ import numpy as np
 import OpenEXR
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, check_readable
+from lightfield.core.files import atomic_path, check_readable, open_file
 from lightfield.imaging.primaries import Chromaticities, to_rec_709
 
 Attribute = str | int | float
@@ -164,6 +164,8 @@ class Header:
 
 # The quality of a JPEG, of 100. Most values are off by one level at most.
 _JPEG_QUALITY = 98
+# As a texture, a square of this side takes 4 GB or more.
+_LARGEST_SIDE = 32768
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
@@ -171,6 +173,7 @@ _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extra
 def is_readable(path: Path | str) -> bool:
     """Return whether a picture of any format can be read to its end.
 
+    Raises `UserError` for one that would take many gigabytes. A small file may hold such a picture.
     If a JPEG or TIFF ends too soon, its decoder fills the rest with grey or black, and warns.
     """
     import OpenImageIO as oiio
@@ -180,6 +183,13 @@ def is_readable(path: Path | str) -> bool:
         # Fetch the error, or OpenImageIO prints it when the process ends.
         oiio.geterror()
         return False
+    spec = file.spec()
+    if spec.width * spec.height > _LARGEST_SIDE**2:
+        file.close()
+        raise UserError(
+            f"{path}: has {spec.width} × {spec.height} pixels, and a texture may have as many as "
+            f"{_LARGEST_SIDE} × {_LARGEST_SIDE}; make it smaller"
+        )
     pixels = file.read_image(oiio.UNKNOWN)
     warnings = file.geterror().splitlines()
     file.close()
@@ -390,7 +400,7 @@ def _plain_exr_header(path: Path | str) -> Header | None:
     Also None for a header with text that is not UTF-8: OpenEXR's InputFile may crash on it.
     """
     try:
-        with Path(path).open("rb") as file:
+        with open_file(path) as file:
             magic, version = struct.unpack("<II", file.read(8))
         if magic != _EXR_MAGIC or version & _EXR_OTHER_KINDS:
             return None

@@ -12,7 +12,7 @@ import bpy
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.rendering import animation
-from lightfield.rendering.quiet import quiet
+from lightfield.rendering.quiet import quiet, reading_quietly
 
 
 def new_scene() -> None:
@@ -69,12 +69,12 @@ def open_scene(
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
     """
+    check_readable(path)
     this_version = bpy.app.version_string
     try:
-        with quiet():
+        with reading_quietly(path):
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
-        check_readable(path)
         problem = str(error).strip()
         raise UserError(f"{path}: Blender {this_version} cannot open it: {problem}") from None
     libraries = [(path_of(library), library.version) for library in bpy.data.libraries]

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import listed
+from lightfield.core.files import listed, special_kind
 from lightfield.core.paths import files_below
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
@@ -50,6 +50,17 @@ def external_files() -> list[dict[str, Any]]:
     for block, path in _blocks_and_absolute_paths():
         files.update(_files(block, path))
     return [listed(file, home) for file in sorted(files)]
+
+
+def refuse_special(blend: Path) -> None:
+    """Raise `UserError` if a .blend names a FIFO or a device. Blender might read it without end."""
+    for block, path in _blocks_and_absolute_paths():
+        for file in _files(block, path):
+            if kind := special_kind(file):
+                raise UserError(
+                    f"{blend}: the {KINDS[type(block).__name__]} {block.name} is at {file}, which "
+                    f"is {kind}; put a file there"
+                )
 
 
 def problems(images: Collection[Any]) -> list[dict[str, str]]:
@@ -191,7 +202,8 @@ def _is_needed(block: Any, images: Collection[Any], users: Mapping[Any, Any]) ->
 def _files(block: Any, path: str) -> list[Path]:
     """Return the files that a path stands for. Return the path itself if they do not exist."""
     folder = Path(path)
-    if folder.is_dir():
+    # Only a modifier has a folder, for its cache.
+    if isinstance(block, bpy.types.Object) and folder.is_dir():
         return [*files_below(folder)] or [folder]
     if isinstance(block, bpy.types.Image) and block.source == "TILED":
         return [_tile(path, tile.number) for tile in block.tiles]
@@ -213,6 +225,8 @@ def _problem(block: Any, path: Path) -> str | None:
     """Return the problem of a file, or None. Blender itself would only print it."""
     if not path.exists():
         return "missing"
+    if path.is_dir() and not isinstance(block, bpy.types.Object):
+        return "is a folder"
     readable = True
     if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
         # Do not let Blender read it: 5.0 crashes on some broken EXRs.

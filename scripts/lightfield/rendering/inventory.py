@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import animation, cycles, frames, motion_blur, pruning
+from lightfield.rendering import animation, cycles, frames, modifiers, motion_blur, pruning
 from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
@@ -64,6 +64,7 @@ def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
     if others:
         pruning.remove_unused()
     pruning.remove_objects(hidden)
+    modifiers.refuse_too_many_faces()
     objects = list(bpy.data.objects)
     layer = bpy.context.view_layer
     worlds = {world for world in (scene.world, layer.world_override) if world}

@@ -57,6 +57,7 @@ def write_of_datasets(
     """
     scene_block = written.scene.model_dump() if written else {}
     layers = blend_file.open_scene(path, scene_block)
+    external_files.refuse_special(path)
     saved_frame = frames.current()
     chosen_frames = rendered_frames(datasets)
     shown_frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
@@ -71,7 +72,10 @@ def write_of_datasets(
     if written and written.render and written.render.motion_blur is not None:
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
-    contents |= inventory(shown_frames)
+    try:
+        contents |= inventory(shown_frames)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
     if contents["missing"] and not scene_block.get("allow_missing"):
         raise UserError(_refusal(path, contents["missing"]))
     if not light.may_be_lit():

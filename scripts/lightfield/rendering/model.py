@@ -3,6 +3,7 @@
 import logging
 import os
 import re
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -21,10 +22,15 @@ from lightfield.core.names import UP
 from lightfield.core.paths import case_hint
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging.images import is_readable
-from lightfield.rendering import blend_file, model_files, model_light, obj_files
-from lightfield.rendering.model_references import FileReference, printable, refuse_outside
+from lightfield.rendering import blend_file, model_files, model_light, obj_files, ply_files
+from lightfield.rendering.model_references import (
+    FileReference,
+    printable,
+    refuse_outside,
+    refuse_special,
+)
 from lightfield.rendering.pruning import objects_of_used_collections
-from lightfield.rendering.quiet import quiet
+from lightfield.rendering.quiet import reading_quietly
 from lightfield.rendering.render_graph import in_render
 from lightfield.stages.scene import ImportModel, ImportSettings
 
@@ -88,6 +94,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     receipts.note_inputs([path])
     model_files.check(path)
     references, left_out = model_files.survey(path)
+    textures = obj_files.textures(path) if path.suffix.lower() == ".obj" else ()
+    refuse_special(path, [*references, *textures])
     refuse_outside(path, references, settings.shared_folder)
     receipts.note_inputs(reference.path for reference in references)
     if path.suffix.lower() == ".obj":
@@ -96,7 +104,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
     blend_file.new_scene()
-    left_out += _import(path, settings.up)
+    skipped, printed = _import(path, settings.up)
+    left_out += skipped
     unread_materials = _unread_materials()
     left_out += [
         f"the shader of the material {printable(material.name)}, which is no UsdPreviewSurface, "
@@ -114,6 +123,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
+    if path.suffix.lower() == ".ply":
+        count = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
+        left_out += ply_files.faces_left_out(path, count, printed)
     _pack(path)
     for material in unread_materials:
         _paint(material, None)
@@ -150,8 +162,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     }
 
 
-def _import(path: Path, up: str) -> list[str]:
-    """Import a model with the importer of its suffix. Return the parts that it says it skips.
+def _import(path: Path, up: str) -> tuple[list[str], bytes]:
+    """Import a model with the importer of its suffix. Return what it skips, and what it prints.
 
     Raises `UserError` if it refuses the model.
     """
@@ -169,20 +181,24 @@ def _import(path: Path, up: str) -> list[str]:
     }
     readable = obj_files.readable(path) if family == "obj" else nullcontext(path)
     try:
-        with quiet(), _skipped_by_gltf() as skipped, readable as file:
+        with (
+            tempfile.NamedTemporaryFile() as printed,
+            reading_quietly(path, Path(printed.name)),
+            _skipped_by_gltf() as skipped,
+            readable as file,
+        ):
             # Blender would take a path with // before it for one from the .blend.
             result = operators[family](filepath=str(file.absolute()), **options)
             if file != path:
                 _normalise_textures()
+            log = printed.read()
     except RuntimeError as error:
         raise UserError(_refusal(path, str(error))) from None
     except UnicodeError:
         raise UserError(_refusal(path, "it has a name that is not UTF-8")) from None
     if "FINISHED" not in result:
         raise UserError(_refusal(path, "it says nothing more"))
-    if suffix == ".ply":
-        _check_faces(path)
-    return skipped
+    return skipped, log
 
 
 def _normalise_textures() -> None:
@@ -226,19 +242,6 @@ def _refusal(path: Path, message: str) -> str:
         reason = f"it cannot decode {' and '.join(names)}"
         advice = "export the model without compression"
     return f"{path}: Blender {bpy.app.version_string} cannot import it: {reason}; {advice}"
-
-
-def _check_faces(path: Path) -> None:
-    """Raise `UserError` for a PLY with fewer faces than it promises. Blender drops the others."""
-    with path.open("rb") as file:
-        head = file.read(65536).partition(b"end_header")[0]
-    promised = re.search(rb"element\s+face\s+(\d+)", head)
-    count = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
-    if promised and count < int(promised[1]):
-        raise UserError(
-            f"{path}: has {int(promised[1])} faces, of which Blender reads {count}; it is cut "
-            "short, or faces lack corners"
-        )
 
 
 def _remove_cameras_and_lamps() -> None:

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
-from lightfield.rendering import obj_files, usd_files
+from lightfield.rendering import obj_files, ply_files, usd_files
 from lightfield.rendering.model_references import FileReference, Survey
 
 
@@ -50,7 +50,7 @@ def check(path: Path) -> None:
             if size < expected or expected == 84:
                 raise UserError(f"{path}: is cut short, or not an STL file: it has {size} bytes")
         case ".ply":
-            least = _least_ply_bytes(path)
+            least = ply_files.least_bytes(path)
             if size < least:
                 raise UserError(f"{path}: is cut short: it has {size} bytes of at least {least}")
         case ".usdz" if not zipfile.is_zipfile(path):
@@ -61,40 +61,6 @@ def _begins_as_gltf(head: bytes) -> bool:
     """Return whether a file may be glTF by its first bytes: a binary one, or JSON."""
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     return head.startswith(b"glTF") or text.startswith(b"{")
-
-
-# Bytes of the types of values in a PLY.
-_PLY_TYPES = {
-    **dict.fromkeys((b"char", b"uchar", b"int8", b"uint8"), 1),
-    **dict.fromkeys((b"short", b"ushort", b"int16", b"uint16"), 2),
-    **dict.fromkeys((b"int", b"uint", b"int32", b"uint32", b"float", b"float32"), 4),
-    **dict.fromkeys((b"double", b"float64"), 8),
-}
-
-
-def _least_ply_bytes(path: Path) -> int:
-    """Return how many bytes a PLY has at least by its head. Each face has three corners or more.
-
-    In a text, each value has a digit and a blank.
-    """
-    with path.open("rb") as file:
-        content = file.read(65536)
-    end = re.search(rb"end_header(\r\n|\n|\r)", content)
-    head = content[: end.end()] if end else content
-    is_text = b"format ascii" in head
-    total = len(head)
-    count = 0
-    for line in head.splitlines():
-        match line.split():
-            case [b"element", _, number] if number.isdigit():
-                count = int(number)
-            case [b"property", b"list", length, value, _]:
-                sizes = [_PLY_TYPES.get(kind, 1) for kind in (length, value)]
-                total += count * (8 if is_text else sizes[0] + 3 * sizes[1])
-            case [b"property", value, _]:
-                total += count * (2 if is_text else _PLY_TYPES.get(value, 1))
-    # The last line of a text may lack its end.
-    return total - 1 if is_text else total
 
 
 def survey(path: Path) -> Survey:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import special_kind
 
 
 class FileReference(NamedTuple):
@@ -44,6 +45,15 @@ def refuse_outside(
                 f"{model}: {by_layer}names {printable(reference.name)}, which is outside the "
                 f"model's folder; put a copy into {model.parent}, or name the folder that models "
                 f"share: scene: {{shared_folder: {printable(os.path.relpath(place.parent))}}}"
+            )
+
+
+def refuse_special(model: Path, references: Iterable[FileReference]) -> None:
+    """Raise `UserError` if a model names a FIFO or a device. Blender might read it without end."""
+    for reference in references:
+        if kind := special_kind(reference.path):
+            raise UserError(
+                f"{model}: names {printable(reference.name)}, which is {kind}; put a file there"
             )
 
 

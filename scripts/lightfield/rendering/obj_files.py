@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+from lightfield.core.files import special_kind
 from lightfield.rendering.model_references import FileReference, Survey, printable
 
 _TEXTURE = re.compile(rb"\s*(map_\w+|bump|disp|decal|refl|norm)\s+(.*?)\s*$", re.IGNORECASE)
@@ -53,6 +54,13 @@ def survey(path: Path) -> Survey:
     return Survey(references, [each for library in libraries for each in _colour_spaces(library)])
 
 
+def textures(path: Path) -> Iterator[FileReference]:
+    """Yield the textures that the libraries of an OBJ name."""
+    for library in _library_files(path, _mentions(path)):
+        for texture in _textures(library):
+            yield FileReference(library, os.path.relpath(texture.file), texture.file)
+
+
 def own_library(path: Path) -> Path:
     """Return the library with the name of an OBJ, which Blender also reads if it exists."""
     return path.with_suffix(".mtl")
@@ -62,8 +70,7 @@ def own_library(path: Path) -> Path:
 def readable(path: Path) -> Iterator[Path]:
     """Yield an OBJ that Blender reads right: the file itself, or a copy if Blender misreads it."""
     mentions = _mentions(path)
-    places = dict.fromkeys(_in_folder(path, name) for name in _libraries(path, mentions))
-    libraries = list(filter(_is_file, places))
+    libraries = _library_files(path, mentions)
     misread = [file for file in libraries if any(each.is_misread for each in _textures(file))]
     if not misread and all(_names(path, text) == [text] for text in mentions):
         yield path
@@ -100,6 +107,12 @@ def _copy_library(path: Path, copy: Path) -> None:
 
 def _relative(path: Path, named_by: Path) -> bytes:
     return os.fsencode(os.path.relpath(path, named_by.parent))
+
+
+def _library_files(path: Path, mentions: Iterable[bytes]) -> list[Path]:
+    """Return the libraries of an OBJ that exist."""
+    places = dict.fromkeys(_in_folder(path, name) for name in _libraries(path, mentions))
+    return list(filter(_is_file, places))
 
 
 def _libraries(path: Path, mentions: Iterable[bytes]) -> list[bytes]:
@@ -184,7 +197,8 @@ def _texture_file(path: Path, name: bytes) -> tuple[Path, bool]:
         return unescaped, True
     absolute, beside = Path(os.fsdecode(name)), path.parent / Path(os.fsdecode(name)).name
     places = [plain, *([absolute] if absolute.is_absolute() else []), beside]
-    return next(filter(_is_file, places), plain), False
+    # Blender opens a FIFO or a device, too.
+    return next((each for each in places if _is_file(each) or special_kind(each)), plain), False
 
 
 def _is_read(words: list[bytes]) -> bool:

@@ -20,6 +20,21 @@ _SIGNALS = {
     "SIGTERM": "it was cancelled, or exceeded its time limit",
 }
 
+# The same while Blender reads a file, by what `lightfield.rendering.quiet` prints to the log.
+READS = "Blender reads "
+HAS_READ = "Blender has read "
+MOST_MINUTES = 30
+_BLENDER_CRASHED = (
+    f"Blender crashed when it read this file, as it does if it gets no memory ({LESS_MEMORY}), or "
+    "if the file is damaged: export it again"
+)
+_SIGNALS_OF_FILES = _SIGNALS | {
+    "SIGABRT": _BLENDER_CRASHED,
+    "SIGSEGV": _BLENDER_CRASHED,
+    "SIGALRM": f"Blender has read this file for {MOST_MINUTES} minutes; a .blend that it links may "
+    "be a FIFO",
+}
+
 # Lines that tar prints after the cause.
 _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recoverable")
 
@@ -97,8 +112,20 @@ def cause(log: Path) -> str | None:
     if not lines:
         return None
     last_line = errors[-1] if errors else lines[-1]
-    likely_reason = _SIGNALS.get(last_line.removeprefix("error: killed by "))
+    name = last_line.removeprefix("error: killed by ")
+    if name != last_line and (file := _file_at_work(lines)):
+        reason = _SIGNALS_OF_FILES.get(name)
+        last_line = f"error: {file}: {last_line.removeprefix('error: ')}"
+        said = [line.removeprefix("what():").strip() for line in lines if line.startswith("what()")]
+        return ": ".join(filter(None, [last_line, *said[-1:], reason]))
+    likely_reason = _SIGNALS.get(name)
     return f"{last_line}: {likely_reason}" if likely_reason else last_line
+
+
+def _file_at_work(lines: Sequence[str]) -> str | None:
+    """Return the file that Blender was reading when a log ended. None if it was reading none."""
+    marks = [line for line in lines if line.startswith((READS, HAS_READ))]
+    return marks[-1].removeprefix(READS) if marks and marks[-1].startswith(READS) else None
 
 
 def signal_cause(number: int) -> str:
