@@ -127,6 +127,7 @@ if IS_MAIN_PROCESS and HAS_STORAGE and not STORE:
 onstart:
     try:
         announce_changes()
+        make_ways()
         run_lock.take(scene_folders())
         check_start()
         write_new_settings()

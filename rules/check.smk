@@ -12,8 +12,8 @@ from pathlib import Path
 
 from lightfield.core import bundles
 from lightfield.core.errors import UserError
-from lightfield.core.files import set_aside, unreadable, write_text
-from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX, name_of
+from lightfield.core.files import set_aside, special_kind, unreadable, write_text
+from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX, make_way, name_of
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import run_lock
@@ -165,6 +165,23 @@ def settings_file(path, content):
         elif Path(path).read_bytes() != text.encode():
             NEW_SETTINGS[path] = text
     return ancient(path)
+
+
+def make_ways():
+    """Move away links in place of files that a run changes, and what is no file.
+
+    A run changes the files of locks and times. Snakemake copies an output before its job.
+    """
+    locks = [folder / run_lock.NAME for folder in scene_folders()]
+    listing = os.walk(f"{WORK}/benchmarks")
+    times = [Path(folder, name) for folder, _, names in listing for name in names]
+    made = [
+        *ASKED,
+        *itertools.chain(*(each.damaged for each in CHECK.verdicts.values())),
+    ]
+    special = [Path(path) for path in made if special_kind(path)]
+    for path in locks + times + special:
+        make_way(path, Path(WORK))
 
 
 def write_new_settings():

@@ -145,6 +145,19 @@ def check_start():
     check_device()
     check_memory()
     check_disk_space()
+    check_times()
+
+
+def check_times():
+    """Raise `UserError` for a file that jobs of this run read, and whose time is in the future.
+
+    Snakemake would refuse what the job makes, because it is older.
+    """
+    inputs = dict(JOBS)
+    paths = {}
+    for job, names in planned_jobs():
+        paths |= dict.fromkeys(flat(inputs[job](names)[0].values()))
+    presence.check_times(path for path in paths if not CHECK.is_made(path))
 
 
 def check_input(job, names):
@@ -162,7 +175,7 @@ def check_input(job, names):
 
 def announce_refusals():
     """Print in a dry run what the real run would refuse."""
-    checks = [check_folders, check_device, check_memory, check_disk_space]
+    checks = [check_folders, check_device, check_memory, check_disk_space, check_times]
     checks += [functools.partial(check_input, *planned) for planned in planned_jobs()]
     problems = {}
     for check in checks:

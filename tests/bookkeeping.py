@@ -300,6 +300,11 @@ def shard(dataset, stage, views):
     return f"{NOTES}/{dataset}/{stage}/{views}{receipts.SUFFIX}"
 
 
+def notes_of_killed_shard(dataset, stage, views):
+    """Return the file that a killed job of a shard leaves, from a build's folder."""
+    return str(Path(shard(dataset, stage, views)).with_suffix(receipts.PART_SUFFIX))
+
+
 def files_of_shard(folder, dataset, stage, views):
     """Return the bytes and the SHA-256 of each file of a finished shard, by path in the dataset."""
     receipt = receipts.read(Path(folder, shard(dataset, stage, views)))

@@ -154,6 +154,11 @@ def link(path, _):
     path.symlink_to("nowhere")
 
 
+def fifo(path, _):
+    path.unlink()
+    os.mkfifo(path)
+
+
 def unreadable(path, _):
     path.chmod(0)
 
@@ -171,6 +176,7 @@ FAULTS = {
     "a folder": (folder, False),
     "a link to nowhere": (link, False),
     "unreadable": (unreadable, False),
+    "a FIFO": (fifo, False),
 }
 
 

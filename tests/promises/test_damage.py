@@ -123,7 +123,7 @@ def test_every_fault_in_every_kind_of_file_is_found(smoke, tmp_path, batch, monk
 @pytest.mark.slow
 def test_one_plain_run_mends_every_kind_of_file(smoke, tmp_path, monkeypatch):
     # A plan does not see these. A job names a file that it may not read.
-    damaged = Damaged(smoke, tmp_path, 10, 4, left_out=HIDDEN | {"unreadable"})
+    damaged = Damaged(smoke, tmp_path, 11, 4, left_out=HIDDEN | {"unreadable"})
     folder_of_shard = (damaged.root / bookkeeping.shard(CUBOID, "render", "0-6")).parent
     before = rendered(damaged.root)
     result = damaged.run("smoke")

@@ -6,12 +6,13 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import forks
 import pytest
 from checkouts import PUBLISHED_VIEWS as IMPORTED
-from checkouts import ROOT, SEQUENCE, checkout, with_consumers
+from checkouts import ROOT, SEQUENCE, checkout, snakemake, with_consumers
 from sphere import write_views
 
 pytestmark = pytest.mark.slow
@@ -420,3 +421,33 @@ def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing)
     finally:
         program.write_text("")
     assert terminal.endswith(last_words(failing, "render")), terminal
+
+
+FROM_ANOTHER_TIME_ZONE = """
+scene: {model: shape.obj}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+"""
+
+
+def test_a_model_with_a_time_in_the_future_is_named_before_the_first_job(tmp_path):
+    folder = checkout(tmp_path, shape=FROM_ANOTHER_TIME_ZONE)
+    model = folder / "shape.obj"
+    model.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    arguments = ("--config", "scenes=[shape]", "preset=full", "--", "work/shape/model.blend")
+    for hours, is_refused in ((5, True), (0, False)):
+        moment = time.time() + hours * 3600
+        os.utime(model, (moment, moment))
+        plan = snakemake(folder, "--dry-run", *arguments)
+        assert plan.returncode == 0, plan.stderr
+        said = "would be refused: shape.obj: its time is in the future"
+        assert (said in plan.stderr) == is_refused
+    os.utime(model, (time.time() + 5 * 3600,) * 2)
+    run = snakemake(folder, "--cores", "1", *arguments)
+    assert run.returncode == 1
+    assert "error: shape.obj: its time is in the future" in run.stderr
+    assert "touch shape.obj" in run.stderr
+    assert not (folder / "work/shape/model.blend").exists()

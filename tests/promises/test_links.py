@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bookkeeping
 import pytest
+import tiny
 from checkouts import checkout, snakemake
 
 SCENE = """
@@ -133,3 +134,21 @@ def test_a_dataset_whose_folders_move_behind_links_keeps_every_view(built, tmp_p
     run(folder, "all", "package")
     assert_complete(folder, built)
     assert bookkeeping.rendered(folder) == before
+
+
+@pytest.mark.slow
+def test_no_run_writes_through_a_link_in_place_of_a_file(tiny_build, tmp_path):
+    behind = tmp_path / "behind"
+    for path in [path for path in (tiny_build / "work").rglob("*") if path.is_file()]:
+        place = behind / path.relative_to(tiny_build)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        path.rename(place)
+        path.symlink_to(place)
+    place = behind / "part.txt"
+    place.write_text("of somebody else\n")
+    notes = bookkeeping.notes_of_killed_shard(tiny.NAME, "render", tiny.SHARDS[0])
+    (tiny_build / notes).symlink_to(place)
+    before = {path: path.read_bytes() for path in behind.rglob("*") if path.is_file()}
+    tiny.edit(tiny_build, "samples: 4", "samples: 2")
+    tiny.build(tiny_build)
+    assert {path: path.read_bytes() for path in before} == before

@@ -36,6 +36,7 @@ from lightfield.core.files import (
     append_json_line,
     atomic_path,
     file_watchers,
+    read_bytes,
     read_json_lines,
     read_problem,
     set_aside,
@@ -93,7 +94,7 @@ class Receipt:
 def read(path: str | Path) -> Receipt | None:
     """Return a receipt. None if there is none, or if it is damaged."""
     try:
-        text = Path(path).read_bytes()
+        text = read_bytes(path)
         # One text of JSON is read faster than many.
         header, *lines = json.loads(b"[%s]" % b",".join(text.splitlines()))
         outputs, history = _sorted(lines)
@@ -500,14 +501,22 @@ def work_of(path: Path) -> Path:
     return Path(*path.parts[: path.parts.index(FOLDER)])
 
 
+def make_way(path: Path, work: Path) -> None:
+    """Move away a link, or what is no file, from the place of a file that is about to be changed.
+
+    A link would lead the change to another file. ``work`` is the folder of intermediate files.
+    """
+    if path.is_symlink() or unreadable(path):
+        set_aside(path, work / REMOVED)
+
+
 def _locked(part: Path) -> IO[bytes]:
     """Return the open, locked file of an unfinished receipt.
 
     Waits for another process that makes the same files: of a killed run, or of a run of another
     scene that also lists all datasets.
     """
-    if unreadable(part):
-        set_aside(part, work_of(part) / REMOVED)
+    make_way(part, work_of(part))
     part.parent.mkdir(parents=True, exist_ok=True)
     while True:
         with writing(part):

@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import open_file
 
 # Bytes. A scene YAML has some thousand.
 _LARGEST_YAML = 2**16
@@ -113,7 +114,7 @@ def read_yaml(path: Path, file: str) -> Any:
 def read_settings_text(path: Path, file: str) -> str:
     """Return a YAML file's text. Raises `UserError` if it is not text, or too large."""
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             content = stream.read(_LARGEST_YAML + 1)
         if len(content) <= _LARGEST_YAML:
             return content.decode()

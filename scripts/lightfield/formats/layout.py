@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from lightfield.core.files import write_text
+from lightfield.core.files import read_bytes, write_text
 from lightfield.core.paths import inside
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
@@ -207,7 +207,7 @@ def read_sums(path: Path) -> dict[str, str]:
     Raises `UserError` for a name that leads out of the folder of the list.
     """
     sums = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(read_bytes(path).decode().splitlines(), 1):
         digest, separator, name = line.partition("  ")
         if separator:
             inside(path.parent, name, f"{path}: line {number}")

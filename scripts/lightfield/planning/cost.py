@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, read_keys, reading
+from lightfield.core.files import DAMAGE, read_bytes, read_keys, reading
 from lightfield.formats import light_groups, passes
 from lightfield.planning import sampling
 
@@ -423,7 +423,7 @@ def _content(path: str | None) -> Any:
 @lru_cache(maxsize=64)
 def _known_content(path: str, _changed: int) -> Any:
     """Return the content of a JSON file. A change of its time makes the cache read it again."""
-    return json.loads(Path(path).read_bytes())
+    return json.loads(read_bytes(path))
 
 
 # The other stages of a dataset.

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, Stamp, size_and_time, write_json
+from lightfield.core.files import DAMAGE, Stamp, read_bytes, size_and_time, write_json
 from lightfield.core.receipts import Receipt
 
 NAME = "sums.json"
@@ -51,7 +51,7 @@ class Sums:
         self._stamps: dict[str, list[Any]] = {}
         self._has_new = False
         try:
-            self._stamps = dict(json.loads(path.read_bytes()))
+            self._stamps = dict(json.loads(read_bytes(path)))
         except (OSError, *DAMAGE):
             pass
 
@@ -182,6 +182,11 @@ class JobCheck:
             return False
         maker = self._maker(name)
         return maker is None or not self.will_run(maker)
+
+    def is_made(self, name: str) -> bool:
+        """Return whether a job of this run makes a file."""
+        maker = self._maker(name)
+        return maker is not None and self.will_run(maker)
 
     def _maker(self, name: str) -> str | None:
         """Return the receipt of the job that made an input."""

@@ -40,7 +40,7 @@ _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recov
 
 
 # The clocks of nodes differ by at most this many seconds.
-_CLOCKS_DIFFER = 5
+CLOCKS_DIFFER = 5
 
 
 @dataclass
@@ -159,7 +159,7 @@ def failure_report(jobs: Iterable[tuple[str, str, Path | None]]) -> str:
 
 def is_newer(path: Path, time: float) -> bool:
     """Return whether a file exists, and was written after ``time``, in seconds since 1970."""
-    return path.is_file() and path.stat().st_mtime >= time - _CLOCKS_DIFFER
+    return path.is_file() and path.stat().st_mtime >= time - CLOCKS_DIFFER
 
 
 def batch_log(name: str, since: float) -> Path | None:

@@ -2,13 +2,18 @@
 
 import json
 import os
+import shlex
+import time
+from collections.abc import Iterable
+from datetime import datetime
 from pathlib import Path
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE
+from lightfield.core.files import DAMAGE, read_bytes, size_and_time
 from lightfield.core.paths import case_hint
+from lightfield.workflow.failures import CLOCKS_DIFFER
 
 
 def missing_views(dataset: Dataset) -> int:
@@ -52,7 +57,7 @@ def check_external_files(dataset: Dataset) -> None:
     if not source.blend or source.allow_missing:
         return
     try:
-        inventory = json.loads(Path(dataset.paths.inventory).read_bytes())
+        inventory = json.loads(read_bytes(dataset.paths.inventory))
         home = Path(source.blend).parent
         paths = [
             Path(os.path.normpath(home / file["path"]))
@@ -68,6 +73,19 @@ def check_external_files(dataset: Dataset) -> None:
             f"{source.blend}: files that it shows are missing: {_first_names(missing_files)}; put "
             "them back, or render without them: scene: {allow_missing: true}"
         )
+
+
+def check_times(paths: Iterable[str]) -> None:
+    """Raise `UserError` for a file whose time is in the future."""
+    now = time.time()
+    for path in paths:
+        stamp = size_and_time(path)
+        if stamp and stamp[1] / 1e9 > now + CLOCKS_DIFFER:
+            shown = datetime.fromtimestamp(stamp[1] / 1e9).isoformat(" ", "minutes")
+            raise UserError(
+                f"{path}: its time is in the future ({shown}), so all that is made from it would "
+                f"look outdated; give it the present time: touch {shlex.quote(path)}"
+            )
 
 
 def check_imported(dataset: Dataset) -> None:

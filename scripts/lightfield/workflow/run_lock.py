@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import writing
+from lightfield.core.files import open_file, read_bytes, writing
 
 NAME = "run.lock"
 # The open files whose locks this process holds.
@@ -67,7 +67,7 @@ def _lock(file: IO[bytes]) -> None:
 def _refusal(path: Path) -> str:
     """Return which scene another run makes, and whose run it is."""
     try:
-        number, user, host = json.loads(path.read_bytes())
+        number, user, host = json.loads(read_bytes(path))
     except (OSError, ValueError, TypeError):
         # That run has not written it yet, or is of an older version.
         whose, end = "", ""
@@ -85,7 +85,7 @@ def _refusal(path: Path) -> str:
 def is_held(folder: Path) -> bool:
     """Return whether a run holds the lock in a folder."""
     try:
-        with (folder / NAME).open("rb") as file:
+        with open_file(folder / NAME) as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True

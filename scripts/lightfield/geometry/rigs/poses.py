@@ -20,7 +20,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_problem, read_text
+from lightfield.core.files import read_bytes, read_json, read_problem, read_text
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.frames import (
@@ -365,7 +365,7 @@ def _are_points(line: str) -> bool:
 
 def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[float], str]]:
     """Yield the place in the file, seven numbers and the name of each image in an images.bin."""
-    content = path.read_bytes()
+    content = read_bytes(path)
     try:
         (count,), start = struct.unpack_from("<Q", content), 8
         for _ in range(count):
