@@ -13,7 +13,12 @@ from pathlib import Path
 from lightfield.core import bundles
 from lightfield.core.errors import UserError
 from lightfield.core.files import set_aside, special_kind, unreadable, write_text
-from lightfield.core.receipts import FOLDER as FOLDER_OF_RECEIPTS, SUFFIX, make_way, name_of
+from lightfield.core.receipts import (
+    FOLDER as FOLDER_OF_RECEIPTS,
+    SUFFIX,
+    make_way,
+    name_of,
+)
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import run_lock

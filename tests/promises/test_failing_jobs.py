@@ -425,6 +425,7 @@ def test_a_device_of_the_nodes_may_be_missing_on_the_submitting_machine(failing)
 
 FROM_ANOTHER_TIME_ZONE = """
 scene: {model: shape.obj}
+render: {samples: 1}
 rigs:
   LFPlane:
     type: plane
