@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import bookkeeping
 import pytest
 from checkouts import ROOT, checkout, planned, snakemake, start_snakemake
 from tiny import BLEND, CHOSEN, SCENE
@@ -42,7 +43,7 @@ def test_snakemakes_folder_that_is_none_is_named(kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["results/tiny", "work/tiny", "work/logs", "work/benchmarks/tiny", "work/receipts"]
+    "name", ["results/tiny", "work/tiny", "work/logs", "work/benchmarks/tiny", bookkeeping.NOTES]
 )
 def test_a_file_in_place_of_a_folder_is_named(name, tmp_path):
     folder = checkout(tmp_path, tiny=SCENE)
