@@ -136,6 +136,7 @@ def print_results():
     """Print the end of a run that made all that it should."""
     print_summary()
     print_pages()
+    print_packages()
     print_families()
 
 
@@ -149,19 +150,25 @@ def print_failures():
 def print_pages():
     """Print the paths of the pages of this run's datasets, which are all valid."""
     prefix = f"{STORE}/" if STORE else ""
-    validated = {
-        job_of(receipt)
-        for receipt, (job, _) in ASKED.items()
-        if KINDS[job].phase == "validation"
-    }
-    pages = []
-    for dataset in DATASETS.values():
-        if f"{dataset.name}/checksums" in validated:
-            pages.append(f"{prefix}{dataset.paths.page}")
+    jobs = {job_of(receipt) for receipt in ASKED}
+    pages = [
+        f"{prefix}{dataset.paths.page}"
+        for dataset in DATASETS.values()
+        if f"{dataset.name}/page" in jobs
+    ]
     if len(pages) > MOST_PAGES:
         pages = [f"{len(pages)} datasets: {prefix}{RESULTS}/index.html"]
     for page in pages:
         print(f"valid: {page}", file=sys.stderr)
+
+
+def print_packages():
+    """Print the paths of the first archives of this run's packages."""
+    prefix = f"{STORE}/" if STORE else ""
+    for job, names in ASKED.values():
+        if job == "{scene}/{rig}/package":
+            archive = PATHS.package.format(**names)
+            print(f"packed: {prefix}{archive}", file=sys.stderr)
 
 
 def print_families():

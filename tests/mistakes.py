@@ -294,7 +294,7 @@ REFUSED = [
         (
             f"exports.{name}",
             {"sources": ["perspective"]},
-            f"exports.{name}.sources: perspective of the rig LFSphere has fewer than two frames",
+            f"exports.{name}.sources: perspective: the rig LFSphere has fewer than two frames",
         )
         for name in ("dnerf", "colmap_frames", "multipleview")
     ),

@@ -21,6 +21,9 @@ REPLACED = (
     "Assuming unrestricted shared",
     "Config file",
     "Singularity containers: ignored",
+    "Restored previous version",
+    "Exiting because a job execution failed",
+    "WorkflowError:\nAt least one job",
 )
 # What --printshellcmds shows as Snakemake itself does: jobs, with the reason for each.
 OF_JOBS = (LogEvent.RUN_INFO, LogEvent.JOB_INFO, LogEvent.SHELLCMD)

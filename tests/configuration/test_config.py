@@ -81,6 +81,21 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
     assert scene_datasets("row", "tiny", Preset(views=2))[0].flow
 
 
+def test_an_export_that_cannot_take_what_a_preset_leaves_is_refused(tmp_path, monkeypatch):
+    for key, value in (("size", 1.2), ("baseline", 0.4)):
+        rig = {"type": "plane", "cameras": [4, 4], key: value}
+        content = flowing(rig) | {"exports": {"hci": {"sources": ["views"]}}}
+        del content["flow"]
+        content["rigs"]["View"]["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+        (tmp_path / f"{key}.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    assert scene_datasets("size")[0].exports.hci
+    assert scene_datasets("baseline", "tiny", Preset(views=12))[0].exports.hci
+    problem = r"size\.yaml: exports\.hci: under the preset tiny, the rig View has cameras .*apart"
+    with pytest.raises(UserError, match=problem):
+        scene_datasets("size", "tiny", Preset(views=12))
+
+
 def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
     file = tmp_path / "numbers.yaml"
     numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}
@@ -153,7 +168,7 @@ def test_an_export_of_one_rigs_views_ignores_other_rigs(tmp_path):
     content["exports"]["colmap"] = {"sources": ["views"], "depth": True}
     path.write_text(yaml.safe_dump(content))
     problem = (
-        "exports.colmap.sources: views of the rig LFCuboid is a panorama, for which COLMAP has no "
+        "exports.colmap.sources: views: the rig LFCuboid is a panorama, for which COLMAP has no "
         r"depth maps; .*; or export without it: rigs: \[LFSphere\]"
     )
     with pytest.raises(UserError, match=problem):

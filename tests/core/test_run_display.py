@@ -212,10 +212,20 @@ def test_logs_of_other_runs_are_not_read(run):
     assert not any("of old" in line for line in run.shown(running=["a"]))
 
 
-def test_the_terminal_does_not_say_that_containers_are_not_used():
-    remark = "Singularity containers: ignored"
-    source = Path(snakemake.__file__).with_name("workflow.py").read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    ("remark", "file"),
+    [
+        ("Singularity containers: ignored", "workflow.py"),
+        ("Restored previous version", "jobs.py"),
+        ("Exiting because a job execution failed", "scheduling/job_scheduler.py"),
+        ("At least one job did not complete successfully", "workflow.py"),
+    ],
+)
+def test_the_terminal_leaves_out_remarks_of_snakemake_that_do_not_help(remark, file):
+    source = (Path(snakemake.__file__).parent / file).read_text(encoding="utf-8")
     assert remark in source
+    if remark.startswith("At least"):
+        remark = f"WorkflowError:\n{remark}"
     path = ROOT / "envs" / "snakemake_logger_plugin_plenoforge" / "__init__.py"
     spec = importlib.util.spec_from_file_location("plugin", path)
     plugin = importlib.util.module_from_spec(spec)

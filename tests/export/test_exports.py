@@ -33,6 +33,7 @@ from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
+EVEN_PLANE = {"type": "plane", "cameras": [4, 3], "baseline": 0.4}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 
 
@@ -1239,7 +1240,7 @@ def test_yaml_that_a_consumer_cannot_take_is_refused(name, source, camera, optio
     content = {
         "scene": {"blend": "a.blend"},
         "render": {"samples": 1},
-        "rigs": {"LF": RIG | {"camera": camera}},
+        "rigs": {"LF": EVEN_PLANE | {"camera": camera}},
         "reprojections": {"again": {"camera": LENSES["perspective"]}},
         "exports": {name: {"sources": [source], **options}},
     }
@@ -1248,10 +1249,23 @@ def test_yaml_that_a_consumer_cannot_take_is_refused(name, source, camera, optio
     assert f"exports.{name}.sources: " in str(caught.value)
 
 
+def test_a_sensor_s_pictures_without_a_pass_are_refused_in_yaml():
+    content = {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1},
+        "rigs": {"LF": EVEN_PLANE | {"camera": LENSES["perspective"]}},
+        "sensor": {},
+        "exports": {"lichtfeld": {"sources": ["sensor"], "normals": True}},
+    }
+    problem = "sensor lacks the pass normal; export the sensor's source"
+    with pytest.raises(ValidationError, match=problem):
+        TypeAdapter(Scene).validate_python(content)
+
+
 def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     camera = LENSES["perspective"]
     rigs = {
-        "Plane": RIG | {"camera": camera},
+        "Plane": EVEN_PLANE | {"camera": camera},
         "Ball": {"type": "sphere", "subdivisions": 1, "camera": camera},
     }
     again = {"rigs": ["Plane"], "camera": camera, "format": "exr"}
@@ -1264,16 +1278,21 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     }
     assert TypeAdapter(Scene).validate_python(content).exports.hci
     content["exports"] = {"hci": {"sources": ["views"]}}
-    problem = r"views of the rig Ball is not .* type plane.*; or export without it: rigs: \[Plane\]"
+    problem = r"views: the rig Ball is not .* type plane.*; or export without it: rigs: \[Plane\]"
     with pytest.raises(ValidationError, match=problem):
         TypeAdapter(Scene).validate_python(content)
     content["exports"] = {"hci": {"sources": ["views"], "rigs": ["Plane"]}}
     assert TypeAdapter(Scene).validate_python(content).exports.hci
+    content["rigs"] = {"Plane": RIG | {"camera": camera}}
+    content["exports"] = {"hci": {"sources": ["views"]}}
+    problem = "the rig Plane has cameras 0.4 m apart across and 0.6 m apart down"
+    with pytest.raises(ValidationError, match=problem):
+        TypeAdapter(Scene).validate_python(content)
     content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
     content["reprojections"] = {}
     for name, why in (("instant_ngp", "cameras at one place"), ("colmap", "only one view")):
         content["exports"] = {name: {"sources": ["views"]}}
-        with pytest.raises(ValidationError, match=f"views of the rig One has {why}"):
+        with pytest.raises(ValidationError, match=f"views: the rig One has {why}"):
             TypeAdapter(Scene).validate_python(content)
     content["exports"] = {"instant_ngp": {"sources": ["views"], "bounds": "depth"}}
     assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp

@@ -353,7 +353,7 @@ def test_a_folder_that_cannot_be_a_rig_is_named(published, tmp_path, monkeypatch
         ({"scene": {"dataset": "published", "frame": 3}}, "frame: does not go with dataset"),
         (
             {"scene": {"dataset": "published"}, "exports": {"colmap": {"sources": ["views"]}}},
-            "exports.colmap.sources: views of the rig LFPlane sees 180 degrees",
+            "exports.colmap.sources: views: the rig LFPlane sees 180 degrees",
         ),
     ],
 )

@@ -471,7 +471,7 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
         (
             "panorama",
             {"exports": {"poses_csv": {"sources": ["views"]}}},
-            "views of the rig one has views without a centre",
+            "views: the rig one has views without a centre",
         ),
     ],
 )

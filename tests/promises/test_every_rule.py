@@ -486,7 +486,11 @@ ROUNDS = {
         "brought": ("depth: true}", "depth: true, points: 9}", {"export"}),
     },
     "an export of one rig": {
-        "built": ("points: 9", "points: 9, rigs: [LFPlane]", {"LFInner validate", "LFInner costs"}),
+        "built": (
+            "points: 9",
+            "points: 9, rigs: [LFPlane]",
+            {"LFInner validate", "LFInner costs", "LFInner figures"},
+        ),
     },
     "a split, and a frame": {
         "built": ("split: odd", "split: {every: 3}", {"LFPlane lightfield", "probe_cameras"}),

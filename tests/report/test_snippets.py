@@ -120,6 +120,7 @@ def test_the_card_s_code_runs_where_the_package_is_unpacked(built, tmp_path, mon
         subprocess.run(check.split(), cwd=folder, check=True, stdout=subprocess.DEVNULL)
     count = "12 at each of 3 frames" if built.rig != built.dataset else "12"
     assert f"| views | {count}, " in readme
+    assert f"| transparent | {'yes: channel A' if built.is_transparent else 'no'}" in readme
 
 
 def test_the_page_s_code_reads_the_channels_that_it_names(built, monkeypatch):

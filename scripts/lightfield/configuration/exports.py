@@ -290,9 +290,17 @@ class Hci(Developed):
         return _centred_pinhole(lens) or (None if has_depth else NO_DEPTH)
 
     def rig_refusal(self, rig: Rig) -> str | None:
-        if isinstance(rig, Plane) and not rig.cube_map and rig.look_at is None:
+        if not isinstance(rig, Plane) or rig.cube_map or rig.look_at is not None:
+            return "is not a rig of type plane with parallel cameras, which HCI's layout needs"
+        steps = rig.steps
+        if not steps:
+            return "has only one view"
+        if math.isclose(steps[0], steps[-1], rel_tol=1e-6):
             return None
-        return "is not a rig of type plane with parallel cameras, which HCI's layout needs"
+        return (
+            f"has cameras {steps[0]:g} m apart across and {steps[1]:g} m apart down, which are "
+            "equal in HCI's layout; give it a baseline in place of size"
+        )
 
 
 class ScanNetPP(Developed):

@@ -51,7 +51,8 @@ class ModelOptions(Settings):
     )
     ground: bool = Field(
         False,
-        description="Put a floor under the model, which receives its shadow.",
+        description="Put a floor under the model, which receives its shadow. It is a shadow "
+        "catcher: views that are not transparent show the light's environment through it.",
     )
     light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
         SOFTBOXES,

@@ -478,20 +478,20 @@ class Scene(Credits):
         for name, refusal in refusals.items():
             if refusal:
                 hint = f"; or export without it: rigs: [{accepted}]" if accepted else ""
-                raise ValueError(
-                    f"{export_key}.sources: {source} of the rig {name} {refusal}{hint}"
-                )
+                raise ValueError(f"{export_key}.sources: {source}: the rig {name} {refusal}{hint}")
 
     def _check_passes_of(self, key: str, source: str, export: Export) -> None:
         """Check that the views of a source have the passes that an export needs."""
         passes = self.render and self.render.passes
         place = "render.passes"
         if source != VIEWS:
-            passes = self.reprojections[source].passes
+            passes = self.developments[source].passes
             place = f"reprojections.{source}.passes"
         for pass_name in export.needed_passes if self.render else ():
             if pass_name not in (passes or ()):
-                raise ValueError(f"{key}: {source} lacks the pass {pass_name}; add it to {place}")
+                is_of_sensor = source != VIEWS and source not in self.reprojections
+                remedy = "export the sensor's source" if is_of_sensor else f"add it to {place}"
+                raise ValueError(f"{key}: {source} lacks the pass {pass_name}; {remedy}")
 
     def _check_rig(self, key: str, name: str, rig: Rig) -> None:
         """Check a rig with its camera, its file and the depth."""
@@ -563,11 +563,9 @@ def _export_refusal(
 ) -> str | None:
     """Return why an export's consumer cannot take the views of a rig, and what to do. Or None."""
     camera = (reprojection and reprojection.camera) or rig.camera
-    if refusal := export.refusal(camera.make(), has_depth):
-        return refusal
     if rig.is_omnidirectional:
         return "has views without a centre, as omnidirectional stereo has"
-    return export.rig_refusal(rig)
+    return export.rig_refusal(rig) or export.refusal(camera.make(), has_depth)
 
 
 def _check_blender_limits(key: str, lens: Lens) -> None:

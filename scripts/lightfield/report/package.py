@@ -37,7 +37,8 @@ SILVR = (
 LOADERS = {
     "exr": "import OpenEXR\npixels = OpenEXR.File('{}/{view}.exr').channels()",
     "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
-    "nerfstudio": "ns-train nerfacto --data {}",
+    "nerfstudio": "ns-train nerfacto --data {} nerfstudio-data --orientation-method none "
+    "--center-method none --auto-scale-poses False",
     "nerf_synthetic": "ns-train nerfacto --data {} blender-data",
     "instant_ngp": "./instant-ngp {}/transforms.json",
     "opendibr": "./RealtimeDIBR -i {} -j {}/cameras.json",
@@ -99,6 +100,7 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
         "views": len(lightfield.views),
         "lens": lightfield.lens.description,
         "resolution": [lightfield.lens.width, lightfield.lens.height],
+        "transparent": lightfield.transparent,
         "depth": lightfield.depth,
         "passes": [
             name

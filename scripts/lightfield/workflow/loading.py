@@ -137,6 +137,9 @@ def datasets_of(
     datasets = []
     for name, rig in written.rigs.items():
         reprojections = _reprojections_of(name, written, limits)
+        exports = _exports_of(name, written, reprojections)
+        limited_rig = _rig_of(scene, name, written, preset, limits)
+        _check_limited_exports(scene, name, preset, limited_rig, exports)
         for folder, frame in _frames(name, rig, source.frame):
             dataset = Dataset(
                 scene_name=scene,
@@ -145,11 +148,11 @@ def datasets_of(
                 rig_folder=folder,
                 source=source.model_copy(update={"frame": frame}),
                 render=_limited_render(written.render, rig, limits),
-                rig=_rig_of(scene, name, written, preset, limits),
+                rig=limited_rig,
                 reprojections=reprojections,
                 flow=written.flow,
                 mesh=_mesh_of(name, written),
-                exports=_exports_of(name, written, reprojections),
+                exports=exports,
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
                 shard_count=shard_count,
@@ -214,6 +217,16 @@ def _exports_of(
         is_made = is_chosen and not belongs_elsewhere
         exports[key] = export.model_copy(update={"sources": sources}) if is_made else None
     return written.exports.model_copy(update=exports)
+
+
+def _check_limited_exports(scene: str, name: str, preset: str, rig: Rig, exports: Exports) -> None:
+    """Check that the exports' consumers can take a rig from which a preset left out cameras."""
+    for key, export in exports.selected.items():
+        if export.sources and (refusal := export.rig_refusal(rig)):
+            raise UserError(
+                f"{scene_yaml.OWN_SCENES}/{scene}.yaml: exports.{key}: under the preset {preset}, "
+                f"the rig {name} {refusal}"
+            )
 
 
 def _mesh_of(name: str, written: scene_yaml.Scene) -> scene_yaml.MeshFiles | None:

@@ -67,7 +67,11 @@ def check_external_files(dataset: Dataset) -> None:
     except (OSError, *DAMAGE):
         return
     # Path.exists() raises for a path that is too long. os.path.exists() does not.
-    missing_files = [str(path) for path in paths if not os.path.exists(path)]  # noqa: PTH110
+    missing_files = [
+        f"{path}{case_hint(path)}"
+        for path in paths
+        if not os.path.exists(path)  # noqa: PTH110
+    ]
     if missing_files:
         raise UserError(
             f"{source.blend}: files that it shows are missing: {_first_names(missing_files)}; put "

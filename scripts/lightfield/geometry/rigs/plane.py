@@ -43,6 +43,14 @@ class Plane(Grid):
         columns, rows = self.cameras
         return (self.baseline * (columns - 1), 0.0, self.baseline * (rows - 1))
 
+    @property
+    def steps(self) -> list[float]:
+        """The distances of neighbouring cameras across and down, in metres, where there are any."""
+        sides = (float(self.sides[0]), float(self.sides[2]))
+        return [
+            side / (count - 1) for side, count in zip(sides, self.cameras, strict=True) if count > 1
+        ]
+
     def unit_poses(self) -> UnitPoses:
         across, down = grid(axis(self.cameras[0]), -axis(self.cameras[1]))
         return UnitPoses.of_sides(("", stack(across, 0.0, down), np.array([math.pi / 2, 0.0, 0.0])))
