@@ -127,6 +127,9 @@ def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     assert planned(folder, *arguments)["export_sequence"] == 1
     result = snakemake(folder, "--cores", "2", *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
+    # A package has no page.
+    ends = [line for line in result.stderr.splitlines() if line.startswith(("valid: ", "packed: "))]
+    assert ends == ["packed: results/moving/moving_LFPair.tar"]
     rig = folder / "results/moving/LFPair"
     lists = {path.name for path in rig.glob("exports/dnerf/*.json")}
     parts = ("train", "val", "test")
