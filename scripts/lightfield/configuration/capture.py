@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration import blend_lock, scene_source
-from lightfield.configuration.keys import scene_fingerprint
+from lightfield.configuration.keys import VERSIONS, scene_fingerprint
 from lightfield.configuration.scene_source import FILE, SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
@@ -19,7 +19,7 @@ from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import OMNIDIRECTIONAL
 from lightfield.formats.render_block import RenderBlock
-from lightfield.geometry import rigs, spread
+from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are not
@@ -226,7 +226,7 @@ class LightfieldSettings(Settings):
             render=capture.render.to_json(),
             rig=rig,
             panorama_width=panorama_width,
-            spread_version=spread.VERSION if rig.tests_one_of else None,
+            spread_version=VERSIONS["spread"] if rig.tests_one_of else None,
             **keys,
         )
 

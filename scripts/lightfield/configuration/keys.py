@@ -49,6 +49,8 @@ VERSIONS = {
     "softboxes": 1,
     # The import of models, if it refuses other models. Views keep their keys.
     "import": 2,
+    # The choice of spread test views. Views keep their keys.
+    "spread": 1,
 }
 
 

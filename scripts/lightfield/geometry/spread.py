@@ -4,9 +4,6 @@ import numpy as np
 
 from lightfield.geometry.rotations import Floats
 
-# Raise this number if equal cameras give another choice.
-VERSION = 1
-
 # Coordinates are whole steps of this part of the rig's extent. So the squares of distances are
 # exact, and the last digits of a sine decide nothing.
 _STEP = 1e-7

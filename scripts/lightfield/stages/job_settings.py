@@ -26,7 +26,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
-from lightfield.geometry import spread
 from lightfield.geometry.rigs import Poses
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
@@ -334,7 +333,7 @@ def _export_settings(
     return export_settings_of(name).of(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
-        spread_version=spread.VERSION if _chooses_tests(dataset, options) else None,
+        spread_version=keys.VERSIONS["spread"] if _chooses_tests(dataset, options) else None,
         **roles,
     )
 
