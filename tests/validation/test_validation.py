@@ -427,10 +427,7 @@ def test_with_few_pixels_a_curved_surface_passes_and_a_turn_of_a_pixel_fails(
 ) -> None:
     dataset = make_dataset(tmp_path / "room" / "spiral", *SMALL_SPIRAL)
     painted(lambda channels: {**channels, "Z": channels["Z"].astype(precision)})(dataset)
-    geometry_check = check(validate(dataset), "geometry")
-    assert geometry_check.passed
-    # This is more than would pass with more pixels.
-    assert geometry_check.figures["worst_displacement_pixels"] > geometry.DISPLACEMENT_LIMIT
+    assert check(validate(dataset), "geometry").passed
     for axis in range(3):
         copy = Path(shutil.copytree(dataset, tmp_path / str(axis) / "spiral"))
         relist(copy, turn([BAD], degrees(axis, 60 / 24)))

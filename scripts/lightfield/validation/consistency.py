@@ -358,10 +358,16 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
     the residuals, as expected or as the motion leaves it, propagated to the motion. Both grow as
     the points become fewer.
 
-    Curvature counts. A plane lies inside a bulging surface, and deeper where it is seen at an
-    angle. So the planes of a curved model seem displaced, however many points it has.
+    Planes and curved surfaces both measure the motion, and the smaller one counts. A plane lies
+    inside a bulging surface, and deeper where it is seen at an angle. So the planes of a curved
+    model seem displaced, however many points it has. Curved surfaces are noisier.
     """
-    residual = measured.curved_residual
+    residuals = (measured.residual, measured.curved_residual)
+    return min(_displacement(measured, residual, camera) for residual in residuals)
+
+
+def _displacement(measured: Comparison, residual: Array, camera: Camera) -> tuple[float, float]:
+    """Return the displacement that explains residuals, and the one to expect."""
     footprint = measured.footprint
     arms = (measured.queried.points - camera.position) / footprint[:, np.newaxis]
     # Give the unknowns a similar size: both are in pixels, the rotation at the median distance.
