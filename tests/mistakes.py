@@ -218,6 +218,7 @@ REFUSED = [
     ("rigs.LFSphere.frames", {"first": 0, "last": 9999, "step": 0}),
     ("rigs.LFSphere.frames", {"first": 0, "last": 9999}, "rigs.LFSphere"),
     ("rigs.LFCuboid.cameras", [2000, 2000, 2000], "rigs.LFCuboid"),
+    ("rigs.LFCuboid.cameras", [200, 200, 100], "rigs.LFCuboid"),
     ("rigs.LFCuboid.cameras", [HUGE, 1, 1]),
     ("rigs.LFCuboid.cameras", [0, 1, 1]),
     ("rigs.LFCuboid.camera.lens", LONG),

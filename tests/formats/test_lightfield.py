@@ -163,6 +163,7 @@ BROKEN = {
     "no mapping": ([], "must be a mapping, not a list"),
     "no camera": ({"frames": []}, "camera: is missing"),
     "no frames": (content(frames=None), "frames: must be a list of views"),
+    "too many views": (content(frames=[None] * 1_000_000), "frames: are 1,000,000; must be at"),
     "no view": (content(frames=[]), "frames: is empty"),
     "a text for settings": (content(render="cycles"), "render: must be a mapping"),
     "no list of passes": (content(passes=3), "passes: must be of normal, object"),

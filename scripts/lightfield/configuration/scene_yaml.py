@@ -37,6 +37,7 @@ from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
+from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -509,6 +510,10 @@ class Scene(Credits):
             raise ValueError(
                 f"{key}: has {frames} frames of {rig.view_count} views; must be at most "
                 f"{MOST_FRAMES} frames and {MOST_VIEWS} views in all"
+            )
+        if rig.view_count > MOST_VIEWS_OF_RIG:
+            raise ValueError(
+                f"{key}: has {rig.view_count:,} views; must be at most {MOST_VIEWS_OF_RIG:,}"
             )
         for view in _unknown_names(rig):
             raise ValueError(f"{key}.split: there is no view {view!r}")

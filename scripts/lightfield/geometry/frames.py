@@ -18,6 +18,9 @@ from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
 # Cameras are at one place if they are nearer to each other than this, in metres.
 ONE_PLACE = 1e-6
 
+# Planning a dataset of more views would take minutes.
+MOST_VIEWS = 100_000
+
 # In bytes, because the name becomes a file's.
 LONGEST_NAME = 200
 
@@ -50,6 +53,8 @@ def read_frames(frames: Any) -> list[Frame]:
     check_list(frames)
     if not frames:
         raise UserError("frames: is empty")
+    if len(frames) > MOST_VIEWS:
+        raise UserError(f"frames: are {len(frames):,}; must be at most {MOST_VIEWS:,}")
     views = [_frame(f"frames[{index}]", content) for index, content in enumerate(frames)]
     names: set[str] = set()
     for frame in views:
