@@ -27,7 +27,7 @@ render: {samples: 1}
 rigs:
   LFHuge:
     type: plane
-    cameras: [1000, 1000]
+    cameras: [400, 250]
     camera: {lens: rectilinear, fov: 60, resolution: [16384, 16384]}
 """
 
