@@ -167,17 +167,23 @@ def _render_views(
     stall: int,
 ) -> None:
     """Render ``views`` one after the other in the open scene. Write and note each."""
+    from lightfield.rendering import holdouts, shadow_catchers
+
     files = _ViewFiles(lightfield, folder)
     process = psutil.Process()
     earlier_seconds: list[float] = []
     visible = _visible_places(lightfield)
+    catches = lightfield.transparent and bool(shadow_catchers.names())
+    has_holdouts = holdouts.exist()
     progress.begin()
     for view in views:
         # Use a timer of the system, because a process that hangs may run no Python.
         signal.alarm(stall)
         began = time.perf_counter()
         began_cpu = time.process_time()
-        rendered = _render_view(view, lightfield, visible)
+        rendered = _render_view(
+            view, lightfield, visible, catches=catches, has_holdouts=has_holdouts
+        )
         files.write(view, rendered)
         shard_log.log(
             {
@@ -235,12 +241,21 @@ def _visible_places(lightfield: LightField) -> Array | None:
     return visible_part.places() if keys.renders_part(lightfield) else None
 
 
-def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _Rendered:
+def _render_view(
+    view: View,
+    lightfield: LightField,
+    visible: Array | None,
+    *,
+    catches: bool,
+    has_holdouts: bool,
+) -> _Rendered:
     """Render the geometry of a view, if depth or a pass needs it, and then its colour.
 
-    ``visible`` are the places from `_visible_places`.
+    ``visible`` are the places from `_visible_places`. ``catches`` says whether the view is
+    transparent and the scene has shadow catchers, and ``has_holdouts`` whether the scene may have
+    holdouts.
     """
-    from lightfield.rendering import holdouts, shadow_catchers, unshown, visible_part
+    from lightfield.rendering import unshown, visible_part
     from lightfield.rendering.colour_pass import render_colour
     from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
@@ -251,7 +266,6 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     began = time.perf_counter()
     choose_eye(view.name)
     part = visible_part.choose(visible, view.world_from_camera, lightfield.lens)
-    catches = lightfield.transparent and bool(shadow_catchers.names())
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
     if has_geometry:
@@ -264,7 +278,7 @@ def _render_view(view: View, lightfield: LightField, visible: Array | None) -> _
     unshown_pixels = None
     if catches:
         colour, geometry, unshown_pixels = unshown.left_out(colour, geometry, view_passes)
-    if geometry and holdouts.exist():
+    if geometry and has_holdouts:
         unshown_pixels = int(np.isinf(geometry.depth).sum())
     if part:
         colour = replace(colour, pixels=part.in_whole(colour.pixels, 0))
