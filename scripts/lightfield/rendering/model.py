@@ -94,8 +94,7 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     receipts.note_inputs([path])
     model_files.check(path)
     references, left_out = model_files.survey(path)
-    textures = obj_files.textures(path) if path.suffix.lower() == ".obj" else ()
-    refuse_special(path, [*references, *textures])
+    refuse_special(path, references)
     refuse_outside(path, references, settings.shared_folder)
     receipts.note_inputs(reference.path for reference in references)
     if path.suffix.lower() == ".obj":

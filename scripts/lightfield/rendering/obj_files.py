@@ -13,7 +13,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lightfield.core.files import special_kind
-from lightfield.rendering.model_references import FileReference, Survey, printable
+from lightfield.rendering.model_references import (
+    FileReference,
+    Survey,
+    printable,
+    refuse_special,
+)
 
 _TEXTURE = re.compile(rb"\s*(map_\w+|bump|disp|decal|refl|norm)\s+(.*?)\s*$", re.IGNORECASE)
 # The options of a texture, and the most words that follow each.
@@ -45,20 +50,19 @@ class _Texture(NamedTuple):
 
 
 def survey(path: Path) -> Survey:
-    """Return the libraries of an OBJ, and the colour spaces of textures that Blender leaves out."""
+    """Return the libraries of an OBJ, and the colour spaces of textures that Blender leaves out.
+
+    Raises `UserError` if a texture is a FIFO or a device.
+    """
     references = [
         FileReference(path, os.fsdecode(name), _in_folder(path, name))
         for name in _libraries(path, _mentions(path))
     ]
-    libraries = filter(_is_file, (reference.path for reference in references))
+    libraries = [reference.path for reference in references if _is_file(reference.path)]
+    for library in libraries:
+        files = [texture.file for texture in _textures(library)]
+        refuse_special(path, [FileReference(library, os.path.relpath(f), f) for f in files])
     return Survey(references, [each for library in libraries for each in _colour_spaces(library)])
-
-
-def textures(path: Path) -> Iterator[FileReference]:
-    """Yield the textures that the libraries of an OBJ name."""
-    for library in _library_files(path, _mentions(path)):
-        for texture in _textures(library):
-            yield FileReference(library, os.path.relpath(texture.file), texture.file)
 
 
 def own_library(path: Path) -> Path:

@@ -203,15 +203,22 @@ class JobCheck:
         It runs if it is not fine, or if a job runs that makes one of its inputs.
         """
         if path not in self._runs:
-            settings = self._wanted(path)
-            summary = self._summary(path)
             # A job that is its own ancestor, as no plan has one, would not end.
             self._runs[path] = False
-            if settings is not None and summary:
-                makers = map(self._maker, summary.inputs)
-                self._runs[path] = not self.verdict(path, settings).is_fine or any(
-                    self.will_run(maker) for maker in makers if maker
-                )
-            else:
-                self._runs[path] = summary is None
+            self._runs[path] = self._has_reason(path)
         return self._runs[path]
+
+    def _has_reason(self, path: str) -> bool:
+        """Return whether a job has a reason to run. Without a receipt, it always has."""
+        summary = self._summary(path)
+        if summary is None:
+            return True
+        if path not in self.verdicts:
+            settings = self._wanted(path)
+            if settings is None:
+                return False
+            self.verdict(path, settings)
+        makers = map(self._maker, summary.inputs)
+        return not self.verdicts[path].is_fine or any(
+            self.will_run(maker) for maker in makers if maker
+        )
