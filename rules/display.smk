@@ -15,6 +15,8 @@ from lightfield.workflow.run_display import RunDisplay, Task
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
+# What stands before a path of the results in a message.
+STORE_PREFIX = f"{STORE}/" if STORE else ""
 # What stands below the table of what jobs request of a cluster.
 REQUESTS_NOTE = """\
 mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the cluster's default.
@@ -149,26 +151,24 @@ def print_failures():
 
 def print_pages():
     """Print the paths of the pages of this run's datasets, which are all valid."""
-    prefix = f"{STORE}/" if STORE else ""
     jobs = {job_of(receipt) for receipt in ASKED}
     pages = [
-        f"{prefix}{dataset.paths.page}"
+        f"{STORE_PREFIX}{dataset.paths.page}"
         for dataset in DATASETS.values()
         if f"{dataset.name}/page" in jobs
     ]
     if len(pages) > MOST_PAGES:
-        pages = [f"{len(pages)} datasets: {prefix}{RESULTS}/index.html"]
+        pages = [f"{len(pages)} datasets: {STORE_PREFIX}{RESULTS}/index.html"]
     for page in pages:
         print(f"valid: {page}", file=sys.stderr)
 
 
 def print_packages():
     """Print the paths of the first archives of this run's packages."""
-    prefix = f"{STORE}/" if STORE else ""
     for job, names in ASKED.values():
         if job == "{scene}/{rig}/package":
             archive = PATHS.package.format(**names)
-            print(f"packed: {prefix}{archive}", file=sys.stderr)
+            print(f"packed: {STORE_PREFIX}{archive}", file=sys.stderr)
 
 
 def print_families():
