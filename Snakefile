@@ -44,12 +44,15 @@ os.environ.pop("BASH_ENV", None)
 # the others.
 GIVEN_KEYS = set(config)
 HAS_OWN_CONFIG = Path("config.yaml").exists() and Path.cwd() != FOLDER
+# The defaults, and before them the values of the user's own folder.
+CONFIG_FILES = [FOLDER / "config.yaml"]
+if HAS_OWN_CONFIG:
+    CONFIG_FILES.insert(0, Path("config.yaml"))
 
 # Snakemake ends with a traceback if it cannot write its notes. It loads both files without a limit
 # of size, and does not name the line of a mistake.
 try:
     check_folder(Path(".snakemake"))
-    # The defaults, and the values of the user's own folder.
     DEFAULTS = read_config(FOLDER / "config.yaml")
     USER_CONFIG = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
 except UserError as error:

@@ -243,7 +243,7 @@ def check_folders():
     chosen = tuple(f"{name_of(folder)}/" for folder in (RESULTS, WORK))
     for receipt, verdict in CHECK.verdicts.items():
         if verdict.example and not verdict.example.startswith(chosen):
-            raise UserError(
+            raise config_mistake(
                 f"results: is {RESULTS}, and work is {WORK}, but {receipt} is the receipt of "
                 f"{verdict.example}: after a move, leave a link in the old place, and keep the key; "
                 "a second build needs a folder work of its own"

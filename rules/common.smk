@@ -5,7 +5,7 @@ import shlex
 import sys
 from operator import attrgetter
 
-from lightfield.configuration.config_file import load_config
+from lightfield.configuration.config_file import load_config, with_lines
 from lightfield.configuration.dataset import Cluster
 from lightfield.configuration.dataset_paths import Paths
 from lightfield.core.errors import UserError
@@ -44,7 +44,13 @@ try:
         for dataset in BUILD.chosen:
             presence.check_presence(dataset)
 except UserError as error:
-    sys.exit(f"error: {error}")
+    sys.exit(f"error: {with_lines(str(error), CONFIG_FILES, GIVEN_KEYS)}")
+
+
+def config_mistake(problem):
+    """Return the error for a mistake in config.yaml, with the line of the problem's key."""
+    return UserError(with_lines(f"config.yaml: {problem}", CONFIG_FILES, GIVEN_KEYS))
+
 
 # Where the storage of jobs without a common folder is. Empty if they have one.
 STORE = SETTINGS.storage

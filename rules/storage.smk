@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+from lightfield.configuration import scene_yaml
 from lightfield.core.errors import UserError
 from lightfield.workflow.storage import Storage
 
@@ -25,15 +26,23 @@ def mark_of_settings(wildcards):
 
 def check_storage():
     """Raise `UserError` for a path that jobs could not find in a storage."""
-    places = {"results": RESULTS, "work": WORK}
-    for dataset in CHOSEN_DATASETS:
-        if dataset.source.blend:
-            places[f"{dataset.scene_name}: scene.blend"] = dataset.source.blend
-    for key, path in places.items():
-        if Path(path).is_absolute() or ".." in Path(path).parts:
-            raise UserError(
-                f"{key}: {path}: must lie here, for the storage has its copy"
+    for key, path in {"results": RESULTS, "work": WORK}.items():
+        if lies_elsewhere(path):
+            raise config_mistake(
+                f"{key}: is {path}; must lie here, for the storage has its copy"
             )
+    for dataset in CHOSEN_DATASETS:
+        blend = dataset.source.blend
+        if blend and lies_elsewhere(blend):
+            raise scene_yaml.mistake(
+                dataset.scene_name,
+                f"scene.blend: is {blend}; must lie here, for the storage has its copy",
+            )
+
+
+def lies_elsewhere(path):
+    """Return whether a path leads out of this folder."""
+    return Path(path).is_absolute() or ".." in Path(path).parts
 
 
 def use_copies(folder):

@@ -140,7 +140,7 @@ TEXTS = {
 }
 
 EXPLAINED_TEXTS = [
-    ("render: {samples: 4\n", "line 2, column 1"),
+    ("render: {samples: 4\n", ":2:1: "),
     ("render: {samples: 4}\nrender: {samples: 5}\n", "the key 'render' is given twice"),
     ("render: {<<: {samples: 4, samples: 5}}\n", "the key 'samples' is given twice"),
     (
@@ -149,8 +149,8 @@ EXPLAINED_TEXTS = [
     ),
     ("1: 2\n", "the key 1 is not a text"),
     ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
-    ("scene:\n\tbuilder: room\n", "line 2, column 1: is indented with a tab; use spaces"),
-    ("a:\n  - b\n\t- c\n", "line 3, column 1: is indented with a tab; use spaces"),
+    ("scene:\n\tbuilder: room\n", ":2:1: is indented with a tab; use spaces"),
+    ("a:\n  - b\n\t- c\n", ":3:1: is indented with a tab; use spaces"),
     ("scene: {blend: a.blend, sha256: 0123}\n", 'scene.sha256: is "0123"; must be 64 hex'),
     ("render: {samples: 12:30:45}\n", 'render.samples: is "12:30:45"; must be a whole number'),
     ("render: {samples: 010}\n", 'render.samples: is "010"; must be a whole number'),
@@ -165,27 +165,27 @@ EXPLAINED_TEXTS = [
     ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
     (
         'description: !!timestamp "x"\n',
-        "line 1, column 14: description: is 'x', which is not a valid timestamp",
+        ":1:14: description: is 'x', which is not a valid timestamp",
     ),
     (
         "rigs:\n  A:\n    split: !!bool x\n",
-        "line 3, column 12: rigs.A.split: is 'x', which is not a valid bool",
+        ":3:12: rigs.A.split: is 'x', which is not a valid bool",
     ),
     (
         "rigs: {A: {size: [1, !!float y]}}\n",
-        "line 1, column 22: rigs.A.size.[1]: is 'y', which is not a valid float",
+        ":1:22: rigs.A.size.[1]: is 'y', which is not a valid float",
     ),
     (
         f"render:\n  samples: {'9' * 60_000}\n",
-        "line 2, column 12: render.samples: is '999",
+        ":2:12: render.samples: is '999",
     ),
     (
         f"render:\n  samples: 0x{'f' * 60_000}\n",
-        "line 2, column 12: render.samples: is a number with too many digits",
+        ":2:12: render.samples: is a number with too many digits",
     ),
     (
         'description: "a \\ud800"\n',
-        "line 1, column 14: description: has '\\ud800', half of a character",
+        ":1:14: description: has '\\ud800', half of a character",
     ),
 ]
 
@@ -1050,8 +1050,8 @@ CHOICES = [
     ({"energy": {"currency": "EUR"}}, "energy.currency: is no longer a key", "energy_kwh"),
 ]
 CONFIG_TEXTS = [
-    (b"scenes: [garden]\n\tpreset: full\n", "line 2, column 1: is indented with a tab"),
-    (b"scenes: [garden\n", "line 2, column 1"),
+    (b"scenes: [garden]\n\tpreset: full\n", ":2:1: is indented with a tab"),
+    (b"scenes: [garden\n", ":2:1: "),
     (b"- garden\n", "must be a mapping"),
     (b"", "must be a mapping"),
     (b"\xff\xfe", "cannot be read as YAML"),

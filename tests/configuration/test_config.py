@@ -66,7 +66,7 @@ def test_flow_of_a_rig_at_one_place_is_refused(rig, refused, tmp_path, monkeypat
     with pytest.raises(UserError) as caught:
         scene_yaml.read_scene(file)
     message = str(caught.value)
-    assert message.startswith(f"{file}: flow: ")
+    assert re.match(rf"{file}:\d+: flow: ", message)
     assert "rigs.View" in message
     assert "\n" not in message
 
@@ -76,7 +76,7 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
         yaml.safe_dump(flowing({"type": "plane", "cameras": [4, 1]}))
     )
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
-    with pytest.raises(UserError, match=r"row\.yaml: flow: .*preset tiny .*rigs\.View"):
+    with pytest.raises(UserError, match=r"row\.yaml:\d+: flow: .*preset tiny .*rigs\.View"):
         scene_datasets("row", "tiny", Preset(views=1))
     assert scene_datasets("row", "tiny", Preset(views=2))[0].flow
 
@@ -91,7 +91,9 @@ def test_an_export_that_cannot_take_what_a_preset_leaves_is_refused(tmp_path, mo
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     assert scene_datasets("size")[0].exports.hci
     assert scene_datasets("baseline", "tiny", Preset(views=12))[0].exports.hci
-    problem = r"size\.yaml: exports\.hci: under the preset tiny, the rig View has cameras .*apart"
+    problem = (
+        r"size\.yaml:\d+: exports\.hci: under the preset tiny, the rig View has cameras .*apart"
+    )
     with pytest.raises(UserError, match=problem):
         scene_datasets("size", "tiny", Preset(views=12))
 
@@ -251,7 +253,9 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert small[0].reprojections["perspective"].camera.resolution == (100, 100)
     assert small[0].render.samples == 8
     assert small[0].render.denoise is True
-    with pytest.raises(UserError, match=r"right\.yaml: rigs\.LFSphere: a rig of type sphere can"):
+    with pytest.raises(
+        UserError, match=r"right\.yaml:\d+: rigs\.LFSphere: a rig of type sphere can"
+    ):
         scene_datasets("right", limits=Preset(views=1))
 
 
@@ -395,3 +399,77 @@ def test_no_two_scenes_may_share_a_folder(tmp_path, monkeypatch):
     for scene, preset in (("room", "tiny"), ("room_tiny", "full")):
         with pytest.raises(UserError, match="room_tiny would be the folder of both room with"):
             chosen(scene, preset)
+
+
+WHERE_KEYS_STAND = """\
+rigs:
+  near.by: &near
+    camera: &camera
+      lens: equidistant
+      resolution:
+        - 8
+        - 0
+    size: 1
+  far:
+    <<: *near
+    size: 2
+  wall: {camera: *camera}
+  near: 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("problem", "line"),
+    [
+        ("rigs: is wrong", 1),
+        ("rigs.near: is wrong", 13),
+        ("rigs.near.by: is wrong", 2),
+        ("rigs.near.by.camera: is missing the key fov", 3),
+        ("rigs.near.by.camera.fov: is missing", 3),
+        ("rigs.near.by.camera.resolution.[1]: is 0", 7),
+        ("rigs.far.size: is 2", 11),
+        ("rigs.far.camera.lens: is wrong", 4),
+        ("rigs.wall.camera: is wrong", 12),
+        ("rigs.wall.camera.lens: is wrong", 4),
+        ("rig: unknown key", None),
+        ("is missing the key scene", None),
+        ("rigs of nobody: is wrong", None),
+    ],
+)
+def test_a_problem_has_the_line_where_its_key_stands(problem, line):
+    said = yaml_files.located(problem, WHERE_KEYS_STAND, "a.yaml")
+    assert said == (f"a.yaml:{line}: {problem}" if line else f"a.yaml: {problem}")
+
+
+def test_a_key_of_the_configuration_has_the_line_of_the_file_that_says_it(tmp_path, monkeypatch):
+    """Not of the other file, and no line if the command line says it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "defaults").mkdir()
+    defaults = tmp_path / "defaults/config.yaml"
+    defaults.write_text("preset: full\nenergy:\n  cores: auto\n  watts: -1\n")
+    users_file = tmp_path / "config.yaml"
+    users_file.write_text("energy: {cores: 0}\nscenes: 7\n")
+    content = {"preset": "best", "scenes": 7, "energy": {"cores": 0, "watts": -1}, "presets": {}}
+    with pytest.raises(UserError) as caught:
+        config_file.load_config(content)
+    message = config_file.with_lines(str(caught.value), [users_file, defaults], {"scenes"})
+    assert "config.yaml:1: energy.cores: is 0" in message
+    assert "defaults/config.yaml:4: energy.watts: is -1" in message
+    assert "config.yaml: scenes: " in message
+    assert "config.yaml: presets: " in message
+
+
+def test_a_drawn_value_has_its_line_in_the_family(tmp_path):
+    file = tmp_path / "rooms.yaml"
+    file.write_text(
+        "scene: {builder: room}\n"
+        "render:\n"
+        "  samples: 4\n"
+        "rigs: {A: {type: sphere, camera: {lens: equidistant, fov: 180, resolution: [8, 8]}}}\n"
+        "family:\n"
+        "  seeds: 0-3\n"
+        "  values:\n"
+        "    render.samples: {integers: [0, 4]}\n"
+    )
+    with pytest.raises(UserError, match=r"rooms\.yaml:8: render\.samples: is 0"):
+        scene_yaml.read_scene(file)

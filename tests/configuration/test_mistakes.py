@@ -34,6 +34,13 @@ SETTINGS = {
 }
 
 
+class PlainDumper(yaml.SafeDumper):
+    """Writes equal values each time, without aliases."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
 def read_with_mistake(mistake, file):
     """Write a file with its mistake, and read it as a program does."""
     value = mistake.value
@@ -41,7 +48,7 @@ def read_with_mistake(mistake, file):
         file.write_bytes(value.encode() if isinstance(value, str) else value)
     if file.name == "scene.yaml":
         if mistake.key:
-            file.write_text(yaml.safe_dump(changed(mistake.key, value)))
+            file.write_text(yaml.dump(changed(mistake.key, value), Dumper=PlainDumper))
         scene_yaml.read_scene(file)
     elif file.name == "config.yaml":
         if not mistake.key:
@@ -71,11 +78,48 @@ def test_a_mistake_is_refused_with_file_and_key(mistake, tmp_path, monkeypatch):
     assert len(lines) <= 11
     # A user must not see a regular expression.
     assert not re.search(r"\^[\[\\\w]|\]\*?\$", message), message
-    # Settings of config.yaml may come from the command line, so its folder may be missing.
-    named = file if mistake.file != "config.yaml" or str(file) in message else file.name
-    assert message.startswith(f"{named}: {mistake.said}")
-    assert all(line.startswith(f"{named}: ") for line in lines)
+    # The line of a key of config.yaml is known where its files are.
+    named = file.name if mistake.file == "config.yaml" else file
+    places = [re.match(rf"{re.escape(str(named))}(:\d+){{0,2}}: ", line) for line in lines]
+    assert all(places)
+    assert message[places[0].end() :].startswith(mistake.said)
     assert mistake.allowed in message
+    if mistake.file == "scene.yaml" and mistake.key:
+        lines_of_keys = lines_of(file.read_text())
+        for line, place in zip(lines, places, strict=True):
+            problem = line[place.end() :]
+            assert place[0] == f"{file}{line_of(problem, lines_of_keys)}: ", problem
+
+
+def lines_of(text):
+    """Return the lines of the keys and list items of a YAML file in block style, by the keys."""
+    lines = {}
+    # The keys above a line, with their columns. An item may be in the column of its key.
+    parents = []
+    for number, line in enumerate(text.splitlines(), 1):
+        column = len(line) - len(line.lstrip())
+        while line[column:].startswith("- "):
+            items = [key for place, key in parents if place == column and key.startswith("[")]
+            index = int(items[0][1:-1]) + 1 if items else 0
+            parents = [(c, k) for c, k in parents if c < column or (c == column and k[0] != "[")]
+            parents.append((column, f"[{index}]"))
+            lines[".".join(key for _, key in parents)] = number
+            column += 2
+        if match := re.match(r"([\w.-]+):(?: |$)", line[column:]):
+            parents = [(place, key) for place, key in parents if place < column]
+            parents.append((column, match[1]))
+            lines[".".join(key for _, key in parents)] = number
+    return lines
+
+
+def line_of(problem, lines_of_keys):
+    """Return ``:line`` of the longest key with which a problem begins. Or nothing without one."""
+    # The values that a family draws stand for keys of its members.
+    values = "family.values."
+    drawn = {k.removeprefix(values): line for k, line in lines_of_keys.items() if values in k}
+    lines = lines_of_keys | drawn
+    keys = [key for key in lines if re.match(rf"{re.escape(key)}(: |\.)", problem)]
+    return f":{lines[max(keys, key=len)]}" if keys else ""
 
 
 def test_all_mistakes_of_a_scene_yaml_are_told_at_once(tmp_path):
@@ -90,8 +134,8 @@ def test_all_mistakes_of_a_scene_yaml_are_told_at_once(tmp_path):
     with pytest.raises(UserError) as caught:
         scene_yaml.read_scene(file)
     lines = str(caught.value).splitlines()
-    assert all(line.startswith(f"{file}: ") for line in lines)
-    problems = [line.removeprefix(f"{file}: ") for line in lines]
+    assert all(line.startswith(f"{file}:") for line in lines)
+    problems = [re.sub(r"^:(\d+:)? ", "", line.removeprefix(str(file))) for line in lines]
     starts = [
         "reprojection: unknown key; did you mean reprojections?",
         "scene.sed: unknown key",
@@ -165,12 +209,17 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(
     assert not (tmp_path / "results").exists() and not (tmp_path / "work").exists()
 
 
+CHECKOUTS_CONFIG = (ROOT / "config.yaml").read_text()
+LAST_LINE = CHECKOUTS_CONFIG.count("\n") + 1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        (b"scenes: [garden]\n\tpreset: full\n", "line 2, column 1: is indented with a tab"),
-        (None, "cannot be read as YAML"),
+        ("scenes: [garden]\n\tpreset: full\n", "config.yaml:2:1: is indented with a tab"),
+        (CHECKOUTS_CONFIG + "energie: 1\n", f"config.yaml:{LAST_LINE}: energie: unknown key"),
+        (None, "config.yaml: cannot be read as YAML"),
     ],
 )
 def test_a_fault_in_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
@@ -178,9 +227,9 @@ def test_a_fault_in_the_checkouts_own_config_is_one_line(text, problem, tmp_path
     if text is None:
         (folder / "config.yaml").unlink()
     else:
-        (folder / "config.yaml").write_bytes(text)
+        (folder / "config.yaml").write_text(text)
     run = snakemake(folder, "--dry-run")
     said = (run.stdout + run.stderr).splitlines()
     assert run.returncode != 0
-    assert said[-1].startswith("error: ") and "config.yaml: " in said[-1] and problem in said[-1]
+    assert said[-1].startswith(f"error: {problem}")
     assert len(said) <= 2

@@ -32,7 +32,9 @@ def test_another_folder_of_results_is_refused_before_a_job_and_in_the_plan(tiny_
     before = sorted(tiny_build.rglob("*.exr"))
     status, plan = said(tiny_build, "results=elsewhere", "--dry-run")
     (refusal,) = (
-        line for line in plan.splitlines() if line.startswith("would be refused: results:")
+        line
+        for line in plan.splitlines()
+        if line.startswith("would be refused: config.yaml: results:")
     )
     assert status == 0 and "is missing" not in plan and "outdated:" not in plan
     status, run = said(tiny_build, "results=elsewhere")

@@ -537,7 +537,7 @@ def test_a_dataset_of_a_model_follows_its_files(renders, tmp_path):
 @pytest.mark.slow
 def test_a_missing_model_is_named_before_the_first_job(tmp_path):
     folder = checkout(tmp_path / "plenoforge", chair=SCENE)
-    no_file = "error: configs/scenes/chair.yaml: scene.model: there is no file models/shape.obj"
+    no_file = "error: configs/scenes/chair.yaml:2: scene.model: there is no file models/shape.obj"
     result = snakemake(folder, "--config", "scenes=chair")
     assert result.returncode != 0
     assert f"{no_file}; put it there" in result.stderr

@@ -1,7 +1,8 @@
 """The top-level configuration, config.yaml: which scenes to build, at which quality, and where."""
 
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -18,6 +19,7 @@ from lightfield.core.setting_types import (
 )
 from lightfield.core.settings import Name, Settings, checked_yaml, pattern
 
+_FILE = "config.yaml"
 # Folders of the project, of a user's inputs, and of programs such as Snakemake.
 _RESERVED = {
     ".ci",
@@ -227,7 +229,34 @@ _CONFIGURATION = TypeAdapter(Configuration)
 
 def load_config(content: Any) -> Configuration:
     """Return the top-level configuration. Raises `UserError`."""
-    return checked_yaml(_CONFIGURATION, content, "config.yaml")
+    return checked_yaml(_CONFIGURATION, content, f"{_FILE}: {{}}".format)
+
+
+def with_lines(message: str, files: Iterable[Path], given_keys: Set[str]) -> str:
+    """Return the message of an error with the line of each key that it names in a config.yaml.
+
+    ``files`` are those whose keys make the configuration, the one that counts first. The
+    ``given_keys`` come from the command line, and have no line.
+    """
+    from lightfield.core.yaml_files import find_key, read_settings_text
+
+    texts = {(name := _shown(path)): read_settings_text(path, name) for path in files}
+
+    def with_line(message_line: str) -> str:
+        problem = message_line.removeprefix(f"{_FILE}: ")
+        if problem == message_line or re.split("[.:]", problem)[0] in given_keys:
+            return message_line
+        keys = {name: find_key(problem, text) for name, text in texts.items()}
+        name = max(keys, key=lambda name: keys[name][0])
+        depth, number = keys[name]
+        return f"{name}:{number}: {problem}" if depth else message_line
+
+    return "\n".join(map(with_line, message.splitlines()))
+
+
+def _shown(path: Path) -> str:
+    """Return the path of a config.yaml for messages."""
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -236,7 +265,7 @@ def read_config(path: Path) -> dict[str, Any]:
     # YAML.
     from lightfield.core.yaml_files import read_yaml
 
-    content = read_yaml(path, path.name)
+    content = read_yaml(path, _shown(path))
     if not isinstance(content, dict):
-        raise UserError(f"{path}: must be a mapping of keys to values")
+        raise UserError(f"{_shown(path)}: must be a mapping of keys to values")
     return content

@@ -33,7 +33,13 @@ from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, PARTS, ROOT, VIEWS
 from lightfield.core.setting_types import Auto, unique_names
 from lightfield.core.settings import Name, Settings, checked, checked_yaml, suggestion
-from lightfield.core.yaml_files import parse_yaml, read_settings_text, read_yaml
+from lightfield.core.yaml_files import (
+    find_key,
+    located,
+    parse_yaml,
+    read_settings_text,
+    read_yaml,
+)
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
@@ -651,8 +657,19 @@ def check_member(content: Any, name: str) -> Scene:
 
 def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
-    file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
+    file = _shown(path)
     return _checked_scene(read_settings_text(path, file), file, Path.cwd())
+
+
+def mistake(scene: str, problem: str) -> UserError:
+    """Return the error for a mistake in a scene YAML, with the line of the problem's key."""
+    path = scene_path(scene)
+    return UserError(located(problem, read_settings_text(path, _shown(path)), _shown(path)))
+
+
+def _shown(path: Path) -> str:
+    """Return the path of a scene YAML for messages."""
+    return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
 
 
 # The rules ask for the same scenes many times.
@@ -660,8 +677,16 @@ def read_scene(path: Path) -> Scene:
 def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
     """Return a scene YAML's text as settings. Its relative paths start from ``_folder``."""
     content = parse_yaml(text, file)
+    is_family = False
     if isinstance(content, dict) and "family" in content:
         # The check below reports a block `family` that is wrong itself.
         with suppress(ValidationError, TypeError):
             content = stand_in(content)
-    return checked_yaml(_SCENE, content, file)
+            is_family = True
+
+    def located_here(problem: str) -> str:
+        # The line of a value that a family draws is in family.values.
+        depth, line = find_key(f"family.values.{problem}", text) if is_family else (0, 0)
+        return f"{file}:{line}: {problem}" if depth > 2 else located(problem, text, file)
+
+    return checked_yaml(_SCENE, content, located_here)

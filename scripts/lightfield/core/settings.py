@@ -195,19 +195,20 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
         raise UserError(f"{file}: {first}") from None
 
 
-def checked_yaml(model: TypeAdapter[Model], content: Any, file: str) -> Model:
+def checked_yaml(model: TypeAdapter[Model], content: Any, located: Callable[[str], str]) -> Model:
     """Return the content of a file that a user wrote as ``model``.
 
     Raises `UserError` with a line for each mistake, so that the user can mend them at once.
+    ``located`` adds the file and the line to a problem.
     """
     try:
         return model.validate_python(content)
     except ValidationError as error:
         problems = _problems(error.errors(), content)
-    lines = [f"{file}: {problem}" for problem in problems[:_MOST_PROBLEMS]]
-    if problems[_MOST_PROBLEMS:]:
-        lines.append(f"{file}: {len(problems) - _MOST_PROBLEMS} more mistakes")
-    raise UserError(*lines)
+    more = len(problems) - _MOST_PROBLEMS
+    if more > 0:
+        problems[_MOST_PROBLEMS:] = [f"{more} more mistakes"]
+    raise UserError(*map(located, problems))
 
 
 def read_settings(model: type[Model], path: Path) -> Model:

@@ -138,28 +138,71 @@ def parse_yaml(text: str, file: str) -> Any:
         return loader.construct_document(node) if node else None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
-        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         keys = ".".join(_keys_to(mark.index, node)) if mark and node else ""
         problem = f"{keys}: {error.problem}" if keys else error.problem
         if mark and _is_indented_by_tabs(text, mark.line):
             problem = "is indented with a tab; use spaces"
-        raise UserError(f"{file}: {where}{problem}") from None
+        raise UserError(f"{file}{where}: {problem}") from None
     except (ValueError, RecursionError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
 
 
+def located(problem: str, text: str, file: str) -> str:
+    """Return ``file:line: problem``. The line is that of the key with which the problem begins.
+
+    ``text`` is the file's text, which `parse_yaml` has read.
+    """
+    _, line = find_key(problem, text)
+    return f"{file}:{line}: {problem}" if line else f"{file}: {problem}"
+
+
+def find_key(problem: str, text: str) -> tuple[int, int]:
+    """Return how many of the keys with which a problem begins a YAML file has, and the last's line.
+
+    So a missing key has the line of its parent. Without any key, both numbers are 0. A key that
+    was inserted with `<<` or `*name` has the line where it stands.
+    """
+    loader = _UniqueKeyLoader(text)
+    node = loader.get_single_node()
+    if node:
+        # This replaces each `<<` by the keys that it inserts.
+        loader.construct_document(node)
+    depth = line = 0
+    while node:
+        children = [
+            (key, place, child)
+            for key, place, child in _children(node)
+            if problem.startswith((f"{key}.", f"{key}: "))
+        ]
+        if not children:
+            break
+        # Names may have dots. Of keys that are equal, the last counts.
+        key, place, node = max(reversed(children), key=lambda child: len(child[0]))
+        depth += 1
+        line = place.start_mark.line + 1
+        if problem.startswith(f"{key}: "):
+            break
+        problem = problem.removeprefix(f"{key}.")
+    return depth, line
+
+
 def _keys_to(index: int, node: yaml.Node) -> Iterator[str]:
     """Yield the keys below a node that lead to the value at ``index`` of the text."""
-    children: list[tuple[str, yaml.Node]] = []
-    if isinstance(node, yaml.MappingNode):
-        children = [(str(key.value), value) for key, value in node.value]
-    elif isinstance(node, yaml.SequenceNode):
-        children = [(f"[{number}]", value) for number, value in enumerate(node.value)]
-    for key, child in children:
+    for key, _, child in _children(node):
         if child.start_mark.index <= index < child.end_mark.index:
             yield key
             yield from _keys_to(index, child)
             return
+
+
+def _children(node: yaml.Node) -> list[tuple[str, yaml.Node, yaml.Node]]:
+    """Return the keys below a node as messages write them, each with its place and its value."""
+    if isinstance(node, yaml.MappingNode):
+        return [(str(key.value), key, value) for key, value in node.value]
+    if isinstance(node, yaml.SequenceNode):
+        return [(f"[{number}]", value, value) for number, value in enumerate(node.value)]
+    return []
 
 
 def _is_indented_by_tabs(text: str, line: int) -> bool:

@@ -3,7 +3,7 @@
 from importlib.metadata import version
 
 from lightfield.configuration import blend_lock
-from lightfield.configuration.scene_yaml import load_scene
+from lightfield.configuration.scene_yaml import load_scene, mistake
 from lightfield.core import download, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
@@ -14,7 +14,7 @@ def fetch(job: FetchBlend) -> None:
     """Download the .blend. Continue where an earlier download was interrupted."""
     source = load_scene(job.scene).scene
     if source.url is None:
-        raise UserError(f"configs/scenes/{job.scene}.yaml: scene: is missing the key url")
+        raise mistake(job.scene, "scene: is missing the key url")
     expected, origin = blend_lock.blend_sha256(job.scene, source)
     download.fetch(source.url, job.output, expected, str(origin))
 

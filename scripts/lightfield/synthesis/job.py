@@ -4,12 +4,14 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
+from lightfield.core.settings import checked_yaml
 from lightfield.core.units import count
-from lightfield.core.yaml_files import read_yaml
+from lightfield.core.yaml_files import located, parse_yaml, read_settings_text
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import NAME, LightField
@@ -73,7 +75,13 @@ def _poses(path: Path | None) -> LightField | None:
         return None
     if path.suffix == ".json":
         return LightField.read(path)
-    rig = rigs.from_settings(read_yaml(path, str(path)), str(path))
+    file = str(path)
+    text = read_settings_text(path, file)
+    rig: rigs.Rig = checked_yaml(
+        TypeAdapter(rigs.AnyRig),
+        parse_yaml(text, file),
+        lambda problem: located(problem, text, file),
+    )
     if rig.camera is None:
         raise UserError(f"{path}: camera: is missing; it is the camera of the synthesised views")
     return LightField.from_rig(rig, lenses.from_camera(rig.camera))

@@ -21,7 +21,7 @@ from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_yaml import load_scene, scene_path
+from lightfield.configuration.scene_yaml import load_scene, mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import MESH, VIEWS, scene_folder
 from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
@@ -355,7 +355,7 @@ class Build:
             try:
                 batches[folder] = self.families[name].batches()
             except UserError as error:
-                raise UserError(f"{scene_path(name)}: {error}") from None
+                raise mistake(name, str(error)) from None
         return batches
 
     @property

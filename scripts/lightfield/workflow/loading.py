@@ -175,15 +175,16 @@ def rig_dataset(scene: str, rig: str | None) -> Dataset:
 
 def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limits: Preset) -> Rig:
     """Return a rig under a preset's ``limits``. Raises `UserError` if too few views remain."""
-    file = f"{scene_yaml.OWN_SCENES}/{scene}.yaml"
     try:
         rig = _limited_rig(written.rigs[name], limits, written.render is not None)
     except UserError as error:
-        raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more views") from None
+        problem = f"rigs.{name}: {error}; let the preset have more views"
+        raise scene_yaml.mistake(scene, problem) from None
     if written.flow and rig.is_at_one_place():
-        raise UserError(
-            f"{file}: flow: {scene_yaml.FLOW_PLACES}, but the preset "
-            f"{preset} leaves one of rigs.{name}; let the preset have more views"
+        raise scene_yaml.mistake(
+            scene,
+            f"flow: {scene_yaml.FLOW_PLACES}, but the preset {preset} leaves one of rigs.{name}; "
+            "let the preset have more views",
         )
     return rig
 
@@ -223,9 +224,8 @@ def _check_limited_exports(scene: str, name: str, preset: str, rig: Rig, exports
     """Check that the exports' consumers can take a rig from which a preset left out cameras."""
     for key, export in exports.selected.items():
         if export.sources and (refusal := export.rig_refusal(rig)):
-            raise UserError(
-                f"{scene_yaml.OWN_SCENES}/{scene}.yaml: exports.{key}: under the preset {preset}, "
-                f"the rig {name} {refusal}"
+            raise scene_yaml.mistake(
+                scene, f"exports.{key}: under the preset {preset}, the rig {name} {refusal}"
             )
 
 

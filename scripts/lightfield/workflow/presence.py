@@ -36,15 +36,15 @@ def check_presence(dataset: Dataset) -> None:
     source = dataset.source
     hint = case_hint(Path(source.model or source.blend or "."))
     if source.model and not Path(source.model).is_file():
-        raise UserError(
-            f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.model: "
-            f"there is no file {source.model}{hint}; put it there"
+        raise scene_yaml.mistake(
+            dataset.scene_name,
+            f"scene.model: there is no file {source.model}{hint}; put it there",
         )
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
-        raise UserError(
-            f"{scene_yaml.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
-            f"there is no file {source.blend}{hint}; {page}put it there"
+        raise scene_yaml.mistake(
+            dataset.scene_name,
+            f"scene.blend: there is no file {source.blend}{hint}; {page}put it there",
         )
 
 
