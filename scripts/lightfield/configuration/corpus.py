@@ -5,10 +5,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from lightfield.core.names import Part
+from lightfield.core.names import CORPUS, Part
 from lightfield.core.settings import Settings
 
-CORPUS = "corpus.json"
 PAGE = "index.html"
 # The files of a corpus that every family has.
 CORPUS_FILES = (CORPUS, PAGE, "sha256sums.txt")

@@ -15,7 +15,9 @@ from pathlib import Path
 from lightfield.core.terminal import report_interrupts
 
 _SCRIPTS = Path(__file__).resolve().parents[2]
-_PROGRAM_FOLDERS = {_SCRIPTS, _SCRIPTS.parent / "benchmarks"}
+# An installed library lies beside other packages, which are no programs of ours.
+_IS_INSTALLED = _SCRIPTS.name != "scripts"
+_PROGRAM_FOLDERS = set() if _IS_INSTALLED else {_SCRIPTS, _SCRIPTS.parent / "benchmarks"}
 
 # Prefixes of variables that change what a program computes, by what reads them.
 _REMOVED = (

@@ -14,6 +14,9 @@ SPLITS = "splits.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 
+# The file that lists the members of a family.
+CORPUS = "corpus.json"
+
 # The help of all flags --inventory.
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 

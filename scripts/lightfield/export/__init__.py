@@ -19,6 +19,7 @@ from lightfield.core.names import MESH
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.formats.export_lists import FOLDER, MANIFEST, files_of
+from lightfield.formats.layout import FRAME_FOLDERS
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.exports import ExportViews
 
@@ -61,7 +62,7 @@ def source_of(name: str, settings: ExportSettings[Any], dataset: Path) -> Source
     views = (settings.source, settings.suffix, test_folders)
     if name not in SEQUENCE_EXPORTS:
         return SourceDataset(dataset, *views, **development)
-    folders = settings.frames or [path.name for path in dataset.glob("f[0-9]*")]
+    folders = settings.frames or [path.name for path in dataset.glob(FRAME_FOLDERS)]
     return SourceSequence.of_folders(dataset, folders, *views, **development)
 
 

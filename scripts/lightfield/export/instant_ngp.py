@@ -27,7 +27,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
 from lightfield.core.names import PARTS
 from lightfield.core.progress import Progress
-from lightfield.export.source import DepthMaps, Floats, check_size, depth_of
+from lightfield.export.source import DepthMaps, Floats
+from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.export_lists import MASK
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth

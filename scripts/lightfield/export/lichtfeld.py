@@ -25,8 +25,9 @@ from lightfield.core.files import link_or_copy, write_json, write_text
 from lightfield.core.progress import Progress
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Floats, SourceDataset, check_size
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.depth import check_size
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular

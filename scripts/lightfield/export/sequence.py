@@ -9,6 +9,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats.layout import frame_times
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 
@@ -88,8 +89,7 @@ class SourceSequence:
     @property
     def times(self) -> list[float]:
         """The time of each frame: 0 for the first, 1 for the last."""
-        first, last = self.numbers[0], self.numbers[-1]
-        return [(number - first) / (last - first) for number in self.numbers]
+        return frame_times(self.numbers)
 
     def require_still_cameras(self) -> None:
         """Raise `UserError` if a camera moves: the consumer has one pose for all frames."""

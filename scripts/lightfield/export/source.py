@@ -4,20 +4,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy
-from lightfield.formats.depth import depth_meaning
+from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.lightfield import NAME, LightField, View
-from lightfield.geometry.depth import (
-    LARGEST_STEP,
-    converted,
-    in_16_bits,
-)
+from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 
@@ -129,9 +124,7 @@ class SourceDataset:
         """Return the coverage of each pixel (height, width), 0 to 255. 0 where it has no light."""
         covered = self.valid(view).astype(np.float32)
         if self.lightfield.transparent:
-            alpha = self._image(view, ["A"]).channels["A"]
-            scale = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
-            covered *= alpha.astype(np.float32) / scale
+            covered *= self._image(view, ["A"]).alpha
         return np.asarray(np.rint(covered * 255), np.uint8)
 
     def opaque(self, view: View) -> NDArray[np.uint8]:
@@ -264,10 +257,9 @@ def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[n
 
     ``rays`` (n, 3) may have any length. Outside the frame column and row are 0.
     """
-    x, y = np.floor(lens.pixels(rays)).T
-    with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
-    column, row = (np.where(inside, value, 0).astype(np.intp) for value in (x, y))
+    pixels = lens.pixels(rays)
+    inside = lens.in_frame(pixels)
+    column, row = np.where(inside, np.floor(pixels).T, 0).astype(np.intp)
     return column, row, inside
 
 
@@ -293,33 +285,3 @@ class DepthMaps:
                 f"note: {place}: {self._lost} of {self._pixels} depths are 0, unknown, because "
                 f"16 bits hold only {self.unit:g} to {LARGEST_STEP * self.unit:g} m"
             )
-
-
-def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
-    """Return a view's depth (h, w) in metres, as "z" or "distance". NaN where there is no ray.
-
-    ``rays`` (h, w, 3) are the pixels' rays. Raises `UserError` for a view of another size, and if
-    neither its header nor lightfield.json says what channel Z means.
-    """
-    image = images.read_image(path, ["Z"])
-    check_size(path, lightfield, image.channels["Z"])
-    depth = image.channels["Z"].astype(np.float64)
-    stored_meaning = depth_meaning(image.attributes, lightfield)
-    if stored_meaning not in ("z", "distance"):
-        raise UserError(
-            f"{lightfield.path}: depth: is {stored_meaning!r}; must be z or distance "
-            "to say what channel Z of the views holds"
-        )
-    # A pixel without a ray has no depth.
-    return np.where(np.isnan(rays[..., 2]), np.nan, converted(depth, rays, stored_meaning, meaning))
-
-
-def check_size(path: Path, lightfield: LightField, pixels: NDArray[Any]) -> None:
-    """Raise `UserError` if a view's pixels (h, w, …) do not have the size of the lens."""
-    height, width = pixels.shape[:2]
-    lens = lightfield.lens
-    if (width, height) != (lens.width, lens.height):
-        raise UserError(
-            f"{path}: is {width} × {height}, but {lightfield.path} says "
-            f"{lens.width} × {lens.height}"
-        )

@@ -4,6 +4,7 @@ A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections. E
 a folder with its own lightfield.json and images.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,12 @@ from lightfield.formats.sensors import SensorSettings, parameter_file, settings_
 
 IMAGES = "exr"
 """The folder of a dataset's own views."""
+
+FRAME_FOLDERS = "f[0-9]*"
+"""The pattern of the folders of a sequence's frames, in a rig's folder."""
+
+OTHER_FILES = "other_files.tar"
+"""The tar beside published shards that has the files of no single view."""
 
 SUMS = "sha256sums.txt"
 """The file with a dataset's checksums. Only a valid dataset has it."""
@@ -71,6 +78,11 @@ class ImageSet:
         return self.name or IMAGES
 
     @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The suffixes that its views may have, the one with more information first."""
+        return (".exr", ".png") if self.name else (".exr",)
+
+    @property
     def prefix(self) -> str:
         """The prefix of its files' paths and of its checks' names."""
         return f"{self.name}/" if self.name else ""
@@ -107,6 +119,24 @@ class File:
     def is_view(self) -> bool:
         """Whether it is a view's picture, not a pass or a picture beside it."""
         return self.view >= 0 and self.of_pass is None
+
+
+def further_parts(package: Path) -> list[Path]:
+    """Return the further parts beside the first part of a package: x.2.tar beside x.tar."""
+    tars = package.parent.glob(f"{package.stem}.*.tar")
+    # Another rig's name may begin with this rig's name.
+    return sorted(tar for tar in tars if re.fullmatch(r"\.\d+", tar.stem[len(package.stem) :]))
+
+
+def frame_number(folder: str) -> int:
+    """Return the frame of the animation whose folder in a sequence has this name: f00001."""
+    return int(folder.removeprefix("f"))
+
+
+def frame_times(numbers: Sequence[int]) -> list[float]:
+    """Return the time of each frame of a sequence: 0 for the first, 1 for the last."""
+    first, last = numbers[0], numbers[-1]
+    return [(number - first) / max(last - first, 1) for number in numbers]
 
 
 def read_set(dataset: Path, name: str, source: ImageSet | None = None) -> ImageSet:
@@ -154,9 +184,8 @@ def view_files(dataset: Path, image_set: ImageSet, number: int) -> tuple[list[Fi
 
 def _formats(image_set: ImageSet, present: Set[str]) -> list[str]:
     """Return the suffixes that any of a set's views has. EXR if no view is there."""
-    allowed = (".exr", ".png") if image_set.name else (".exr",)
     formats = []
-    for suffix in allowed:
+    for suffix in image_set.suffixes:
         if any(view + suffix in present for view in image_set.views):
             formats.append(suffix)
     return formats or [".exr"]

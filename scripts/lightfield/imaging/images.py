@@ -84,6 +84,13 @@ class Image:
         return to_rec_709(colour, self.chromaticities)
 
     @property
+    def alpha(self) -> np.ndarray[Any, Any]:
+        """Channel A as (height, width) float32, 0 to 1."""
+        alpha = self.channels["A"]
+        scale = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
+        return np.asarray(alpha.astype(np.float32) / scale)
+
+    @property
     def encoded(self) -> np.ndarray[Any, Any]:
         """R, G and B of a picture of whole numbers as (height, width, 3) float64, 0 to 1."""
         pixels = np.stack([self.channels[name] for name in "RGB"], axis=-1)

@@ -18,7 +18,8 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path
-from lightfield.export.source import Bools, Floats, SourceDataset, check_size
+from lightfield.export.source import Bools, Floats, SourceDataset
+from lightfield.formats.depth import check_size
 from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens

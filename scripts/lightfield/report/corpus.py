@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.corpus import CORPUS, PAGE, THUMBNAILS
+from lightfield.configuration.corpus import PAGE, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.core.names import PARTS
+from lightfield.core.names import CORPUS, PARTS
 from lightfield.formats.layout import SUMS
 from lightfield.report import corpus_looks, corpus_page, corpus_shards
 from lightfield.report.corpus_looks import Look

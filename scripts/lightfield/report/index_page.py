@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lightfield.configuration.corpus import CORPUS
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
+from lightfield.core.names import CORPUS
 from lightfield.core.paths import files_below
 from lightfield.formats.layout import REPORT
 from lightfield.formats.lightfield import NAME, LightField

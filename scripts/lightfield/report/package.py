@@ -5,7 +5,6 @@ order, times, owners and modes depend on the files alone.
 """
 
 import json
-import re
 import tarfile
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -21,7 +20,7 @@ from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.export import transforms
 from lightfield.formats.export_lists import MANIFEST
-from lightfield.formats.layout import CARD, IMAGES, README, REPORT
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_parts
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
@@ -166,10 +165,8 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     paths = [
         path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
     ]
-    for old in target.parent.glob(f"{target.stem}.*.tar"):
-        # Another rig's name may begin with this rig's name.
-        if re.fullmatch(r"\.\d+", old.name[len(target.stem) : -len(".tar")]):
-            old.unlink()
+    for old in further_parts(target):
+        old.unlink()
     written = []
     card_size = sum(tar_size(len(text.encode())) for text in texts.values())
     for number, part in enumerate(_parts(paths, most, card_size), 1):

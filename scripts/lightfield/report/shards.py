@@ -19,6 +19,7 @@ from lightfield.core.files import atomic_path, write_csv
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
 from lightfield.formats.layout import (
+    OTHER_FILES,
     SUMS,
     File,
     ImageSet,
@@ -28,12 +29,11 @@ from lightfield.formats.layout import (
     source_view,
     view_files,
 )
-from lightfield.formats.lightfield import NAME
+from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.report.package import add_entry, tar_size
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
-_OTHER_FILES = "other_files"
 INDEX = "views.csv"
 
 
@@ -147,6 +147,8 @@ def _add_file(
         "sensor_size": lightfield.content["sensor_size"],
         "depth": lightfield.depth,
         "world_matrix": view.world_from_camera.tolist(),
+        # Without a centre, the rays do not follow from camera and matrix alone.
+        **{key: lightfield.content[key] for key in {OMNIDIRECTIONAL} & lightfield.content.keys()},
     }
 
 
@@ -190,7 +192,7 @@ def write_shards(
 
 def write_others(output: Path, name: str, datasets: Sequence[DatasetFiles]) -> Path:
     """Write all files without a view as a tar that unpacks to the folder ``name``."""
-    path = output / f"{_OTHER_FILES}.tar"
+    path = output / OTHER_FILES
     files = {inside: file for dataset in datasets for inside, file in dataset.others.items()}
     write_tar(path, ((f"{name}/{inside}", files[inside]) for inside in sorted(files)))
     return path

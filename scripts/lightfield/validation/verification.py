@@ -11,11 +11,12 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 
-from lightfield.configuration.corpus import CORPUS, SHARDS, THUMBNAILS
+from lightfield.configuration.corpus import SHARDS, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
+from lightfield.core.names import CORPUS
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, VALIDATION, read_sums
 from lightfield.formats.lightfield import NAME, LightField

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from lightfield.configuration.config_file import Configuration
-from lightfield.configuration.corpus import CORPUS, CORPUS_FILES
+from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import load_scene, mistake
 from lightfield.core.errors import UserError
-from lightfield.core.names import MESH, VIEWS, scene_folder
+from lightfield.core.names import CORPUS, MESH, VIEWS, scene_folder
 from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import VALIDATION

@@ -197,6 +197,10 @@ class Lens(ABC):
             pixels[missed] = np.nan
         return pixels.reshape(*array.shape[:-1], 2)
 
+    def in_frame(self, pixels: Array) -> npt.NDArray[np.bool_]:
+        """Return which pixel coordinates (..., 2) lie in the image. NaN does not."""
+        return np.asarray(((pixels >= 0) & (pixels < (self.width, self.height))).all(axis=-1))
+
     def pixel_rays(self, dtype: npt.DTypeLike = np.float64) -> Array:
         """Return the unit rays (height, width, 3) of all pixels' centres."""
         x, y = (np.arange(side, dtype=dtype) + 0.5 for side in (self.width, self.height))

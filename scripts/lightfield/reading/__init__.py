@@ -1,0 +1,1 @@
+"""Opens finished datasets: folders, packages and shards. Needs neither Blender nor numba."""

@@ -1,0 +1,287 @@
+"""A dataset as Python sees it: its views, with pixels, rays and projections.
+
+A lightfield.json is read when it is first needed, and pixels each time that they are asked for.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path, PurePosixPath
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.names import PARTS
+from lightfield.formats import passes
+from lightfield.formats.depth import check_size, depth_of
+from lightfield.formats.layout import ImageSet
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.lightfield import View as Camera
+from lightfield.formats.passes import FLOW
+from lightfield.geometry.lenses import Lens
+from lightfield.imaging import images
+from lightfield.reading.files import Files
+
+Array = NDArray[Any]
+Floats = NDArray[np.float32]
+Doubles = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
+
+    A property reads its file each time, so keep the arrays that you need again.
+    """
+
+    dataset: "Dataset"
+    camera: Camera
+
+    @property
+    def name(self) -> str:
+        return self.camera.name
+
+    @property
+    def split(self) -> str | None:
+        """What the view is for: train, validation or test. None without a split."""
+        return self.camera.split
+
+    @property
+    def world_from_camera(self) -> Doubles:
+        """The camera-to-world matrix (4, 4). The camera looks along −Z, and +Y is up."""
+        return self.camera.world_from_camera
+
+    @property
+    def lens(self) -> Lens:
+        return self.dataset.lens
+
+    @property
+    def frame(self) -> float | None:
+        """The frame of the animation. None in files that SILVR's tools wrote."""
+        return self.dataset.lightfield.content.get("frame")
+
+    @property
+    def time(self) -> float:
+        """The time in a sequence, from 0 for its first frame to 1 for its last. 0 without one."""
+        return self.dataset.times[0]
+
+    @property
+    def rgb(self) -> Floats:
+        """The colour (height, width, 3): linear light from an EXR, or 0 to 1 in sRGB from a PNG."""
+        image = self._image([*"RGB"])
+        is_light = image.channels["R"].dtype.kind == "f"
+        return (image.colour if is_light else image.encoded).astype(np.float32, copy=False)
+
+    @property
+    def alpha(self) -> Floats:
+        """The part of each pixel (height, width) that the scene covers, from 0 to 1."""
+        return self._image(["A"]).alpha
+
+    @property
+    def depth(self) -> Floats:
+        """The depth (height, width) in metres, of the kind that `Dataset.depth` names.
+
+        inf for a miss, and NaN for a pixel without depth.
+        """
+        return self._depth(self.dataset.depth)
+
+    @property
+    def distance(self) -> Floats:
+        """The depth (height, width) in metres, measured from the camera along the ray."""
+        return self._depth("distance")
+
+    @property
+    def z(self) -> Floats:
+        """The depth (height, width) in metres, measured along the optical axis."""
+        return self._depth("z")
+
+    @property
+    def normal(self) -> Floats:
+        """The unit normals (height, width, 3) in the world. 0 for a miss."""
+        return self.read("normal")
+
+    def read(self, name: str) -> Array:
+        """Return a pass: (height, width, channels), or (height, width) if it has one channel.
+
+        Numbers of objects are whole. All other passes are float32.
+        """
+        names = self.dataset.passes
+        if name not in names:
+            raise UserError(
+                f"{self.dataset.lightfield.path}: passes: has no {name!r}; it has "
+                f"{', '.join(names) or 'none'}"
+            )
+        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
+        view = (self.camera.flow or "") if view_pass == FLOW else self.name
+        image = self._read(
+            view_pass.path(Path(self.dataset.folder), view).as_posix(), view_pass.channels
+        )
+        planes = [image.channels[channel] for channel in view_pass.channels]
+        pixels = np.stack(planes, axis=-1) if len(planes) > 1 else planes[0]
+        return pixels.astype(np.float32, copy=False) if pixels.dtype.kind == "f" else pixels
+
+    def rays(self) -> tuple[Floats, Floats]:
+        """Return the rays of all pixels' centres in the world: origins and unit directions.
+
+        Both are (height, width, 3) in metres. Directions are NaN where the lens has no ray.
+        Raises `UserError` for omnidirectional stereo, whose rays have no common origin.
+        """
+        self.dataset.lightfield.require_centre()
+        directions = _unit_rays(self.lens) @ self.world_from_camera[:3, :3].T
+        origins = np.empty(directions.shape, np.float32)
+        origins[:] = self.world_from_camera[:3, 3]
+        return origins, directions.astype(np.float32)
+
+    def project(self, points: ArrayLike) -> tuple[Doubles, Bools]:
+        """Return the pixels (n, 2) of points (n, 3) in the world, and which of them are visible.
+
+        Pixels are right and down from the image's top left corner: (0.5, 0.5) is the first pixel's
+        centre. They are NaN where the lens does not see a point. A visible point is within the lens
+        and the frame. Another surface may hide it. Raises `UserError` as `rays` does.
+        """
+        self.dataset.lightfield.require_centre()
+        local = np.asarray(points, np.float64) - self.world_from_camera[:3, 3]
+        pixels = self.lens.pixels(local @ self.world_from_camera[:3, :3])
+        return pixels, self.lens.in_frame(pixels)
+
+    def _depth(self, meaning: str | None) -> Floats:
+        lightfield = self.dataset.lightfield
+        if meaning is None:
+            raise UserError(f"{lightfield.path}: depth: is null; these views have no depth")
+        with self.dataset.files.on_disk(self._picture) as file:
+            depth = depth_of(file, lightfield, _unit_rays(self.lens), meaning)
+        return depth.astype(np.float32)
+
+    @property
+    def _picture(self) -> str:
+        """The name of the view's file."""
+        names = self.dataset.pictures_of(self.name)
+        return next(filter(self.dataset.files.has, names), names[0])
+
+    def _image(self, channels: Sequence[str]) -> images.Image:
+        return self._read(self._picture, channels)
+
+    def _read(self, name: str, channels: Sequence[str]) -> images.Image:
+        with self.dataset.files.on_disk(name) as file:
+            image = images.read_image(file, channels)
+            check_size(file, self.dataset.lightfield, image.channels[channels[0]])
+        return image
+
+
+class Views(Sequence[View]):
+    """Views in the order of lightfield.json: by number, by name, or a part of them."""
+
+    def __init__(self, views: Iterable[View]) -> None:
+        self._views = list(views)
+
+    def __len__(self) -> int:
+        return len(self._views)
+
+    @overload
+    def __getitem__(self, key: int | str) -> View: ...
+    @overload
+    def __getitem__(self, key: slice) -> "Views": ...
+    def __getitem__(self, key: int | str | slice) -> "View | Views":
+        if isinstance(key, slice):
+            return Views(self._views[key])
+        return self._named(key) if isinstance(key, str) else self._views[key]
+
+    def _named(self, name: str) -> View:
+        views = [view for view in self._views if view.name == name]
+        if len(views) == 1:
+            return views[0]
+        if views:
+            raise UserError(f"{name}: is a view of {len(views)} frames; choose one of .frames")
+        names = [view.name for view in self._views]
+        among = f"; they are {names[0]} to {names[-1]}" if names else ""
+        raise UserError(f"{name}: is none of the {len(names)} views{among}")
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """The views of one rig, or of one of its ``reprojection``s: each has a lens and poses.
+
+    - ``folders``: the folder of each frame of a sequence. Without a sequence, the dataset's own.
+    - ``times``: the time of each frame: 0 for the first, 1 for the last.
+    - ``member``: in a corpus, what corpus.json says of the scene, such as ``name`` and ``split``.
+    """
+
+    files: Files
+    folders: tuple[str, ...] = ("",)
+    times: tuple[float, ...] = (0.0,)
+    reprojection: str = ""
+    member: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def lightfield(self) -> LightField:
+        """The lightfield.json. ``content`` has its keys. In a sequence, it is the first frame's."""
+        name = str(PurePosixPath(self.folder, NAME))
+        with self.files.on_disk(name) as file:
+            return replace(LightField.read(file), path=self.files.place(name))
+
+    @property
+    def lens(self) -> Lens:
+        return self.lightfield.lens
+
+    @property
+    def depth(self) -> str | None:
+        """The depth that the views store: "z", "distance", or None."""
+        return self.lightfield.depth
+
+    @property
+    def passes(self) -> list[str]:
+        """The names of the passes that the views have beside colour and depth."""
+        names = [each.name for each in self.lightfield.passes]
+        has_flow = any(view.flow for view in self.lightfield.views)
+        return [*names, FLOW.name] if has_flow else names
+
+    @cached_property
+    def frames(self) -> "list[Dataset]":
+        """The dataset of each frame of a sequence. Without a sequence, only this one."""
+        if len(self.folders) == 1:
+            return [self]
+        return [
+            replace(self, folders=(folder,), times=(time,))
+            for folder, time in zip(self.folders, self.times, strict=True)
+        ]
+
+    @cached_property
+    def views(self) -> Views:
+        """All views. In a sequence, all views of a frame come before those of the next."""
+        return Views(
+            View(frame, camera) for frame in self.frames for camera in frame.lightfield.views
+        )
+
+    def split(self, part: str) -> Views:
+        """Return the views of a part: train, validation or test. Without a split, all train."""
+        if part not in PARTS:
+            raise UserError(f"split: is {part!r}; must be {', '.join(PARTS)}")
+        return Views(view for view in self.views if (view.split or "train") == part)
+
+    @cached_property
+    def reprojections(self) -> "dict[str, Dataset]":
+        """The same views through other lenses, by the reprojections' names."""
+        if self.reprojection:
+            return {}
+        names = self.files.datasets_in(self.folders[0])
+        return {name: replace(self, reprojection=name) for name in names}
+
+    @property
+    def folder(self) -> PurePosixPath:
+        """The folder of the lightfield.json."""
+        return PurePosixPath(self.folders[0], self.reprojection)
+
+    def pictures_of(self, view: str) -> list[str]:
+        """Return the names that a view's file may have, the best first."""
+        images = ImageSet(self.reprojection, self.lightfield)
+        folder = PurePosixPath(self.folders[0], images.folder)
+        return [f"{folder / view}{suffix}" for suffix in images.suffixes]
+
+
+# Every view of a dataset has the same lens, and its rays take as much memory as six pictures.
+@lru_cache(maxsize=2)
+def _unit_rays(lens: Lens) -> Doubles:
+    return lens.pixel_rays()

@@ -1,0 +1,123 @@
+"""Finds the datasets at a path: a rig's folder, a package, shards, or many of them."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, reading
+from lightfield.core.names import CORPUS
+from lightfield.core.paths import case_hint
+from lightfield.formats.layout import (
+    FRAME_FOLDERS,
+    OTHER_FILES,
+    frame_number,
+    frame_times,
+    further_parts,
+)
+from lightfield.formats.lightfield import NAME
+from lightfield.reading.dataset import Dataset
+from lightfield.reading.files import Files, Folder, Member, Packed, members_of
+from lightfield.reading.shards import read_shards
+
+# A run of shards: garden_ring-train-{00000..00009}.tar.
+_RUN = re.compile(r"\{(\d+)\.\.(\d+)\}")
+
+
+def open_dataset(path: str | os.PathLike[str]) -> Dataset:
+    """Open the dataset at ``path``. It is one of:
+
+    - the folder of a rig, of a sequence, or of a dataset that SILVR's tools wrote;
+    - the .tar of a package. Further parts are found beside it;
+    - a folder of WebDataset shards, one shard, or a run of shards such as ``x-{00000..00009}.tar``.
+
+    Raises `UserError`, an exception of one line, if there is no dataset, or more than one.
+    """
+    datasets = open_corpus(path)
+    if len(datasets) > 1:
+        raise UserError(f"{path}: has {len(datasets)} datasets; open_corpus returns them as a list")
+    return datasets[0]
+
+
+def open_corpus(path: str | os.PathLike[str]) -> list[Dataset]:
+    """Open all datasets at ``path``: of a family, of a scene's rigs, or of a folder of packages.
+
+    ``member`` of a family's dataset has what its corpus.json says of the scene. Takes all that
+    `open_dataset` takes, too. Raises `UserError` if there is no dataset.
+    """
+    path = Path(path)
+    if path.is_dir():
+        datasets = _in_folder(path)
+    elif run := _RUN.search(path.name):
+        first, last = run.groups()
+        numbers = (f"{number:0{len(first)}d}" for number in range(int(first), int(last) + 1))
+        datasets = _in_tars(path, [path.with_name(_RUN.sub(n, path.name)) for n in numbers])
+    elif not path.exists():
+        raise UserError(f"{path}: is not there{case_hint(path)}")
+    elif path.suffix == ".tar":
+        datasets = _in_tars(path, [path])
+    else:
+        raise UserError(f"{path}: must be the folder of a dataset, or a .tar")
+    if not datasets:
+        raise UserError(f"{path}: has no {NAME}, and no .tar of a dataset")
+    return datasets
+
+
+def _in_folder(folder: Path) -> list[Dataset]:
+    if own := _dataset(Folder(folder)):
+        return [own]
+    if (folder / CORPUS).is_file():
+        return _members(folder)
+    rigs = [_dataset(Folder(path)) for path in sorted(folder.iterdir()) if path.is_dir()]
+    if datasets := [rig for rig in rigs if rig]:
+        return datasets
+    tars = sorted(folder.glob("*.tar"))
+    return _in_tars(folder, [tar for tar in tars if tar.name != OTHER_FILES]) if tars else []
+
+
+def _members(family: Path) -> list[Dataset]:
+    """Return the datasets of a family's valid members."""
+    datasets = []
+    content = read_keys(family / CORPUS, "corpus.py", "members")
+    with reading(family / CORPUS, "corpus"):
+        for entry in content["members"]:
+            for rig in entry["datasets"] if entry["state"] == "valid" else ():
+                files = Folder(family / entry["name"] / rig)
+                datasets.append(_dataset(files, entry) or Dataset(files, member=entry))
+    return datasets
+
+
+def _dataset(files: Files, member: dict[str, object] | None = None) -> Dataset | None:
+    """Return the dataset of these files, or the sequence. None if they have no lightfield.json."""
+    if files.has(NAME):
+        return Dataset(files, member=member or {})
+    folders = sorted(files.datasets_in("", FRAME_FOLDERS), key=frame_number)
+    if not folders:
+        return None
+    times = frame_times([frame_number(folder) for folder in folders])
+    return Dataset(files, tuple(folders), tuple(times), member=member or {})
+
+
+def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
+    """Return the datasets in packages or in shards. ``path`` is what the user opened."""
+    members = {archive: members_of(archive) for archive in archives}
+    # The files of a shard lie in no folder.
+    if any("/" not in name for contents in members.values() for name in contents):
+        found = [_dataset(files, member) for files, member in read_shards(path, members)]
+    else:
+        further = {part for archive in archives for part in further_parts(archive)}
+        found = [_dataset(_package(archive)) for archive in archives if archive not in further]
+    return [dataset for dataset in found if dataset]
+
+
+def _package(archive: Path) -> Packed:
+    """Return the files of a package, and of its further parts beside it."""
+    further = archive.parent.glob(f"{archive.stem}.*.tar")
+    parts = [
+        part for part in further if re.fullmatch(r"\.\d+\.tar", part.name[len(archive.stem) :])
+    ]
+    contents: dict[str, Member] = {}
+    for part in [archive, *parts]:
+        contents |= {name.partition("/")[2]: file for name, file in members_of(part).items()}
+    return Packed(archive, contents)
