@@ -43,6 +43,8 @@ try:
     if IS_MAIN_PROCESS:
         for dataset in BUILD.chosen:
             presence.check_presence(dataset)
+        for name, family in BUILD.families.items():
+            presence.check_lights(name, family)
 except UserError as error:
     sys.exit(f"error: {with_lines(str(error), CONFIG_FILES, GIVEN_KEYS)}")
 

@@ -24,12 +24,19 @@ rule build_scene:
         " > {log} 2>&1"
 
 
+def light_of(wildcards):
+    """Return the picture that lights a scene's model. Empty for a light that has a name."""
+    light_file = asked(BUILD.scene, wildcards).source.light_file
+    return local(light_file) if light_file else []
+
+
 rule import_model:
     input:
         reads(
             "{name}/import_model",
             "import_model",
             model=lambda wildcards: local(asked(BUILD.scene, wildcards).source.model),
+            light=light_of,
         ),
     output:
         blend=PATHS.model_blend,

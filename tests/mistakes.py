@@ -658,6 +658,16 @@ EXPLAINED = [
         {"model": "a.obj", "light": "sun"},
         'scene.light: is "sun"; must be one of softboxes, city',
     ),
+    *(
+        ("scene", {"model": "a.obj", "light": light}, "sunset, or a path that ends in .hdr or .exr")
+        for light in ("sky.png", "sky.{a}.hdr", "a\nb.exr", ".hdr.", "Softboxes")
+    ),
+    (
+        "scene",
+        {"model": "a.obj", "light": 3},
+        "scene.light: is 3; must be a text: put it in quotes",
+    ),
+    ("scene.light", "sky.hdr", "scene.light: is only for model"),
     ("scene", {"model": "a.obj", "unit": "mm"}, 'scene.unit: is "mm"; must be box or metres'),
     ("scene", {"model": "a.obj", "ground": 1}, "scene.ground: is 1; must be true or false"),
     ("scene", {"model": "a.obj", "url": "https://a.org/b"}, "scene.url: does not go with model"),

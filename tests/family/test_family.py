@@ -20,7 +20,7 @@ from lightfield.core.files import read_json, write_json
 from lightfield.family import batch as family_batch
 from lightfield.family.batch import deadly_member, member_at_hand
 from lightfield.family.member import MemberBuild
-from lightfield.imaging.images import write_png
+from lightfield.imaging.images import write_exr, write_png
 from lightfield.stages.checks import Validate
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.registry import VERSIONS
@@ -496,6 +496,21 @@ def test_changed_poses_build_the_members_again(run_batch, batch):
     assert verdict(posed).is_fine
     Path("poses.csv").write_text("name,x,y,z,rx,ry,rz\na,0,-4,0,1.5,0,0\n")
     assert verdict(posed).outdated == ["poses.csv"]
+
+
+@pytest.mark.slow
+def test_a_changed_light_builds_the_members_again(run_batch, batch):
+    lit = batch.model_copy(update={"scene": batch.scene | {"scene": {"light": "sky.exr"}}})
+    write_exr(Path("sky.exr"), {name: np.ones((2, 4), np.float32) for name in "RGB"})
+    run_batch(lit)
+    assert read_json(Path("results/faces/face/member.json"))["state"] == "valid"
+    assert verdict(lit).is_fine
+    write_exr(Path("sky.exr"), {name: np.zeros((2, 4), np.float32) for name in "RGB"})
+    assert verdict(lit).outdated == ["sky.exr"]
+    # The light may be why a process died.
+    build = build_of(lit)
+    build.note_death("killed")
+    assert receipts.read(build.receipt).inputs.keys() >= {"face.obj", "sky.exr"}
 
 
 @pytest.mark.slow

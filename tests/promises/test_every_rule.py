@@ -77,11 +77,13 @@ exports:
 """
 MOVED = f"scene: {{builder: still_life}}{SEQUENCE}"
 MODELLED = f"""
-scene: {{model: model.obj}}
+scene: {{model: model.obj, light: sky.hdr}}
 render: {{samples: 4}}
 rigs:
   LFPlane: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}}}
 """
+# A picture of two pixels, of four bytes each.
+SKY = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\nbrightly"
 # A family, of two batches.
 MANY = f"""
 scene: {{builder: room}}
@@ -147,8 +149,9 @@ work = json.loads(Path("work_to_do", log).read_text())
 
 def write(job=None):
     if job and job.name == "import_model":
-        # A model is only in the settings. Its program notes it with the files that it names.
-        note_inputs([Path(job.settings.model)])
+        # A model and its light are only in the settings. Its program notes them.
+        settings = job.settings
+        note_inputs([settings.model, *([settings.light_file] if settings.light_file else [])])
     if job and job.name == "report_index":
         # It finds the pages itself.
         note_shared_inputs(work["input"])
@@ -181,6 +184,7 @@ class Build:
         self.folder = checkout(folder, **scenes)
         for name in ("model.obj", "other.obj"):
             (folder / name).write_text("# stands in for a model\n")
+        (folder / "sky.hdr").write_text(SKY)
         camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
         write_views(folder / "published/LFPlane", camera, {"type": "plane", "cameras": [2, 1]})
         for program in [*ROOT.glob("scripts/*.py"), *ROOT.glob("benchmarks/*.py")]:
@@ -524,7 +528,7 @@ ROUNDS = {
     "motion blur, and another model": {
         "built": ("samples: 4", "samples: 4, motion_blur: true", {"inventory"} | CAMERAS),
         "modelled": (
-            "model: model.obj",
+            "model: model.obj, light: sky.hdr",
             "model: other.obj, unit: metres, up: z, ground: true, light: city, frame: 2, "
             "allow_missing: true, shared_folder: textures",
             {"import_model", "inventory"} | CAMERAS,
@@ -545,13 +549,14 @@ ROUNDS = {
     "the numbers of objects": {
         "built": ("samples: 4", "samples: 4, passes: [object]", {"mesh"} | CAMERAS),
     },
-    "how pixels are resampled, and other drawn values": {
+    "how pixels are resampled, other drawn values, and another text of a light": {
         "built": (
             "exposure: -1",
             "exposure: -1\n    filter: bilinear\n    samples: 2\n    rotation: [0, 9, 0]",
             {"perspective lens_map", "perspective reprojected_lightfield"},
         ),
         "many": ("[0.5, 1]", "[0.6, 1]", {"build_members"}),
+        "sky.hdr": ("brightly", "dimmedly", {"import_model"}),
     },
     "how light becomes pixels": {
         "built": (

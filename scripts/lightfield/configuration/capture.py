@@ -136,14 +136,17 @@ class Capture:
         if self.rig.stereo and self.rig.is_omnidirectional:
             origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
         origin["frame"] = self.frame
+        scene = self.source.model_dump(
+            include=_MODEL_SOURCE_KEYS if self.source.model else _SOURCE_KEYS,
+            exclude_none=True,
+            # The frame in a .blend may have a fraction. The frame in a scene YAML has none.
+            warnings=False,
+        )
+        if self.source.light_file:
+            scene["light"] = Path(self.source.light_file).name
         origin["scene"] = {
             "name": self.scene_name,
-            **self.source.model_dump(
-                include=_MODEL_SOURCE_KEYS if self.source.model else _SOURCE_KEYS,
-                exclude_none=True,
-                # The frame in a .blend may have a fraction. The frame in a scene YAML has none.
-                warnings=False,
-            ),
+            **scene,
             "fingerprint": self.fingerprint,
         }
         origin["render"] = self.render.to_json()

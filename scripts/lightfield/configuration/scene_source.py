@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from lightfield.core.names import LIGHTS, MODELS, SOFTBOXES, UP, builders
 from lightfield.core.setting_types import QUOTED
@@ -54,18 +54,23 @@ class ModelOptions(Settings):
         description="Put a floor under the model, which receives its shadow. It is a shadow "
         "catcher: views that are not transparent show the light's environment through it.",
     )
-    light: Annotated[str, Field(json_schema_extra={"enum": list(LIGHTS)})] = Field(
+    light: str = Field(
         SOFTBOXES,
+        pattern=pattern(
+            rf"^({'|'.join(LIGHTS)}|{QUOTED}\.(hdr|exr|HDR|EXR))$",
+            f"one of {', '.join(LIGHTS)}, or a path that ends in .hdr or .exr, without {{ }} * ? "
+            "[ ] and line breaks",
+        ),
+        examples=list(LIGHTS),
         description="Light of a model. softboxes: three lamps and a grey world. Any other name: "
-        "the environment of this name that comes with Blender.",
+        "the environment of this name that comes with Blender. A path: your own environment, an "
+        "equirectangular .hdr or .exr, relative to the folder in which Snakemake runs.",
     )
 
-    @field_validator("light")
-    @classmethod
-    def _exists(cls, light: str) -> str:
-        if light not in LIGHTS:
-            raise ValueError(f"must be one of {', '.join(LIGHTS)}")
-        return light
+    @property
+    def light_file(self) -> str | None:
+        """The path of the user's own environment. None for a light that has a name."""
+        return None if self.light in LIGHTS else self.light
 
 
 def check_model(model: str, up: str) -> None:

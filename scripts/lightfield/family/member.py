@@ -102,6 +102,9 @@ class MemberBuild:
             if self.member.model:
                 model = Path(self.member.model)
                 receipts.note_inputs([model])
+                with suppress(UserError):
+                    light_file = self._written().scene.light_file
+                    receipts.note_inputs([light_file] if light_file else [])
                 with suppress(UserError, OSError, *DAMAGE):
                     references = model_files.survey(model).references
                     receipts.note_inputs(reference.path for reference in references)

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from lightfield.configuration.keys import model_fingerprint
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, keep_apart, listed, write_json
+from lightfield.core.files import atomic_path, keep_apart, listed, sha256, write_json
 from lightfield.core.names import UP
 from lightfield.core.paths import case_hint
 from lightfield.core.settings import FARTHEST
+from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import blend_file, model_files, model_light, obj_files, ply_files
 from lightfield.rendering.model_references import (
@@ -93,6 +94,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     path = Path(settings.model)
     receipts.note_inputs([path])
     model_files.check(path)
+    if settings.light_file:
+        receipts.note_inputs([settings.light_file])
+        environment.check(Path(settings.light_file))
     references, left_out = model_files.survey(path)
     refuse_special(path, references)
     refuse_outside(path, references, settings.shared_folder)
@@ -149,6 +153,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         model_light.add_ground(box)
     _name_caches_from(folder)
     options = settings.model_dump(include={"unit", "up", "ground", "light", "frame"})
+    if settings.light_file:
+        options["light"] = sha256(settings.light_file)
     if unread_materials:
         # An earlier version left them black.
         options["grey"] = len(unread_materials)

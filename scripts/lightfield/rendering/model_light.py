@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from lightfield.core.names import SOFTBOXES
+from lightfield.core.names import LIGHTS, SOFTBOXES
 from lightfield.rendering.inventory import contributing, rendered_materials
 
 # Each lamp has a direction from the model, as azimuth (0 is +X) and elevation in degrees, and an
@@ -25,7 +25,7 @@ _FLOOR = 20
 
 
 def add(light: str, box: NDArray[np.float64]) -> None:
-    """Light a model within ``box``, (2, 3) in metres, with `SOFTBOXES` or an environment."""
+    """Light a model within ``box``, (2, 3) in metres, with one of `LIGHTS`, or a picture's path."""
     world = bpy.data.worlds.new("light")
     bpy.context.scene.world = world
     if light == SOFTBOXES:
@@ -34,11 +34,15 @@ def add(light: str, box: NDArray[np.float64]) -> None:
             _lamp(name, np.radians(azimuth), np.radians(elevation), irradiance, box)
         _speed_up()
         return
-    folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
-    image = bpy.data.images.load(str(folder / f"{light}.exr"))
+    path = Path(light)
+    if light in LIGHTS:
+        folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
+        path = folder / f"{light}.exr"
+    # Blender would take a path with // before it for one from the .blend.
+    image = bpy.data.images.load(str(path.absolute()))
     image.pack()
     # Keep this machine's path out of the .blend.
-    image.filepath = f"//{light}.exr"
+    image.filepath = f"//{path.name}"
     background = _background(world)
     environment = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
     environment.image = image

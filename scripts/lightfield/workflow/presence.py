@@ -10,8 +10,10 @@ from pathlib import Path
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.family import Family
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, read_bytes, size_and_time
+from lightfield.core.names import LIGHTS
 from lightfield.core.paths import case_hint
 from lightfield.workflow.failures import CLOCKS_DIFFER
 
@@ -27,7 +29,7 @@ def missing_views(dataset: Dataset) -> int:
 
 
 def check_presence(dataset: Dataset) -> None:
-    """Check that the user's .blend exists or can be downloaded, and that the model exists.
+    """Check that the user's .blend exists or can be downloaded, and the model and its light exist.
 
     Raises `UserError`.
 
@@ -40,12 +42,34 @@ def check_presence(dataset: Dataset) -> None:
             dataset.scene_name,
             f"scene.model: there is no file {source.model}{hint}; put it there",
         )
+    if source.light_file:
+        check_light(dataset.scene_name, source.light_file)
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
         raise scene_yaml.mistake(
             dataset.scene_name,
             f"scene.blend: there is no file {source.blend}{hint}; {page}put it there",
         )
+
+
+def check_lights(scene: str, family: Family) -> None:
+    """Check the pictures that light the members of a family. Raises `UserError`."""
+    light = family.values.get("scene.light")
+    lights = (light.choice or []) if light else [scene_yaml.load_scene(scene).scene.light]
+    for light_file in lights:
+        if isinstance(light_file, str) and light_file not in LIGHTS:
+            check_light(scene, light_file)
+
+
+def check_light(scene: str, light_file: str) -> None:
+    """Check that a picture can light a scene's model. Raises `UserError`. Reads its header."""
+    # Only now, because other plans read no pictures.
+    from lightfield.imaging import environment
+
+    try:
+        environment.check_header(Path(light_file))
+    except UserError as error:
+        raise UserError(f"{scene_yaml.OWN_SCENES}/{scene}.yaml: scene.light: {error}") from None
 
 
 def check_external_files(dataset: Dataset) -> None:
