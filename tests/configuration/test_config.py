@@ -324,11 +324,62 @@ def test_the_schemas_for_editors_match_the_models(name):
     assert path.read_text() == json_schema.schema(name), "run scripts/schema.py"
 
 
-def test_the_schemas_accept_every_scene_and_find_its_mistakes():
+def schema_of(text, folder):
+    """Return the schema that a YAML file in a folder names in its first line, as editors do."""
+    path = re.match(r"# yaml-language-server: \$schema=(\S+)\n", text)[1]
+    return json.loads((folder / path).read_text())
+
+
+@pytest.mark.parametrize(
+    "path",
+    [*scene_yaml.SCENES.glob("*.yaml"), ROOT / "config.yaml", ROOT / "config/config.yaml"],
+    ids=lambda path: path.stem,
+)
+def test_a_yaml_names_a_schema_that_accepts_it(path):
+    text = path.read_text()
+    validator = jsonschema.Draft202012Validator(schema_of(text, path.parent))
+    validator.validate(yaml.safe_load(text))
+
+
+def parts_of(schema):
+    """Yield all parts of a schema that are mappings."""
+    if isinstance(schema, dict):
+        yield schema
+    for part in schema.values() if isinstance(schema, dict) else schema:
+        if isinstance(part, dict | list):
+            yield from parts_of(part)
+
+
+@pytest.mark.parametrize("name", json_schema.MODELS)
+def test_editors_explain_each_key_and_propose_only_allowed_defaults(name):
+    schema = json.loads(json_schema.schema(name))
+    for part in parts_of(schema):
+        for key, of_key in part.get("properties", {}).items():
+            model = schema["$defs"].get(of_key.get("$ref", "").rpartition("/")[2], {})
+            description = of_key.get("description") or model["description"]
+            assert re.fullmatch(r"[^`\n]*(`[^`\n]+`[^`\n]*)*", description), key
+            if "default" in of_key:
+                named = of_key | {"$defs": schema["$defs"]}
+                jsonschema.Draft202012Validator(named).validate(of_key["default"])
+
+
+def test_editors_propose_the_keys_of_the_given_type_of_rig_and_lens():
+    schema = json.loads(json_schema.schema("scene"))
+    (rig,) = schema["properties"]["rigs"]["patternProperties"].values()
+    for kinds, key in (
+        (rig["oneOf"], "type"),
+        (schema["$defs"]["CameraSettings"]["oneOf"], "lens"),
+    ):
+        models = [schema["$defs"][kind["$ref"].rpartition("/")[2]] for kind in kinds]
+        names = [model["properties"][key]["const"] for model in models]
+        assert len({*names}) == len(names) and all(key in model["required"] for model in models)
+        assert [model["title"] for model in models] == names
+
+
+def test_the_schema_finds_mistakes_of_a_scene():
     validator = jsonschema.Draft202012Validator(json.loads(json_schema.schema("scene")))
-    for path in scene_yaml.SCENES.glob("*.yaml"):
-        validator.validate(yaml.safe_load(path.read_text()))
     for path, value in (
+        ("rigs", {"a b": RIGHT["rigs"]["LFSphere"]}),
         ("render.sample", 4),
         ("rigs.LFSphere.subdivisions", 12),
         ("rigs.LFSphere.type", "cuboid"),

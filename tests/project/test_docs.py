@@ -1,5 +1,6 @@
 """The documents: working links, pages of readable length, and a true reference."""
 
+import os
 import re
 import subprocess
 import sys
@@ -103,6 +104,22 @@ def complete_scenes():
             if {"scene", "render", "rigs"} <= content.keys():
                 examples.append(pytest.param(content, id=name_of(page)))
     return examples
+
+
+def test_the_schemas_that_examples_name_exist():
+    """An example is in configs/scenes/, unless a comment above it says which file it is."""
+    found = 0
+    for page in PAGES:
+        for file, code in re.findall(
+            r"^(?:<!-- file: (.*?) -->\n)?^```yaml\n(.*?)^```$", page.read_text(), re.M | re.S
+        ):
+            if schema := re.match(r"# yaml-language-server: \$schema=(\S+)\n", code):
+                folder = (ROOT / (file or "configs/scenes/mine.yaml")).parent
+                # The folder of a tutorial does not exist here.
+                path = Path(os.path.normpath(folder / schema[1]))
+                assert path.is_file(), page
+                found += 1
+    assert found > 3
 
 
 @pytest.mark.parametrize("content", complete_scenes())

@@ -6,6 +6,7 @@ own. The functions that need no build also serve the stages of a family's member
 """
 
 import os
+import re
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -252,11 +253,16 @@ def _page(build: Build, dataset: Dataset) -> PageSettings:
     ]
     return PageSettings.of(
         rig=dataset.placed_rig,
-        yaml=scene_path(dataset.scene_name).read_text(encoding="utf-8"),
+        yaml=_without_schema(scene_path(dataset.scene_name).read_text(encoding="utf-8")),
         command=_rebuilding(dataset),
         panorama=bool(dataset.panorama),
         measurements=measured,
     )
+
+
+def _without_schema(yaml: str) -> str:
+    """Return a scene YAML without the line that tells editors its schema."""
+    return re.sub(r"\A# yaml-language-server: .*\n", "", yaml)
 
 
 def _measurements(build: Build, dataset: Dataset) -> list[Path]:

@@ -10,6 +10,8 @@ from lightfield.geometry.rigs.rig import UnitPoses, stack
 
 
 class Cuboid(BoxGrid):
+    """Cameras on the six sides of a cuboid, each looking outward."""
+
     type: Literal["cuboid"]
 
     @staticmethod

@@ -13,6 +13,8 @@ from lightfield.geometry.rotations import Floats
 
 
 class Cylinder(Grid):
+    """Rings of cameras around the z axis, open above and below, each looking outward."""
+
     shape = "CYLINDER"
     fewest = (3, 2)
     is_round = True

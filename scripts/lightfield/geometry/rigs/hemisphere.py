@@ -13,6 +13,8 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 class Hemisphere(Orbit):
+    """Cameras around an object, spread evenly over elevations, that look at its middle."""
+
     type: Literal["hemisphere"]
     elevation: Elevations = Field(
         (0.0, 90.0),

@@ -10,6 +10,8 @@ from lightfield.geometry.rigs.rig import UnitPoses, stack
 
 
 class Lattice(BoxGrid):
+    """Cameras that fill a box, all looking along +Y."""
+
     type: Literal["lattice"]
 
     def unit_poses(self) -> UnitPoses:

@@ -13,6 +13,8 @@ from lightfield.geometry.rotations import Floats
 
 
 class Plane(Grid):
+    """An upright wall of cameras that look along +Y."""
+
     shape = "PLANE"
     fewest = (2, 2)
 

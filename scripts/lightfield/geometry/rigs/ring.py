@@ -11,6 +11,8 @@ from lightfield.geometry.rotations import Floats
 
 
 class Ring(Orbit):
+    """Cameras around an object, spread evenly at one elevation, that look at its middle."""
+
     type: Literal["ring"]
     elevation: Elevation = Field(
         0.0,

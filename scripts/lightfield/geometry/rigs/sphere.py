@@ -15,6 +15,8 @@ _SAME_LEVEL = 1e-3
 
 
 class Sphere(Rig):
+    """A camera on each vertex of Blender's icosphere, in Blender's order, looking outward."""
+
     shape = "SPHERE"
     is_round = True
 

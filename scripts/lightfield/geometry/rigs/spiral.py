@@ -10,6 +10,8 @@ from lightfield.geometry.rotations import Floats
 
 
 class Spiral(Orbit):
+    """Cameras that rise while they go round an object, and look at its middle."""
+
     type: Literal["spiral"]
     turns: float = Field(
         2.0,
