@@ -8,9 +8,11 @@ from pathlib import Path
 
 import accessibility
 import families
+import numpy as np
 import pytest
 from faults import CORPUS_KINDS, FAULTS, spoil
 
+from lightfield import open_corpus, open_dataset
 from lightfield.configuration.corpus import Shares
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
@@ -76,6 +78,34 @@ def test_a_corpus_lists_its_members_with_what_they_are_made_from(built):
     assert (first["seed"], first["values"]) == (0, {"shade": 1, "wood": "oak"})
     assert first["datasets"]["plane"]["views"] == 3
     assert content["members"][-1]["model"] == "models/broken.glb"
+
+
+def test_a_corpus_opens_as_a_list_of_its_valid_members(built):
+    corpus = open_corpus(built)
+    assert [data.member["name"] for data in corpus] == [f"{number:04d}" for number in range(6)]
+    assert corpus[3].member["values"] == {"shade": 4, "wood": "ash"}
+    shards = sorted(built.glob("shards/*/*.tar"))
+    assert len(shards) > 6
+    in_shards = [data for part in shards for data in open_corpus(part)]
+    for data in corpus:
+        assert (data.member["split"], len(data.views)) == (part_of(built, data), 3)
+        packed = [other for other in in_shards if other.member["name"] == data.member["name"]]
+        assert {other.member["split"] for other in packed} == {data.member["split"]}
+        packed_views = [view for other in packed for view in other.views]
+        assert sorted(view.name for view in packed_views) == [view.name for view in data.views]
+        for view in packed_views:
+            np.testing.assert_array_equal(view.rgb, data.views[view.name].rgb)
+            np.testing.assert_array_equal(view.rays(), data.views[view.name].rays())
+    # All shards of a part together.
+    of_part = open_corpus(built / "shards/train")
+    assert [len(data.views) for data in of_part] == [3] * len(of_part)
+    with pytest.raises(UserError, match="has 6 datasets; open_corpus"):
+        open_dataset(built)
+
+
+def part_of(family, data):
+    members = read_json(family / "corpus.json")["members"]
+    return next(each["split"] for each in members if each["name"] == data.member["name"])
 
 
 def test_a_corpus_names_each_failure_with_its_cause(built):

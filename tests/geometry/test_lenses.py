@@ -19,6 +19,7 @@ from conftest import BLENDER
 from pydantic import TypeAdapter
 from scipy.spatial.transform import Rotation
 
+from lightfield import open_dataset
 from lightfield.core.errors import UserError
 from lightfield.geometry.depth import conventional_depth, z_from_distance
 from lightfield.geometry.lenses import (
@@ -123,6 +124,28 @@ def grid(lens: Lens, dtype: type, steps: int = 129) -> tuple[np.ndarray, np.ndar
     x = np.linspace(0, lens.width, steps).astype(dtype)
     y = np.linspace(0, lens.height, steps).astype(dtype)
     return np.meshgrid(x, y)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_opened_dataset_has_the_rays_and_pixels_of_each_lens(name: str, tmp_path: Path) -> None:
+    lens = EXAMPLES[name].fitted(48)
+    turn = Rotation.from_euler("xyz", (0.3, 1.1, -0.7)).as_matrix()
+    pose = [[*row, place] for row, place in zip(turn.tolist(), (1, 2, -1.5), strict=True)]
+    frame = {"name": "view", "world_matrix": [*pose, [0, 0, 0, 1]]}
+    content = {**lens.to_lightfield(), "lf_type": "test", "frames": [frame]}
+    (tmp_path / "lightfield.json").write_text(json.dumps(content))
+    view = open_dataset(tmp_path).views[0]
+    origins, directions = view.rays()
+    rays = lens.pixel_rays()
+    seen = np.isfinite(rays).all(axis=-1)
+    assert seen.any()
+    assert (origins == (1, 2, -1.5)).all()
+    assert angle(directions[seen] @ turn, rays[seen]).max() < 1e-12
+    assert np.isnan(directions[~seen]).all()
+    pixels, visible = view.project(origins[seen] + 2 * directions[seen])
+    row, column = np.nonzero(seen)
+    assert visible.all()
+    np.testing.assert_allclose(pixels, np.stack([column, row], axis=-1) + 0.5, atol=1e-6)
 
 
 @pytest.fixture(scope="module")

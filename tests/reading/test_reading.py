@@ -1,17 +1,24 @@
 """`open_dataset`, whose readers get the same arrays from a folder, a package and shards."""
 
+import json
+import math
+import pickle
 import shutil
+import tarfile
+from pathlib import Path
 
 import numpy as np
 import pytest
-from sphere import LENSES, write_views
+from sphere import LENSES, RADIUS, colour_of, write_views
 
-from lightfield import open_dataset
+from lightfield import open_corpus, open_dataset
 from lightfield.configuration.scene_yaml import Credits
+from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW
 from lightfield.imaging import images
+from lightfield.imaging.tonemap import encode_srgb
 from lightfield.report import package
 from lightfield.report.publish import publish
 
@@ -122,6 +129,7 @@ def arrays(data):
     return read
 
 
+DTYPES = {"object": np.uint32, "origins": np.float64, "directions": np.float64}
 # The parts of the split that a form has.
 FORMS = {
     "package": {"train", "test"},
@@ -149,4 +157,280 @@ def test_each_form_of_a_dataset_has_the_same_arrays(name, forms):
         true_arrays = arrays(true)
         for key, array in arrays(read).items():
             np.testing.assert_array_equal(array, true_arrays[key], str(key))
-            assert array.dtype == (np.uint32 if key[1] == "object" else np.float32)
+            assert array.dtype == DTYPES.get(key[1], np.float32)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_depth_along_the_rays_leads_to_the_surface(name, tmp_path):
+    """The surface is a sphere, and a point's colour on it follows from its place."""
+    write_views(tmp_path / "dataset", LENSES[name], RIG)
+    data = open_dataset(tmp_path / "dataset")
+    assert len(data.views) == 6
+    for view in data.views:
+        origins, directions = view.rays()
+        points = origins + directions * view.distance[..., None]
+        seen = np.isfinite(points).all(axis=-1)
+        assert seen.any()
+        np.testing.assert_allclose(np.linalg.norm(points[seen], axis=-1), RADIUS, atol=1e-4)
+        colour = encode_srgb(view.rgb[seen])
+        np.testing.assert_allclose(colour, colour_of(points[seen]) / 255, atol=1e-3)
+        axis = -view.world_from_camera[:3, 2]
+        along_axis = (points - view.world_from_camera[:3, 3]) @ axis
+        np.testing.assert_allclose(view.z[seen], along_axis[seen], atol=1e-5)
+        np.testing.assert_array_equal(view.depth, view.z if data.depth == "z" else view.distance)
+
+        pixels, visible = view.project(points[seen])
+        row, column = np.nonzero(seen)
+        assert visible.all()
+        np.testing.assert_allclose(pixels, np.stack([column, row], axis=-1) + 0.5, atol=1e-3)
+
+
+def test_a_fisheyes_rays_follow_from_its_equation(folder):
+    """θ = r · fov / 2, and r is 1 where the image circle touches the edges of the image."""
+    content = json.loads((folder / "lightfield.json").read_text())
+    data = open_dataset(folder)
+    for view, frame in zip(data.views, content["frames"], strict=True):
+        matrix = np.array(frame["world_matrix"])
+        origins, directions = view.rays()
+        for row in range(16):
+            for column in range(24):
+                right, up = (column + 0.5 - 12) / 12, (8 - row - 0.5) / 8
+                r = math.hypot(right, up)
+                if r > 1:
+                    assert np.isnan(directions[row, column]).all()
+                    continue
+                theta = r * math.radians(160) / 2
+                sine = math.sin(theta) / r
+                ray = matrix[:3, :3] @ (sine * right, sine * up, -math.cos(theta))
+                np.testing.assert_allclose(directions[row, column], ray, atol=1e-12)
+                np.testing.assert_array_equal(origins[row, column], matrix[:3, 3])
+
+
+def test_points_beside_the_frame_and_behind_the_camera_are_not_visible(tmp_path):
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [8, 4]}
+    write_views(tmp_path / "dataset", camera, {"type": "lattice", "cameras": [1, 1, 1]})
+    view = open_dataset(tmp_path / "dataset").views[0]
+    # The camera is at the origin, and looks along +Y.
+    points = [(0, 2, 0), (1.9, 2, 0.9), (2.1, 2, 0), (0, 2, 1.1), (0, -2, 0)]
+    pixels, visible = view.project(points)
+    assert visible.tolist() == [True, True, False, False, False]
+    np.testing.assert_allclose(pixels[:3], [(4, 2), (7.8, 0.2), (8.2, 2)], atol=1e-9)
+    assert np.isnan(pixels[4]).all()
+
+
+def test_views_are_found_by_number_name_and_part(folder):
+    data = open_dataset(folder)
+    assert data.views["view_0002f"].name == data.views[2].name == data.views[-4].name
+    assert [view.name for view in data.views[1:3]] == ["view_0001f", "view_0002f"]
+    parts = {part: [view.name for view in data.split(part)] for part in ("train", "test")}
+    assert parts["test"] == ["view_0000f", "view_0003f"]
+    assert len(parts["train"]) == 4
+    assert not data.split("validation")
+    assert data.lightfield.content["scene"]["name"] == "room"
+    assert (data.views[0].frame, data.views[0].time) == (None, 0.0)
+    assert data.frames == [data]
+
+
+def test_without_a_split_all_views_train(tmp_path):
+    write_views(tmp_path / "dataset", CAMERA, {key: RIG[key] for key in ("type", "cameras")})
+    data = open_dataset(tmp_path / "dataset")
+    assert [len(data.split(part)) for part in ("train", "validation", "test")] == [6, 0, 0]
+
+
+def test_a_picture_is_read_as_it_was_encoded(folder):
+    data = open_dataset(folder)
+    view = data.reprojections["perspective"].views[0]
+    light = data.reprojections["panorama"].views[0].rgb
+    assert (view.rgb.max() <= 1, view.alpha.min(), light.dtype) == (True, 1, np.float32)
+    # The reprojection's own lens and pose lead to the sphere, too.
+    origins, directions = view.rays()
+    along = (origins * directions).sum(axis=-1)
+    distance = -along + np.sqrt(along**2 + RADIUS**2 - (origins**2).sum(axis=-1))
+    points = origins + directions * distance[..., None]
+    np.testing.assert_allclose(view.rgb, colour_of(points) / 255, atol=3e-3)
+
+
+def test_a_dataset_of_silvrs_tools_is_read(tmp_path):
+    write_views(tmp_path / "dataset", CAMERA, RIG)
+    file = tmp_path / "dataset/lightfield.json"
+    content = json.loads(file.read_text())
+    del content["depth"]
+    for frame in content["frames"]:
+        del frame["split"]
+    file.write_text(json.dumps(content))
+    for view in (tmp_path / "dataset/exr").iterdir():
+        channels = images.read_image(view).channels
+        images.write_exr(view, channels | {"Z": channels["Z"].astype(np.float16)})
+    view = open_dataset(tmp_path / "dataset").views[1]
+    origins, directions = view.rays()
+    points = origins + directions * view.distance[..., None]
+    seen = np.isfinite(points).all(axis=-1)
+    np.testing.assert_allclose(np.linalg.norm(points[seen], axis=-1), RADIUS, rtol=1e-3)
+
+
+def write_sequence(rig):
+    """Write a sequence of three frames. Its cameras move."""
+    for number in (8, 10, 14):
+        frame = rig / f"f{number:05d}" / "dataset"
+        write_views(frame, CAMERA, RIG | {"center": [number / 100, 0, 0]})
+        write_views(frame / "perspective", LENSES["perspective"], RIG)
+        shutil.copytree(frame, frame.parent, dirs_exist_ok=True)
+        shutil.rmtree(frame)
+        path = frame.parent / "lightfield.json"
+        LightField.read(path).changed(frame=number, scene={"name": "room"}).write(path)
+        finish(frame.parent)
+    return rig
+
+
+@pytest.fixture(scope="module")
+def sequence(tmp_path_factory):
+    return write_sequence(tmp_path_factory.mktemp("sequence") / "rig")
+
+
+@pytest.fixture(params=["folder", "package", "shards", "samples alone"])
+def sequence_form(request, sequence, tmp_path):
+    """The sequence in each form."""
+    scene = Credits.model_validate(CREDITS)
+    if request.param == "folder":
+        return sequence
+    if request.param == "package":
+        card = package.card(sequence, "room_rig", scene)
+        package.pack(sequence, card, tmp_path / "room_rig.tar", None)
+        return tmp_path / "room_rig.tar"
+    publish(sequence, "room_rig", scene, tmp_path / "shards", None)
+    if request.param == "samples alone":
+        (tmp_path / "shards/other_files.tar").unlink()
+    return tmp_path / "shards"
+
+
+def test_a_sequence_has_views_with_a_time(sequence_form, sequence):
+    data = open_dataset(sequence_form)
+    assert len(data.frames) == 3
+    assert [len(frame.views) for frame in data.frames] == [6, 6, 6]
+    assert sorted({view.time for view in data.views}) == pytest.approx([0, 1 / 3, 1])
+    assert len(data.views) == 18
+    assert len(data.split("test")) == 6
+    with pytest.raises(UserError, match=r"view_0001f: .* 3 frames"):
+        data.views["view_0001f"]
+    view = data.frames[1].views["view_0001f"]
+    truth = json.loads((sequence / "f00010/lightfield.json").read_text())["frames"][1]
+    np.testing.assert_allclose(view.world_from_camera, truth["world_matrix"])
+    assert view.rgb.shape == (16, 24, 3)
+    perspective = data.reprojections["perspective"]
+    assert (len(perspective.views), len(perspective.frames[2].views)) == (18, 6)
+    assert perspective.frames[2].views[5].time == 1
+    assert perspective.views[0].rgb.shape == (48, 64, 3)
+
+
+def test_the_rigs_of_a_scene_are_a_list(tmp_path):
+    for name in ("plane", "moving"):
+        write_views(tmp_path / name / "dataset", CAMERA, RIG)
+    shutil.move(tmp_path / "plane/dataset", tmp_path / "room/plane")
+    shutil.move(tmp_path / "moving/dataset", tmp_path / "room/moving/f00001")
+    with pytest.raises(UserError, match="has 2 datasets; open_corpus"):
+        open_dataset(tmp_path / "room")
+    assert [len(data.views) for data in open_corpus(tmp_path / "room")] == [6, 6]
+
+
+def test_opening_reads_no_pixels(tmp_path):
+    write_views(tmp_path / "dataset", CAMERA, RIG)
+    shutil.rmtree(tmp_path / "dataset/exr")
+    view = open_dataset(tmp_path / "dataset").views[0]
+    assert np.isfinite(view.rays()[0]).all()
+    with pytest.raises(UserError, match=r"exr/view_0000f\.exr: no such file"):
+        view.rgb  # noqa: B018
+
+
+def test_loaders_can_send_views_to_other_processes(forms):
+    for form in forms.values():
+        view = open_dataset(form).views[0]
+        copy = pickle.loads(pickle.dumps(view))
+        np.testing.assert_array_equal(copy.rgb, view.rgb)
+
+
+def test_omnidirectional_stereo_has_no_rays_in_any_form(tmp_path):
+    rig = tmp_path / "rig/dataset"
+    write_views(rig, LENSES["panorama"], RIG)
+    path = rig / "lightfield.json"
+    lightfield = LightField.read(path)
+    lightfield.changed(scene={"name": "room"}, omnidirectional_stereo=0.065).write(path)
+    finish(rig)
+    publish(rig, "room_rig", Credits.model_validate(CREDITS), tmp_path / "shards", None)
+    (tmp_path / "shards/other_files.tar").unlink()
+    for form in (rig, tmp_path / "shards"):
+        view = open_dataset(form).views[0]
+        assert view.rgb.shape == (32, 64, 3)
+        for use in (view.rays, lambda view=view: view.project([(0, 0, 0)])):
+            with pytest.raises(UserError, match="omnidirectional_stereo"):
+                use()
+
+
+# ---- mistakes --------------------------------------------------------------------------------
+
+
+def cut(path, beyond):
+    """Cut a tar ``beyond`` so many bytes of its third file's header."""
+    with tarfile.open(path) as archive:
+        size = archive.getmembers()[2].offset + beyond
+    path.write_bytes(path.read_bytes()[:size])
+    return path
+
+
+# What is opened, and what the message names beside it.
+MISTAKES = {
+    "no path": (lambda home: home / "missing", "is not there"),
+    "other case": (lambda home: home / "Shards", "shards differs only in case"),
+    "empty folder": (lambda home: home / "empty", "has no lightfield.json"),
+    "another file": (lambda home: home / "text.txt", "must be the folder of a dataset, or a .tar"),
+    "no tar": (lambda home: home / "text.tar", "whole, uncompressed tar"),
+    "compressed": (lambda home: home / "zipped.tar", "whole, uncompressed tar"),
+    "cut in a file": (lambda home: cut(home / "room_rig.tar", 600), "tar"),
+    "cut between files": (lambda home: cut(home / "room_rig.tar", 0), "cut short"),
+    "missing shard": (lambda home: home / "shards/room_rig-train-{00000..00099}.tar", "-000"),
+    "broken lightfield.json": (lambda home: home / "broken", "lightfield.json"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_that_names_the_path(mistake, forms, tmp_path):
+    home = tmp_path / "home"
+    shutil.copytree(forms["shards"].parent, home)
+    (home / "empty").mkdir()
+    (home / "broken").mkdir()
+    (home / "broken/lightfield.json").write_text('{"camera": ')
+    (home / "text.txt").write_text("text")
+    (home / "text.tar").write_text("text")
+    with tarfile.open(home / "zipped.tar", "w:gz") as archive:
+        archive.add(home / "text.txt", "room/lightfield.json")
+    path, problem = MISTAKES[mistake]
+    path = path(home)
+    with pytest.raises(UserError) as raised:
+        open_dataset(path)
+    message = str(raised.value)
+    assert "\n" not in message
+    assert problem in message
+    assert str(path).partition("{")[0] in message
+
+
+def test_a_missing_pass_and_a_wrong_part_name_what_there_is(folder):
+    data = open_dataset(folder)
+    with pytest.raises(UserError, match=r"no 'albedo'; it has normal, object, flow"):
+        data.views[0].read("albedo")
+    with pytest.raises(UserError, match=r"'val'; must be train, validation, test"):
+        data.split("val")
+    with pytest.raises(UserError, match=r"view_0099f.* view_0000f to view_0005f"):
+        data.views["view_0099f"]
+
+
+def test_a_damaged_view_in_a_tar_is_named_by_its_place(forms, tmp_path):
+    tar = Path(shutil.copy(forms["package"], tmp_path))
+    content = tar.read_bytes()
+    with tarfile.open(tar) as archive:
+        entry = archive.getmember("room_rig/exr/view_0001f.exr")
+    start = entry.offset_data + 1000
+    tar.write_bytes(
+        content[:start] + bytes(entry.size - 1000) + content[start + entry.size - 1000 :]
+    )
+    view = open_dataset(tar).views[1]
+    with pytest.raises(UserError, match=r"room_rig\.tar/exr/view_0001f\.exr: "):
+        view.rgb  # noqa: B018

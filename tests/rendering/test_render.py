@@ -11,6 +11,7 @@ import OpenEXR
 import pytest
 from conftest import BLENDER
 
+from lightfield import open_dataset
 from lightfield.core import receipts
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
@@ -110,6 +111,32 @@ def test_pixels_look_where_cycles_looked(name, rendered):
     assert np.median(error) < 1e-6
     assert np.quantile(error, 0.99) < 1e-4
     assert np.all(np.isposinf(rendered[f"{name}.z"][~seen]))
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_dataset_that_is_opened_leads_to_the_points_that_cycles_hit(name, rendered, tmp_path):
+    content = lightfield(CAMERAS[name], RENDER)
+    content.write(tmp_path / "lightfield.json")
+    z = rendered[f"{name}.z"].astype(np.float32)
+    images.write_exr(tmp_path / f"exr/{content.views[0].name}.exr", {"Z": z})
+    view = open_dataset(tmp_path).views[0]
+    origins, directions = view.rays()
+    truth = rendered[f"{name}.points"]
+    seen = np.isfinite(truth).all(axis=-1)
+    np.testing.assert_array_equal(seen, np.isfinite(directions).all(axis=-1))
+    # Leave out the rim of a 180 degree lens, where Z-depth has no digits left.
+    axis = -view.world_from_camera[:3, 2]
+    usable = seen & (directions @ axis > 0.01) if content.depth == "z" else seen
+    points = origins + directions * view.distance[..., None]
+    distance = np.linalg.norm(truth - origins, axis=-1)
+    error = np.linalg.norm(points - truth, axis=-1)[usable] / distance[usable]
+    assert np.median(error) < 1e-4
+    pixels, visible = view.project(truth[seen])
+    row, column = np.nonzero(seen)
+    offset = np.abs(pixels - np.stack([column, row], axis=-1) - 0.5)
+    # The ray of a sample begins within 0.005 pixels of the centre.
+    assert visible.all()
+    assert offset.max() < 0.02
 
 
 @pytest.fixture

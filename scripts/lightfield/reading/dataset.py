@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
 from lightfield.core.names import PARTS
 from lightfield.formats import passes
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import ImageSet
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.lightfield import View as Camera
-from lightfield.formats.passes import FLOW
+from lightfield.formats.passes import FLOW, NAMES
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.reading.files import Files
@@ -123,7 +124,7 @@ class View:
         pixels = np.stack(planes, axis=-1) if len(planes) > 1 else planes[0]
         return pixels.astype(np.float32, copy=False) if pixels.dtype.kind == "f" else pixels
 
-    def rays(self) -> tuple[Floats, Floats]:
+    def rays(self) -> tuple[Doubles, Doubles]:
         """Return the rays of all pixels' centres in the world: origins and unit directions.
 
         Both are (height, width, 3) in metres. Directions are NaN where the lens has no ray.
@@ -131,9 +132,9 @@ class View:
         """
         self.dataset.lightfield.require_centre()
         directions = _unit_rays(self.lens) @ self.world_from_camera[:3, :3].T
-        origins = np.empty(directions.shape, np.float32)
+        origins = np.empty_like(directions)
         origins[:] = self.world_from_camera[:3, 3]
-        return origins, directions.astype(np.float32)
+        return origins, directions
 
     def project(self, points: ArrayLike) -> tuple[Doubles, Bools]:
         """Return the pixels (n, 2) of points (n, 3) in the world, and which of them are visible.
@@ -237,6 +238,12 @@ class Dataset:
         names = [each.name for each in self.lightfield.passes]
         has_flow = any(view.flow for view in self.lightfield.views)
         return [*names, FLOW.name] if has_flow else names
+
+    def names(self, name: str) -> dict[str, int]:
+        """Return the numbers in a pass of ids by the names that they stand for."""
+        with self.files.on_disk(str(PurePosixPath(self.folders[0], name, NAMES))) as file:
+            names: dict[str, int] = read_json(file)
+        return names
 
     @cached_property
     def frames(self) -> "list[Dataset]":

@@ -37,6 +37,8 @@ def open_dataset(path: str | os.PathLike[str]) -> Dataset:
     datasets = open_corpus(path)
     if len(datasets) > 1:
         raise UserError(f"{path}: has {len(datasets)} datasets; open_corpus returns them as a list")
+    # Read it now, so that a mistake in it is found here.
+    datasets[0].lightfield  # noqa: B018
     return datasets[0]
 
 
