@@ -9,6 +9,7 @@ import numpy as np
 def check(folder):
     croissant(folder / "croissant.json")
     hugging_face(folder / "README.md")
+    datasets(folder)
     webdataset(folder)
 
 
@@ -47,6 +48,27 @@ def hugging_face(path):
     )
     assert all(splits.values())
     assert card["license"] == "cc-by-4.0"
+
+
+def datasets(folder):
+    """Load the shards as the card does, and as the Hub's viewer does: by the front matter."""
+    from datasets import load_dataset
+
+    code = (folder / "README.md").read_text().partition("from datasets import load_dataset\n")[2]
+    names = {"load_dataset": lambda kind, **more: load_dataset(kind, data_dir=folder, **more)}
+    exec(code.partition("```")[0], names)
+    by_card = {split: [*rows] for split, rows in names["data"].items()}
+    by_front_matter = load_dataset(str(folder), streaming=True)
+    assert by_front_matter.keys() == by_card.keys()
+    for split, rows in by_card.items():
+        for row, same in zip(rows, by_front_matter[split], strict=True):
+            assert row["thumbnail.jpg"].size == same["thumbnail.jpg"].size
+            assert np.asarray(row["thumbnail.jpg"]).std() > 0
+            assert row["views.exr"][:4] == b"v/1\x01"
+    print(
+        f"datasets {version('datasets')}: {sum(map(len, by_card.values()))} rows with "
+        f"{', '.join(sorted(names['sample']))}; a thumbnail is {row['thumbnail.jpg'].size}"
+    )
 
 
 def webdataset(folder):

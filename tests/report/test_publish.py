@@ -1,7 +1,10 @@
 """Published datasets: shards with a view's pictures together, and descriptions of them."""
 
+import ast
+import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import tarfile
@@ -12,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from markdown_it import MarkdownIt
+from PIL import Image
 from sphere import LENSES, write_views
 
 from lightfield.configuration.publication import DOCUMENTS
@@ -67,10 +71,14 @@ def folder(tmp_path_factory):
     write_json(dataset / "perspective/exports/colmap/export.json", {"format": "colmap"})
     write_json(dataset / "report/costs.json", {"not": "published"})
     write_json(dataset / "validation.json", {"valid": True})
+    write_sums(dataset)
+    return dataset
+
+
+def write_sums(dataset):
     files = [path for path in dataset.rglob("*") if path.is_file() and "report" not in path.parts]
     lines = [f"{sha256(path)}  {path.relative_to(dataset)}\n" for path in sorted(files)]
     (dataset / "sha256sums.txt").write_text("".join(lines))
-    return dataset
 
 
 def published(folder, output, most=None, **changes):
@@ -96,7 +104,52 @@ def test_a_view_is_a_sample_with_its_passes_and_reprojections_together(folder, o
     assert sorted(key for key, _ in samples) == sorted(views)
     pictures = ["normal.exr", "perspective+normal.exr", "perspective.png", "views.exr"]
     for key, group in samples:
-        assert group == [f"{key}.json", *(f"{key}.{name}" for name in pictures)]
+        assert group == [f"{key}.json", *(f"{key}.{name}" for name in (*pictures, "thumbnail.jpg"))]
+
+
+def test_a_sample_has_a_small_picture_of_its_view(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, CAMERA | {"resolution": [400, 320]}, RIG)
+    path = dataset / "lightfield.json"
+    LightField.read(path).changed(scene={"name": "smoke"}).write(path)
+    dark = dataset / "exr/view_0001f.exr"
+    image = images.read_image(dark)
+    quarter = {name: image.channels[name] / np.float16(4) for name in "RGB"}
+    images.write_exr(dark, image.channels | quarter, image.attributes)
+    write_sums(dataset)
+    output = published(dataset, tmp_path / NAME)
+    shards = [members(tar) for tar in output.glob(f"{NAME}-*.tar")]
+    pictures = {
+        name.partition(".")[0]: Image.open(io.BytesIO(content))
+        for shard in shards
+        for name, content in shard.items()
+        if name.endswith(".thumbnail.jpg")
+    }
+    assert len(pictures) == 6
+    for view, picture in pictures.items():
+        assert picture.format == "JPEG"
+        assert picture.size == (256, 205)
+        x, y = (np.arange(5, side, 7) for side in (256, 205))
+        shown = np.asarray(picture, float)[np.ix_(y, x)]
+        light = images.read_image(dataset / f"exr/{view}.exr").colour
+        light = light[np.ix_(y * 320 // 205, x * 400 // 256)].astype(float)
+        for channel in range(3):
+            roots = np.sqrt(light[..., channel]).ravel()
+            assert np.corrcoef(shown[..., channel].ravel(), roots)[0, 1] > 0.97
+    # All have one exposure: a darker view has a darker picture.
+    brightness = {view: np.asarray(picture).mean() for view, picture in pictures.items()}
+    assert brightness["view_0001f"] < 0.7 * brightness["view_0000f"]
+
+
+def test_the_card_says_how_datasets_loads_the_shards(output):
+    text = (output / "README.md").read_text()
+    (code,) = re.findall(r"```python\nfrom datasets import load_dataset\n(.*?)```", text, re.S)
+    patterns = ast.literal_eval(re.findall(r"^data_files = (.*)$", code, re.M)[0])
+    assert patterns.keys() == {"train", "test"}
+    matched = {path.name for pattern in patterns.values() for path in output.glob(pattern)}
+    assert matched == {path.name for path in output.glob(f"{NAME}-*.tar")}
+    columns = {name.partition(".")[2] for name in members(output / f"{NAME}-train-00000.tar")}
+    assert {*re.findall(r'sample\["(.*?)"\]', code)} <= columns
 
 
 def test_each_part_of_the_split_has_shards_of_its_own(folder, output):
@@ -111,9 +164,7 @@ def test_views_for_validation_have_shards_of_their_own(tmp_path):
     write_views(tmp_path / "dataset", CAMERA, rig)
     path = tmp_path / "dataset/lightfield.json"
     LightField.read(path).changed(scene={"name": "smoke"}).write(path)
-    files = [path for path in (tmp_path / "dataset").rglob("*") if path.is_file()]
-    lines = [f"{sha256(path)}  {path.relative_to(tmp_path / 'dataset')}\n" for path in files]
-    (tmp_path / "dataset/sha256sums.txt").write_text("".join(lines))
+    write_sums(tmp_path / "dataset")
     output = published(tmp_path / "dataset", tmp_path / NAME)
     counts = {"train": 3, "validation": 1, "test": 2}
     for split, count in counts.items():

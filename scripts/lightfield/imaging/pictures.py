@@ -39,6 +39,21 @@ def develop(colour: Array, exposure: float) -> Array:
     return to_8_bit(tone_map(np.ascontiguousarray(colour), exposure, WHITE))
 
 
+def thumbnail(image: Array, side: int, exposure: float | None = None) -> Array:
+    """Return linear (height, width, 4) pixels with associated alpha as a small sRGB picture.
+
+    Its longer side has at most ``side`` pixels. Transparent views lie on a middle grey. Without
+    ``exposure``, the picture has its own.
+    """
+    height, width = image.shape[:2]
+    scale = min(1.0, side / max(width, height))
+    small = shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
+    if exposure is None:
+        exposure = exposure_for(small[..., :3])
+    grey = MIDDLE_GREY / 2**exposure
+    return develop(small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1)), exposure)
+
+
 def shrunk(colour: Array, width: int, height: int) -> Array:
     """Return (…, …, channels) colour resized to ``width`` × ``height`` pixels, without aliasing.
 

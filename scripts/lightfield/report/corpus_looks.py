@@ -172,15 +172,7 @@ def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
 
 def _webp(image: Array) -> bytes:
     """Return linear (height, width, 4) pixels with associated alpha as a thumbnail."""
-    height, width = image.shape[:2]
-    scale = min(1.0, THUMBNAIL / max(width, height))
-    small = pictures.shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
-    exposure = pictures.exposure_for(small[..., :3])
-    # Transparent views lie on a middle grey.
-    grey = pictures.MIDDLE_GREY / 2**exposure
-    colour = small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1))
     file = io.BytesIO()
-    Image.fromarray(pictures.develop(colour, exposure)).save(
-        file, "WEBP", quality=_QUALITY, method=4
-    )
+    picture = Image.fromarray(pictures.thumbnail(image, THUMBNAIL))
+    picture.save(file, "WEBP", quality=_QUALITY, method=4)
     return file.getvalue()

@@ -68,6 +68,7 @@ _RESPONSIBLE_AI = {
 # Croissant names formats by media types. EXR has none that is registered.
 FORMATS = {
     "exr": "https://openexr.com",
+    "jpg": "image/jpeg",
     "png": "image/png",
     "json": "application/json",
     "csv": "text/csv",

@@ -3,6 +3,7 @@
 Source: huggingface.co/docs/hub/datasets-cards.
 """
 
+import json
 from typing import Any
 
 import yaml
@@ -12,6 +13,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW, PASSES
 from lightfield.report.markdown import markdown, one_line
 from lightfield.report.published import Published
+from lightfield.report.shards import THUMBNAIL
 
 # Licences that Hugging Face knows by their names. They are the short names in small letters.
 _HUGGING_FACE_LICENCES = {
@@ -71,6 +73,7 @@ def describe(published: Published) -> str:
         licence=licence,
         licence_url=published.licence_url,
         shards=published.shards,
+        data_files=json.dumps({part["split"]: part["path"] for part in data_files}),
         first_shard=next(iter(published.shards.values()))[0]["file"],
         fields=published.fields,
         meanings={name: _meaning(name, published.lightfield) for name in published.fields},
@@ -83,6 +86,8 @@ def _meaning(field: str, lightfield: LightField) -> str:
     """Describe a member of a sample by its name without the sample's key."""
     if field == "json":
         return "pose, camera and checksum of each picture"
+    if field == THUMBNAIL:
+        return "the view as a small picture, tone-mapped, which the viewer on this page shows"
     stem = field.rpartition(".")[0]
     if stem == VIEWS:
         alpha = ", opacity in A" if lightfield.transparent else ""

@@ -55,7 +55,7 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
         LightField.read(next(each for each in folders if (each / NAME).is_file()) / NAME),
         {split: package.listed(paths) for split, paths in written.items()},
         package.listed([output / shards.INDEX, rest]),
-        ("json", *sorted(names)),
+        ("json", *sorted({*names, shards.THUMBNAIL})),
         sum(len(dataset.samples) for dataset in datasets),
     )
     write_text(output / CARD, hugging_face.describe(published))

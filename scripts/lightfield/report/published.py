@@ -67,5 +67,11 @@ class Published:
             "doi": publication.doi,
             "url": publication.url,
         }
-        entries = [f"  {name} = {{{one_line(value)}}}" for name, value in lines.items() if value]
+        # An angle bracket could begin HTML on a page that shows this.
+        texts = {
+            name: one_line(value).replace("<", r"{\textless}")
+            for name, value in lines.items()
+            if value
+        }
+        entries = [f"  {name} = {{{text}}}" for name, text in texts.items()]
         return "@misc{" + self.name + ",\n" + ",\n".join(entries) + "\n}"

@@ -2,15 +2,16 @@
 
 A sample's members follow each other, and share their names up to the first dot:
 view_0000f.views.exr is the view, view_0000f.normal.exr its pass, view_0000f.perspective.png its
-reprojection, and view_0000f.json has the pose and the camera of each. What belongs to no view is in
-a tar of its own. Equal datasets give equal bytes.
+reprojection, and view_0000f.json has the pose and the camera of each. view_0000f.thumbnail.jpg is a
+small picture of the view. What belongs to no view is in a tar of its own. Equal datasets give equal
+bytes.
 """
 
 import json
 import tarfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,15 @@ from lightfield.formats.layout import (
     view_files,
 )
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
+from lightfield.report import thumbnails
 from lightfield.report.package import add_entry, tar_size
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
 INDEX = "views.csv"
+# The member of a sample that is a small picture of its view.
+THUMBNAIL = "thumbnail.jpg"
+_VIEW = f"{VIEWS}.exr"
 
 
 @dataclass
@@ -42,12 +47,14 @@ class Sample:
     """A view with all its pictures.
 
     ``files`` has the path of each by its field, such as normal.exr. ``content`` is the JSON.
+    ``thumbnail`` is a small picture of the view, or empty.
     """
 
     key: str
     split: str
     content: dict[str, Any]
     files: dict[str, Path] = field(default_factory=dict)
+    thumbnail: bytes = b""
 
     @property
     def members(self) -> Iterator[tuple[str, Path | bytes]]:
@@ -55,6 +62,8 @@ class Sample:
         yield f"{self.key}.json", (json.dumps(self.content, indent=1) + "\n").encode()
         for name, path in sorted(self.files.items()):
             yield f"{self.key}.{name}", path
+        if self.thumbnail:
+            yield f"{self.key}.{THUMBNAIL}", self.thumbnail
 
 
 @dataclass(frozen=True)
@@ -157,6 +166,8 @@ def write_shards(
 ) -> dict[str, list[Path]]:
     """Write the samples as tars of at most ``most`` bytes. Return the tars of each split.
 
+    Each sample has a thumbnail, which Hugging Face's viewer shows
+    (huggingface.co/docs/hub/datasets-webdataset). It is made only when its tar is written.
     `INDEX` beside them says which tar has which view. A larger sample has a tar of its own. Removes
     tars of an earlier publication. Raises `UserError` if two views have the same key.
     """
@@ -166,11 +177,16 @@ def write_shards(
             raise UserError(f"{output}: {count} views have the key {key} in shards; rename them")
     for old in output.glob("*.tar"):
         old.unlink()
+    exposure = thumbnails.exposure_of([sample.files[_VIEW] for sample in samples])
     progress = Progress(len(samples), name, "views")
     shards: dict[str, list[Path]] = {}
     rows = []
     for split in PARTS:
-        of_split = [sample for sample in samples if sample.split == split]
+        of_split = (
+            replace(sample, thumbnail=thumbnails.jpeg(sample.files[_VIEW], exposure))
+            for sample in samples
+            if sample.split == split
+        )
         for number, part in enumerate(parts(of_split, most)):
             # mlcroissant takes tars with equal names for one, even of different datasets.
             path = output / f"{name}-{split}-{number:05}.tar"
