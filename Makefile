@@ -4,6 +4,7 @@
 # make test-snakemakes  builds the smoke scene with the oldest and the newest Snakemake
 # make consumers   reads exports with the consumers' own code, in an environment of its own
 # make learn       learns radiance fields from exported files, in the same environment
+# make extension   writes the Blender extension that draws rigs, in build/
 # make docs        builds the documents as a site with a search, in site/
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
@@ -28,7 +29,7 @@ INSTALL_PLUGIN = cp -R $(PLUGIN) \
 	"$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test test-other test-snakemakes check consumers learn soak docs locks
+.PHONY: all test test-other test-snakemakes check consumers learn soak docs extension locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -85,6 +86,10 @@ docs: export NO_MKDOCS_2_WARNING = 1
 docs: .venv-docs/complete
 	.venv-docs/bin/mkdocs build --strict --quiet
 	@echo "site/index.html"
+
+# PYTHON names any Python from 3.11 with pip. It downloads the packages that Blender's Python lacks.
+extension:
+	"$$(envs/find_python.sh $(PYTHON))" extension/build.py build
 
 # Builds that are killed, damaged and left with full disks; then a family of 200 models, some broken.
 soak: .venv/complete

@@ -658,7 +658,12 @@ def check_member(content: Any, name: str) -> Scene:
 def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = _shown(path)
-    return _checked_scene(read_settings_text(path, file), file, Path.cwd())
+    return check_scene(read_settings_text(path, file), file)
+
+
+def check_scene(text: str, file: str) -> Scene:
+    """Return a scene YAML's text as settings. Raises `UserError`, which calls the YAML ``file``."""
+    return _checked_scene(text, file, Path.cwd())
 
 
 def mistake(scene: str, problem: str) -> UserError:

@@ -10,8 +10,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
-from lightfield.rendering import blend_file, clearance, drawings, frames
-from lightfield.rendering.clearance import REACH, TOUCHING
+from lightfield.rendering import blend_file, clearance, drawings, frames, viewport
+from lightfield.rendering.clearance import REACH
 from lightfield.rendering.limits import warnings
 from lightfield.stages.rig import CheckCameras, FreePlaces
 
@@ -24,7 +24,7 @@ def write_places(job: FreePlaces) -> None:
     blend_file.open_scene(job.blend, settings.model_dump(), contents)
     if isinstance(settings.frame, int):
         frames.go_to(settings.frame)
-    clearance.show_what_is_rendered()
+    viewport.show_what_is_rendered()
     places = clearance.free_places(rig)
     write_json(job.output, {"box": rig.box, "places": places.tolist()})
     print(f"{len(places)} cameras, each with {rig.clearance:g} m of free space around it")
@@ -41,20 +41,21 @@ def write_clearance(job: CheckCameras) -> None:
     contents = _contents(job.inventory)
     blend_file.open_scene(job.blend, lightfield.content.get("scene", {}), contents)
     frames.go_to(lightfield.frame)
-    clearance.show_what_is_rendered()
+    viewport.show_what_is_rendered()
     distances, box = clearance.surroundings(positions)
     enclosures = clearance.enclosures(positions, box)
-    inside = clearance.enclosing_objects(enclosures)
+    enclosing = clearance.enclosing_objects(enclosures)
+    are_inside = clearance.are_inside(enclosing, distances)
     views = {
         name: {
             "distance": None if np.isinf(distance) else round(float(distance), 6),
-            "inside": enclosing is not None or bool(distance < TOUCHING),
+            "inside": is_inside,
         }
-        for name, distance, enclosing in zip(names, distances, inside, strict=True)
+        for name, distance, is_inside in zip(names, distances, are_inside.tolist(), strict=True)
     }
     enclosed_views = [name for name in names if views[name]["inside"]]
     if enclosed_views:
-        objects = sorted({enclosing for enclosing in inside if enclosing}) or ["a surface"]
+        objects = sorted({name for name in enclosing if name}) or ["a surface"]
         more = " …" if len(enclosed_views) > 8 else ""
         raise UserError(
             f"{job.lightfield}: {len(enclosed_views)} of {len(names)} cameras are inside "

@@ -1,4 +1,8 @@
-"""Measures how near each camera is to geometry, and which objects enclose it."""
+"""Measures how near each camera is to geometry, and which objects enclose it.
+
+The functions find geometry in the viewport. `viewport.show_what_is_rendered` makes it show all that
+is rendered.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -14,9 +18,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.sphere import icosphere
-from lightfield.rendering import animation
-from lightfield.rendering.render_graph import in_render
-from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
 
@@ -30,34 +31,6 @@ _TRIES = 100
 _SAMPLES = 64
 # The number of rays from a camera that find the object around it.
 _RAYS = len(icosphere(1))
-
-
-def show_what_is_rendered() -> None:
-    """Make the viewport show what a render of the current frame shows, without its volumes.
-
-    The functions below find geometry in the viewport.
-    """
-    shown = in_render(_shown) - alone()
-    layer = bpy.context.view_layer
-    for obj in bpy.data.objects:
-        animation.mute(obj, ("hide_viewport",))
-        obj.hide_viewport = obj.name_full not in shown
-    for settings in bpy.data.particles:
-        settings.display_percentage = 100
-    for obj in layer.objects:
-        obj.hide_set(False)
-    for collection in bpy.data.collections:
-        collection.hide_viewport = collection.hide_render
-    parts = [layer.layer_collection]
-    for part in parts:
-        part.hide_viewport = False
-        parts += part.children
-
-
-def _shown(depsgraph: Any) -> set[str]:
-    """Return the full names of the objects that are not hidden in a render."""
-    objects = (entry.object for entry in depsgraph.object_instances)
-    return {str(obj.original.name_full) for obj in objects if not obj.hide_render}
 
 
 class Surroundings(NamedTuple):
@@ -131,6 +104,15 @@ def enclosing_objects(enclosures: Sequence[Enclosure | None]) -> Sequence[str | 
     rooms = {name for name in names if name and names.count(name) == len(names)}
     rooms.update(enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open)
     return [None if name in rooms else name for name in names]
+
+
+def are_inside(enclosing: Sequence[str | None], distances: Floats) -> NDArray[np.bool_]:
+    """Return which cameras are inside geometry: an object encloses them, or a surface touches them.
+
+    ``enclosing`` comes from `enclosing_objects`, and ``distances`` (n,) from `surroundings`.
+    """
+    are_enclosed = np.array([name is not None for name in enclosing])
+    return np.asarray(are_enclosed | (distances < TOUCHING))
 
 
 def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:

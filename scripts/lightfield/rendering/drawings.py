@@ -28,7 +28,7 @@ def set_up(layer: Any, camera_type: str, has_light_groups: bool = False) -> None
 def warnings(camera_type: str) -> Iterator[str]:
     """Yield a line if the views of a PANO or PERSP camera lack drawings, or passes of them.
 
-    The viewport must show what is rendered: see `clearance.show_what_is_rendered`.
+    The viewport must show what is rendered: see `viewport.show_what_is_rendered`.
     """
     shown = sorted(str(obj.name_full) for obj in _drawings() if not obj.hide_viewport)
     if not shown:

@@ -26,7 +26,7 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
     Cycles has problems far from the origin, behind many transparent layers, and with some lights
     behind glass. The cameras are at ``positions`` (n, 3). Their nearest surfaces are ``distances``
     (n,) away, inf beyond `REACH`. The viewport must show what is rendered: see
-    `show_what_is_rendered`.
+    `viewport.show_what_is_rendered`.
     """
     # Cycles computes in float32, in world space.
     steps = np.spacing(np.abs(positions).max(axis=1).astype(np.float32)).astype(np.float64)

@@ -1,0 +1,325 @@
+"""The Blender extension: it draws the cameras where the workflow puts them, and writes YAMLs."""
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+import yaml
+from conftest import BLENDER, ROOT
+
+from lightfield.configuration.scene_yaml import read_scene
+from lightfield.formats.lightfield import LightField
+
+SCENES = ROOT / "configs" / "scenes"
+# How far a coordinate in 32 bits may be from the dataset's.
+ROUNDING = 2e-6
+
+
+@pytest.fixture(scope="session")
+def archive(tmp_path_factory):
+    """The extension's zip, without the packages that the environment has."""
+    spec = importlib.util.spec_from_file_location("build", ROOT / "extension" / "build.py")
+    build = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(build)
+    return build.write(tmp_path_factory.mktemp("extension"), [])
+
+
+@pytest.fixture(scope="session")
+def extension(archive, tmp_path_factory):
+    """A folder in which the zip is unpacked."""
+    folder = tmp_path_factory.mktemp("unpacked")
+    with zipfile.ZipFile(archive) as content:
+        content.extractall(folder / "plenoforge_rigs")
+    return folder
+
+
+@pytest.fixture
+def blender(extension, run_program, tmp_path):
+    """Do some steps of `rigs_in_viewport` in Blender. Return what they return."""
+
+    def run(*steps):
+        plain = [(step, (), {}) if isinstance(step, str) else (*step, {})[:3] for step in steps]
+        (tmp_path / "steps.json").write_text(json.dumps(plain))
+        output = tmp_path / "output.json"
+        arguments = (extension, tmp_path / "steps.json", output)
+        run_program(BLENDER / "rigs_in_viewport.py", *arguments)
+        return json.loads(output.read_text())
+
+    return run
+
+
+def opened(path):
+    return ["press", ["open"], {"filepath": str(path)}]
+
+
+def written(path=None):
+    return ["press", ["write"], {"filepath": str(path)} if path else {}]
+
+
+def cameras(points, count):
+    """Return the places (n, 3) of drawn cameras, and the middles (n, 3) of what they see."""
+    array = np.reshape(points, (count, -1, 3)) if count else np.empty((0, 2, 3))
+    return array[:, 0], array[:, 1]
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A user's folder with a .blend, and the YAML of its rigs."""
+    scenes = tmp_path / "project" / "configs" / "scenes"
+    scenes.mkdir(parents=True)
+    (scenes / "mine.yaml").write_text(
+        """# My scene.
+scene: {blend: mine.blend}
+
+render:
+  samples: 16   # enough
+
+rigs:
+  # Around the table.
+  around:
+    type: sphere
+    subdivisions: 2
+    size: 1   # metres
+    camera: &lens {lens: equidistant, fov: 200, resolution: [64, 64]}
+  wall:
+    type: plane
+    cameras: [3, 2]
+    center: [0.1, 2, 1.05]
+    rotation: [0, 0, 30]
+    camera: {lens: rectilinear, fov: 60, resolution: [64, 48]}
+
+  # Not to be changed.
+  walk: {type: path, count: 4, keys: [{position: [0, 0, 1]}, {position: [1, 0, 1]}], camera: *lens}
+
+reprojections:
+  flat: {camera: {lens: rectilinear, fov: 90, resolution: [32, 32]}, rigs: [wall], format: png}
+"""
+    )
+    return tmp_path / "project"
+
+
+@pytest.mark.parametrize("scene", ["smoke", "garden", "barbershop"])
+def test_cameras_are_drawn_where_the_dataset_has_them(scene, blender, run_program, tmp_path):
+    *_, shown = blender("register", opened(SCENES / f"{scene}.yaml"), "rigs")
+    assert shown.keys() == read_scene(SCENES / f"{scene}.yaml").rigs.keys()
+    for name, parts in shown.items():
+        output = tmp_path / f"{name}.json"
+        program = ("make_lightfield.py", "--scene", scene, "--rig", name, "--output", output)
+        run_program(*program)
+        views = LightField.read(output).world_from_cameras
+        places, ahead = cameras(parts["cameras"], len(views))
+        np.testing.assert_allclose(places, views[:, :3, 3], atol=ROUNDING)
+        looks = ahead - places
+        looks /= np.linalg.norm(looks, axis=1, keepdims=True)
+        np.testing.assert_allclose(looks, -views[:, :3, 2], atol=1e-4)
+
+
+def test_cameras_look_through_their_lens_as_blenders_own(blender, project):
+    """The corners of a perspective camera are those of Blender's camera with the same lens."""
+    *_, shown, frame = blender(
+        "register",
+        opened(project / "configs/scenes/mine.yaml"),
+        "rigs",
+        ("view_frame", ["wall", 60, 64, 48]),
+    )
+    camera = np.reshape(shown["wall"]["cameras"], (6, -1, 3))[0]
+    rays = camera[1:] - camera[0]
+    for corner in np.array(frame):
+        cosines = rays @ corner / np.linalg.norm(rays, axis=1) / np.linalg.norm(corner)
+        assert cosines.max() > 1 - 1e-6
+
+
+def test_a_fisheye_beyond_180_degrees_ends_behind_its_camera(blender, project):
+    *_, shown = blender("register", opened(project / "configs/scenes/mine.yaml"), "rigs")
+    camera = np.reshape(shown["around"]["cameras"], (42, -1, 3))[0]
+    rays = camera[1:] - camera[0]
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    assert np.degrees(np.arccos(rays @ rays[0])).max() == pytest.approx(100, abs=0.01)
+
+
+def test_cameras_inside_objects_are_those_that_the_workflow_finds(
+    blender, project, run_program, tmp_path
+):
+    """One camera is in a ball, and one is in a ball that renders do not show."""
+    path = project / "configs/scenes/mine.yaml"
+    saved = str(project / "mine.blend")
+    *_, shown, lines = blender(
+        ("ball", [[0, 0, -0.5], {"hide_render": False}]),
+        ("ball", [[0, 0, 0.5], {"hide_render": True}]),
+        "register",
+        opened(path),
+        ("save", [saved]),
+        written(),
+        "rigs",
+        ("facts", ["around"]),
+    )
+    inventory = tmp_path / "inventory.json"
+    program = ("inventory.py", "--scene", "mine", "--blend", saved, "--output", inventory)
+    run_program(*program, cwd=project)
+    lightfield = tmp_path / "lightfield.json"
+    program = ("make_lightfield.py", "--scene", "mine", "--rig", "around")
+    run_program(*program, "--inventory", inventory, "--output", lightfield, cwd=project)
+    output = tmp_path / "clearance.json"
+    checked = ("--blend", saved, "--lightfield", lightfield, "--output", output)
+    message = run_program("check_cameras.py", *checked, check=False).stderr
+    assert "1 of 42 cameras are inside" in message
+    views = LightField.read(lightfield).views
+    found = [view.position for view in views if view.name in message]
+    places, _ = cameras(shown["around"]["inside"], 1)
+    np.testing.assert_allclose(places, found, atol=ROUNDING)
+    assert len(cameras(shown["around"]["cameras"], 41)[0]) == 41
+    assert "Inside objects: 1" in lines
+
+
+def test_handles_and_the_panel_change_the_yaml_and_nothing_else(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    before = path.read_text()
+    *_, refused, shown = blender(
+        "register",
+        opened(path),
+        ("change", ["around"], {"location": [1, 2, 3.25], "scale": [2, 2, 2]}),
+        ("change", ["around"], {"plenoforge__count_0": 3}),
+        ("change", ["wall"], {"rotation_mode": "QUATERNION"}),
+        ("change", ["wall"], {"rotation_quaternion": [0.5, 0.5, 0.5, 0.5], "scale": [3, 1, 2]}),
+        ("change", ["walk"], {"location": [5, 5, 5]}),
+        written(),
+        "rigs",
+    )
+    assert refused is None
+    after = path.read_text().splitlines()
+    assert [line for line in before.splitlines() if line not in after] == [
+        "    subdivisions: 2",
+        "    size: 1   # metres",
+        "    rotation: [0, 0, 30]",
+    ]
+    assert [line for line in after if line not in before.splitlines()] == [
+        "    subdivisions: 3",
+        "    size: 2   # metres",
+        "    center: [1, 2, 3.25]",
+        "    rotation: [90, 0, 90]",
+        "    size: [3, 1, 2]",
+    ]
+    rigs = read_scene(path).rigs
+    for name, parts in shown.items():
+        poses = np.array([pose.world_from_camera() for pose in rigs[name].poses()])
+        places, ahead = cameras(parts["cameras"], len(poses))
+        np.testing.assert_allclose(places, poses[:, :3, 3], atol=ROUNDING)
+        cosines = ((ahead - places) * -poses[:, :3, 2]).sum(axis=1)
+        np.testing.assert_allclose(cosines, np.linalg.norm(ahead - places, axis=1), atol=1e-5)
+
+
+def test_opening_and_writing_leaves_every_scene_yaml_as_it_is(blender, tmp_path):
+    for path in SCENES.glob("*.yaml"):
+        shutil.copy(path, tmp_path)
+    scenes = [tmp_path / path.name for path in SCENES.glob("*.yaml")]
+    steps = [step for path in scenes for step in (opened(path), written())]
+    assert blender("register", *steps)[1:] == [None] * len(steps)
+    for path in scenes:
+        assert path.read_text() == (SCENES / path.name).read_text()
+
+
+def test_rigs_are_added_removed_copied_and_renamed(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    results = blender(
+        "register",
+        opened(path),
+        ("duplicate", ["wall"]),
+        ("press", ["add"], {"type": "ring"}),
+        ("change", ["ring_1"], {"plenoforge__title": "circle"}),
+        ("delete", ["walk"]),
+        written(),
+        "rigs",
+    )
+    assert None is results[-2]
+    rigs = read_scene(path).rigs
+    assert rigs.keys() == {"around", "wall", "wall_2", "circle"}
+    assert rigs["wall_2"].center == (5.1, 2, 1.05)
+    assert results[-1].keys() == rigs.keys()
+
+
+def test_undo_brings_the_drawing_back(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    *_, before, _, after, _, _, undone = blender(
+        "register",
+        opened(path),
+        ("push", ["opened"]),
+        "rigs",
+        ("change", ["around"], {"location": [1, 0, 0]}),
+        "rigs",
+        ("push", ["moved"]),
+        "undo",
+        "rigs",
+    )
+    assert before["around"] != after["around"]
+    assert undone == before
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        ([("parent", ["around"])], "around: a parent, a constraint or a delta transform moves its"),
+        ([("change", ["around"], {"scale": [1, -1, 1]})], "around: its Empty has a negative scale"),
+        ([("change", ["wall"], {"plenoforge__title": "a b"})], "rigs: 'a b' is not a name"),
+        ([("delete", ["around"])], "rigs: cannot be changed alone"),
+        ([("delete", ["wall"])], "reprojections.flat.rigs: there is no rig"),
+    ],
+)
+def test_what_no_yaml_can_say_is_refused_in_one_line(steps, message, blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    before = path.read_text()
+    *_, refused = blender("register", opened(path), *steps, written())
+    assert message in refused and "\n" not in refused
+    assert path.read_text() == before
+
+
+def test_the_lock_records_the_saved_blend(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    lock = path.with_suffix(".lock.json")
+    blend = project / "mine.blend"
+    save = ("save", [str(blend)])
+    *_, unsaved = blender("register", save, opened(path), ("push", ["opened"]), written())
+    assert unsaved == "mine.blend: has changes that are not saved; save it first"
+    assert not lock.exists()
+    assert blender("register", save, opened(path), save, written())[-1] is None
+    sha256 = subprocess.run(["sha256sum", blend], capture_output=True, text=True).stdout.split()[0]
+    assert json.loads(lock.read_text()) == {"blend": "mine.blend", "sha256": sha256}
+
+
+def test_a_blend_without_a_yaml_gets_one(blender, tmp_path):
+    blend = tmp_path / "character.blend"
+    path = tmp_path / "configs/scenes/character.yaml"
+    add = ("press", ["add"], {"type": "hemisphere"})
+    *_, refused = blender("register", add, written(path))
+    assert refused == "the .blend has no file yet; save it, or open a scene YAML"
+    save = ("save", [str(blend)])
+    assert blender("register", add, save, written(path))[-1] is None
+    assert yaml.safe_load(path.read_text())["scene"] == {"blend": "character.blend"}
+    assert path.with_suffix(".lock.json").exists()
+    assert read_scene(path).rigs["hemisphere_1"].view_count == 50
+
+
+def test_blender_installs_the_zip_and_nothing_stays(archive, run_program, tmp_path):
+    command = BLENDER / "rigs_in_viewport.py"
+    steps = [("install", [str(archive)], {})]
+    (tmp_path / "steps.json").write_text(json.dumps(steps))
+    output = tmp_path / "output.json"
+    subprocess.run(
+        [sys.executable, command, tmp_path, tmp_path / "steps.json", output],
+        check=True,
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+    )
+    (names,) = json.loads(output.read_text())
+    assert {"VIEW3D_PT_plenoforge", "Scene.plenoforge", "handler", "plenoforge"} <= {*names}
+
+
+def test_unregistering_leaves_nothing(blender, project):
+    before, *_, after = blender(
+        "traces", "register", opened(project / "configs/scenes/mine.yaml"), "unregister"
+    )
+    assert before == after == []
