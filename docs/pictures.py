@@ -1,6 +1,7 @@
-"""Draw pictures of the documents: each type of rig, and a view in each of its lenses or passes.
+"""Draw pictures of the documents: rigs, views in their lenses and passes, a walk, points, depth.
 
-Without arguments it draws the rigs. --passes and --lenses name datasets of one's own.
+Without arguments it draws the rigs. The options name datasets of one's own. --walk names the output
+of scripts/synthesize.py for a closed path.
 """
 
 import argparse
@@ -14,12 +15,14 @@ sys.path.insert(0, str(ROOT / "scripts"))
 
 from lightfield.formats.lightfield import LightField  # noqa: E402
 from lightfield.geometry import rigs  # noqa: E402
+from lightfield.imaging.pictures import develop  # noqa: E402
+from lightfield.reading.opening import open_dataset  # noqa: E402
 from lightfield.report import pass_pictures  # noqa: E402
 
 # isort: split
 import matplotlib  # noqa: E402
 import numpy as np  # noqa: E402
-from PIL import Image, ImageDraw, ImageFont  # noqa: E402
+from PIL import Image, ImageDraw, ImageFont, ImageOps  # noqa: E402
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
@@ -44,6 +47,8 @@ RIGS = [
     {"type": "random", "count": 20},
 ]
 GREY = "#777777"
+# Width and height of the pictures of docs/index.md.
+WAY = (480, 240)
 
 
 def draw_rigs(path: Path) -> None:
@@ -107,16 +112,90 @@ def draw_lenses(path: Path, folder: Path) -> None:
     sheet(path, dict(sorted(tiles.items(), key=lambda item: item[1].width)), 4)
 
 
+def draw_walk(path: Path, folder: Path) -> None:
+    """Write an animation of synthesised views, which repeats for ever."""
+    frames = [Image.open(file).convert("RGB") for file in sorted(folder.glob("png/*.png"))]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=67, quality=80, method=6)
+
+
+def draw_points(path: Path, folder: Path) -> None:
+    """Draw the cameras of a dataset as frusta around the points that they see."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.05
+    figure = pyplot.figure(figsize=(4.8, 2.4), dpi=300, facecolor="#10181f")
+    # A square that is higher than the figure.
+    axes = figure.add_axes((0, -0.5, 1, 2), projection="3d", computed_zorder=False)
+    points, colours = [], []
+    for view in open_dataset(folder).views:
+        pose = np.asarray(view.world_from_camera)
+        eye = pose[:3, 3]
+        frame = np.column_stack([corners, np.full(4, -0.14)]) @ pose[:3, :3].T + eye
+        for corner, following in zip(frame, np.roll(frame, -1, axis=0), strict=True):
+            axes.plot(*np.transpose([eye, corner, following]), color="#2fd0c0", linewidth=0.6)
+        origins, directions = view.rays()
+        seen = np.isfinite(view.distance) & (view.alpha > 0.99)
+        points.append((origins + directions * view.distance[..., None])[seen][::5])
+        colours.append(develop(view.rgb, 0.5)[seen][::5] / 255)
+    # In one collection, near points hide distant ones.
+    axes.scatter(*np.concatenate(points).T, c=np.concatenate(colours), s=0.6, linewidths=0)
+    axes.set(xlim=(-0.7, 0.7), ylim=(-0.7, 0.7), zlim=(-0.4, 0.8), facecolor="#10181f")
+    axes.set_box_aspect((1.4, 1.4, 1.2), zoom=1.0)
+    axes.view_init(elev=24, azim=-58)
+    axes.set_axis_off()
+    picture = io.BytesIO()
+    figure.savefig(picture)
+    pyplot.close(figure)
+    Image.open(picture).convert("RGB").resize(WAY).save(path, quality=88)
+
+
+def draw_depth(path: Path, folder: Path) -> None:
+    """Draw a view that looks forward beside its depth, where near surfaces are bright."""
+    views = open_dataset(folder).views
+    view = max(views, key=lambda view: -view.world_from_camera[1][2])
+    nearness = 1 / view.distance
+    coloured = pyplot.get_cmap("magma")(nearness / np.nanquantile(nearness, 0.98), bytes=True)
+    pixels = np.hstack([develop(view.rgb, 0.0), coloured[..., :3]])
+    Image.fromarray(pixels).resize(WAY).save(path, quality=88)
+
+
+def draw_blend(path: Path, folder: Path) -> None:
+    """Draw the first view of a dataset that was rendered from a .blend."""
+    picture = Image.fromarray(develop(open_dataset(folder).views[0].rgb, -0.7))
+    ImageOps.fit(picture, WAY).save(path, quality=88)
+
+
+def draw_places(path: Path) -> None:
+    """Draw the first places of each builder, from the pictures of all their places."""
+    picture = Image.new("RGB", WAY)
+    for row, builder in enumerate(("garden", "lone_monk", "barbershop", "rooms")):
+        sheet = Image.open(FOLDER / f"places_{builder}.jpg")
+        four_places = sheet.crop((0, 0, sheet.width, sheet.width // 8))
+        picture.paste(four_places.resize((WAY[0], WAY[1] // 4)), (0, row * WAY[1] // 4))
+    picture.save(path, quality=88)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--passes", type=Path, help="dataset whose passes are drawn")
     parser.add_argument("--lenses", type=Path, help="dataset whose reprojections are drawn")
+    parser.add_argument("--walk", type=Path, help="folder of synthesised views of a closed path")
+    parser.add_argument("--points", type=Path, help="dataset around an object, with alpha")
+    parser.add_argument("--depth", type=Path, help="dataset of fisheyes, of which one is drawn")
+    parser.add_argument("--blend", type=Path, help="dataset of a .blend, whose first view is drawn")
     arguments = parser.parse_args()
     draw_rigs(FOLDER / "rig_types.png")
+    draw_places(FOLDER / "way_cluster.jpg")
     if arguments.passes:
         draw_passes(FOLDER / "passes.jpg", arguments.passes)
     if arguments.lenses:
         draw_lenses(FOLDER / "lenses.jpg", arguments.lenses)
+    if arguments.walk:
+        draw_walk(FOLDER / "garden_walk.webp", arguments.walk)
+    if arguments.points:
+        draw_points(FOLDER / "way_train.jpg", arguments.points)
+    if arguments.depth:
+        draw_depth(FOLDER / "way_study.jpg", arguments.depth)
+    if arguments.blend:
+        draw_blend(FOLDER / "way_blend.jpg", arguments.blend)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""The tutorials' commands run as they are written, on a tiny room in the place of the garden.
+"""The tutorials' commands, and the README's lines of Python, run as they are written.
+
+A tiny room takes the place of the garden.
 
 Comments in a tutorial, which readers do not see, tell the test about the code below them:
 
@@ -80,11 +82,11 @@ def script(tutorial):
     return "\n".join(lines)
 
 
-def run(folder, tutorial):
+def run(folder, commands):
     # The environment is active only after the tutorial has activated it.
     kept = {name: value for name, value in os.environ.items() if name != "VIRTUAL_ENV"}
     result = subprocess.run(
-        ["bash", "-c", script(tutorial)],
+        ["bash", "-c", commands],
         cwd=folder,
         env=kept | {"CORES": "2"},
         stdout=subprocess.PIPE,
@@ -98,7 +100,7 @@ def run(folder, tutorial):
 
 @pytest.mark.slow
 def test_the_first_dataset_is_built_mended_and_followed_by_a_scene_of_ones_own(folder):
-    output = run(folder, "first-dataset.md")
+    output = run(folder, script("first-dataset.md"))
     assert f"valid: {DATASET}/report/index.html" in output
     assert re.search(r"view_0000f at \[.*\]: colour .*, depth \d\.\d+ m", output)
     assert (folder / DATASET / "exr/view_0003f.exr").is_file()
@@ -109,8 +111,18 @@ def test_the_first_dataset_is_built_mended_and_followed_by_a_scene_of_ones_own(f
 
 
 @pytest.mark.slow
+def test_the_readme_s_lines_read_the_dataset_that_make_builds(folder):
+    (code,) = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)
+    program = (
+        f"points = [[0, 0, 1]]\n{code}print(*view.rgb.shape, *directions.shape, *pixels.shape)"
+    )
+    output = run(folder, f"make\nPYTHONPATH=scripts python - << 'END'\n{program}\nEND")
+    assert output.endswith("32 32 3 32 32 3 1 2\n")
+
+
+@pytest.mark.slow
 def test_ones_own_blend_is_rendered_refused_after_a_change_and_accepted(folder):
-    output = run(folder, "your-own-blend.md")
+    output = run(folder, script("your-own-blend.md"))
     assert "note: character.blend: " in output
     assert "its sha256 is" in output
     for rig in ("around", "camera"):
@@ -119,7 +131,7 @@ def test_ones_own_blend_is_rendered_refused_after_a_change_and_accepted(folder):
 
 @pytest.mark.slow
 def test_a_splat_gets_views_points_and_a_measure_that_finds_no_error_in_the_truth(folder):
-    output = run(folder, "train-a-splat.md")
+    output = run(folder, script("train-a-splat.md"))
     assert "10 views train, 2 test" in output
     assert "2 views: PSNR inf dB, " in output
     assert "SSIM 1.0000, FLIP 0.0000" in output
@@ -132,7 +144,7 @@ def test_a_splat_gets_views_points_and_a_measure_that_finds_no_error_in_the_trut
 
 @pytest.mark.slow
 def test_a_cluster_is_planned_on_the_login_node(folder):
-    output = run(folder, "on-a-cluster.md")
+    output = run(folder, script("on-a-cluster.md"))
     # The smoke scene, and all cameras of the garden.
     assert re.findall(r"^views +\d+ +(\d+) ", output, re.M) == ["14", "12"]
     assert "smoke/LFCuboid_1x1x1" in output
