@@ -3,12 +3,17 @@
 import json
 import math
 import pickle
+import re
 import shutil
+import sys
 import tarfile
+import types
 from pathlib import Path
 
+import families
 import numpy as np
 import pytest
+from checkouts import ROOT
 from sphere import LENSES, RADIUS, colour_of, write_views
 
 from lightfield import open_corpus, open_dataset
@@ -21,6 +26,7 @@ from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.report import package
 from lightfield.report.publish import publish
+from lightfield.stages.family import Corpus, CorpusSettings
 
 # Off the sphere's centre, and turned about every axis.
 RIG = {
@@ -42,14 +48,16 @@ def finish(dataset):
     return dataset
 
 
-def write_dataset(dataset):
+def write_dataset(dataset, rig=RIG):
     """Write a dataset with passes, flow, a split, and two reprojections."""
-    write_views(dataset, CAMERA, RIG)
-    write_views(dataset / "perspective", LENSES["perspective"], RIG, suffix=".png")
-    write_views(dataset / "panorama", LENSES["panorama"], RIG)
+    write_views(dataset, CAMERA, rig)
+    write_views(dataset / "perspective", LENSES["perspective"], rig, suffix=".png")
+    write_views(dataset / "panorama", LENSES["panorama"], rig)
     passes = ["normal", "object"]
     lightfield = LightField.read(dataset / "lightfield.json").with_flow()
-    lightfield.changed(scene={"name": "room"}, render={"passes": passes}).write(lightfield.path)
+    lightfield.changed(scene={"name": "room"}, render={"samples": 4, "passes": passes}).write(
+        lightfield.path
+    )
     random = np.random.default_rng(1)
     for name in ("perspective", "panorama"):
         reprojected = LightField.read(dataset / name / "lightfield.json")
@@ -434,3 +442,70 @@ def test_a_damaged_view_in_a_tar_is_named_by_its_place(forms, tmp_path):
     view = open_dataset(tar).views[1]
     with pytest.raises(UserError, match=r"room_rig\.tar/exr/view_0001f\.exr: "):
         view.rgb  # noqa: B018
+
+
+# ---- the page --------------------------------------------------------------------------------
+
+PAGE = ROOT / "docs/how-to/read-a-dataset.md"
+GARDEN = "results/garden/LFSphere_e100cm_d170cm"
+
+
+@pytest.fixture
+def results(folder, sequence, tmp_path, monkeypatch):
+    """The datasets that the page names. The garden has 18 views or more."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "torch", stand_in_for_torch())
+    garden = write_dataset(tmp_path / GARDEN / "dataset", RIG | {"cameras": [5, 4]})
+    shutil.copytree(garden, tmp_path / GARDEN, dirs_exist_ok=True)
+    shutil.copytree(sequence, tmp_path / "results/still_life/LFMoving")
+    for number in range(4):
+        families.add_member(tmp_path / "results/chairs", f"{number:04d}", shade=number)
+    settings = CorpusSettings(family="chairs")
+    looks = tmp_path / "looks.json"
+    job = Corpus(settings=settings, folder=tmp_path / "results/chairs", cache=looks, receipt=None)
+    job.note_settings(settings.as_json())
+    job.run()
+
+
+def stand_in_for_torch():
+    """Return what the page uses of torch, on arrays. The environment of the tests has no torch."""
+    torch = types.ModuleType("torch")
+
+    class Tensor(np.ndarray):
+        def float(self):
+            return self.astype(np.float32)
+
+    torch.from_numpy = lambda array: array.view(Tensor)
+    data = types.SimpleNamespace(
+        Dataset=object,
+        DataLoader=lambda views, batch_size: (views[number] for number in range(len(views))),
+    )
+    torch.utils = types.SimpleNamespace(data=data)
+    return torch
+
+
+def test_the_code_of_the_page_runs(results, capsys):
+    blocks = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(), re.M | re.S)
+    names = {"points": np.zeros((7, 3))}
+    read = []
+    for block in blocks:
+        exec(block, names)
+        read.append(dict(names))
+    assert read[0]["pixels"].shape == (7, 2)
+    np.testing.assert_allclose(np.linalg.norm(read[1]["points"], axis=1), RADIUS, atol=1e-4)
+    assert len(read[2]["test_views"]) == 7
+    printed = capsys.readouterr().out
+    assert re.findall(r"^(\d+) ([\d.]+) \[", printed, re.M)[-1] == ("14", "1.0")
+    assert re.search(r"^0001 \{.shade.: 1\} 3$", printed, re.M)
+    # By the reader, and by the ten lines that it replaces.
+    np.testing.assert_allclose(read[-1]["directions"], read[-2]["directions"], atol=1e-12)
+    code = [line for line in blocks[-2].splitlines() if line and not line.startswith("import")]
+    assert len(code) == 10
+    (loader,) = (block for block in blocks if "class Rays" in block)
+    lines = loader.partition("class")[2].partition("views = torch")[0].splitlines()
+    assert len([line for line in lines if line]) == 10
+    batches = [*names["views"]]
+    assert len(batches) == 13
+    origins, directions, colour = batches[0]
+    assert origins.shape == directions.shape == colour.shape
+    assert {array.dtype for array in batches[0]} == {np.dtype(np.float32)}

@@ -133,7 +133,9 @@ def test_the_page_s_code_reads_the_channels_that_it_names(built, monkeypatch):
 
 
 def test_the_tutorial_s_code_prints_colour_and_depth(built):
-    (code,) = re.findall(r"^python - << 'END'\n(.*?)^END$", TUTORIAL.read_text(), re.M | re.S)
+    (code,) = re.findall(
+        r"^PYTHONPATH=scripts python - << 'END'\n(.*?)^END$", TUTORIAL.read_text(), re.M | re.S
+    )
     folder = "results/garden_preview/LFSphere_e100cm_d170cm"
     assert folder in code
     code = code.replace(folder, built.dataset.relative_to(Path.cwd()).as_posix())

@@ -56,6 +56,11 @@ class View:
         return self.camera.world_from_camera
 
     @property
+    def position(self) -> Doubles:
+        """The place (3,) of the camera in metres."""
+        return self.world_from_camera[:3, 3]
+
+    @property
     def lens(self) -> Lens:
         return self.dataset.lens
 
@@ -133,7 +138,7 @@ class View:
         self.dataset.lightfield.require_centre()
         directions = _unit_rays(self.lens) @ self.world_from_camera[:3, :3].T
         origins = np.empty_like(directions)
-        origins[:] = self.world_from_camera[:3, 3]
+        origins[:] = self.position
         return origins, directions
 
     def project(self, points: ArrayLike) -> tuple[Doubles, Bools]:
@@ -144,7 +149,7 @@ class View:
         and the frame. Another surface may hide it. Raises `UserError` as `rays` does.
         """
         self.dataset.lightfield.require_centre()
-        local = np.asarray(points, np.float64) - self.world_from_camera[:3, 3]
+        local = np.asarray(points, np.float64) - self.position
         pixels = self.lens.pixels(local @ self.world_from_camera[:3, :3])
         return pixels, self.lens.in_frame(pixels)
 
