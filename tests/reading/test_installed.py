@@ -36,7 +36,8 @@ assert view.rgb.shape == (16, 16, 3)
 assert "OpenImageIO" not in sys.modules
 assert data.reprojections["perspective"].views[0].rgb.shape == (48, 64, 3)
 print(lightfield.__file__)
-print(*sorted({name.partition(".")[0] for name in sys.modules}))
+files = {name for name, module in sys.modules.items() if getattr(module, "__file__", None)}
+print(*{name.partition(".")[0] for name in files})
 """
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
 RIG = {"type": "plane", "cameras": [2, 1], "size": 0.4}

@@ -8,6 +8,7 @@ import shutil
 import sys
 import tarfile
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import families
@@ -22,6 +23,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.report import package
@@ -71,7 +73,26 @@ def write_dataset(dataset, rig=RIG):
         images.write_exr(dataset / f"flow/{view.flow}.exr", flow)
         of_panorama = {name: np.full((32, 64), number, np.float32) for name in "RGB"}
         images.write_exr(dataset / f"panorama/normal/{view.name}.exr", of_panorama)
+    (dataset / "object/names.json").write_text('{"ball": 1}')
+    write_faces(dataset, lightfield)
     return finish(dataset)
+
+
+def write_faces(dataset, lightfield):
+    """Write two faces of a cube map of each view, of which PNGs have the same names as EXRs."""
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [8, 8]})
+    views = [
+        replace(view, name=f"{view.name}_{face}", others={"split": view.split})
+        for view in lightfield.views
+        for face in "lr"
+    ]
+    content = lightfield.changed(lens=lens, views=views, passes=[])
+    (dataset / "faces").mkdir()
+    content.write(dataset / "faces/lightfield.json")
+    for number, view in enumerate(views):
+        planes = {name: np.full((8, 8), number, np.float16) for name in "RGBZ"}
+        images.write_exr(dataset / f"faces/{view.name}.exr", planes)
+        images.write_png(dataset / f"faces/{view.name}.png", np.full((8, 8, 3), number, np.uint8))
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +174,7 @@ FORMS = {
 def test_each_form_of_a_dataset_has_the_same_arrays(name, forms):
     true_data = open_dataset(forms["folder"])
     data = open_dataset(forms[name])
-    assert list(data.reprojections) == ["panorama", "perspective"]
+    assert list(data.reprojections) == ["faces", "panorama", "perspective"]
     assert {view.split for view in data.views} == FORMS[name]
     if name != "one shard":
         expected = {view.name for view in true_data.views if view.split in FORMS[name]}
@@ -237,6 +258,7 @@ def test_views_are_found_by_number_name_and_part(folder):
     assert data.lightfield.content["scene"]["name"] == "room"
     assert (data.views[0].frame, data.views[0].time) == (None, 0.0)
     assert data.frames == [data]
+    assert data.names("object") == {"ball": 1}
 
 
 def test_without_a_split_all_views_train(tmp_path):
@@ -388,6 +410,7 @@ def cut(path, beyond):
 MISTAKES = {
     "no path": (lambda home: home / "missing", "is not there"),
     "other case": (lambda home: home / "Shards", "shards differs only in case"),
+    "further part": (lambda home: home / "parts/room_rig.2.tar", "the first .tar"),
     "empty folder": (lambda home: home / "empty", "has no lightfield.json"),
     "another file": (lambda home: home / "text.txt", "must be the folder of a dataset, or a .tar"),
     "no tar": (lambda home: home / "text.tar", "whole, uncompressed tar"),

@@ -26,7 +26,7 @@ _STEP = 4
 def depths(lens: Rectilinear, view: View, surface: SeenSurface) -> Floats:
     """Return the Z of the points of a surface that are in a view's frame."""
     points = surface.points(_STEP)[0]
-    local = (points - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
+    local = view.to_camera(points)
     inside = pixel_indices(lens, local)[2]
     return np.asarray(-local[inside, 2])
 

@@ -75,7 +75,7 @@ def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
 def _points_of(source: SourceDataset, view: View, surface: SeenSurface, step: int) -> Points:
     """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
     positions, normals = surface.points(step)
-    local = (positions - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
+    local = view.to_camera(positions)
     column, row, inside = pixel_indices(source.lens, local)
     inside &= source.valid(view)[row, column]
     return Points(positions, source.colour(view)[row, column], normals).chosen(inside)
@@ -86,7 +86,7 @@ def observations(source: SourceDataset, points: Points) -> list[Observations]:
     seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
-        local = (points.positions - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
+        local = view.to_camera(points.positions)
         column, row, inside = pixel_indices(source.lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)
         indices = np.flatnonzero(inside)

@@ -243,7 +243,7 @@ class SeenSurface:
 
     def sees(self, points: Floats) -> Bools:
         """Return which world points (n, 3) lie on this surface, so that nothing hides them."""
-        local = (points - self.view.world_from_camera[:3, 3]) @ self.view.world_from_camera[:3, :3]
+        local = self.view.to_camera(points)
         expected = np.linalg.norm(local, axis=1)
         column, row, inside = pixel_indices(self.lens, local)
         distance = np.where(inside, self.distance[row, column], np.nan)

@@ -105,6 +105,11 @@ class View:
         """The name of the view's flow, <view>_to_<other view>; None without flow."""
         return f"{self.name}_to_{self.others['flow']}" if "flow" in self.others else None
 
+    def to_camera(self, points: Floats) -> Floats:
+        """Return points (n, 3) in the world in the camera's coordinates, in metres."""
+        world_from_camera = self.world_from_camera
+        return np.asarray((points - world_from_camera[:3, 3]) @ world_from_camera[:3, :3])
+
     def to_json(self) -> dict[str, Any]:
         return {
             "name": self.name,

@@ -149,8 +149,7 @@ class View:
         and the frame. Another surface may hide it. Raises `UserError` as `rays` does.
         """
         self.dataset.lightfield.require_centre()
-        local = np.asarray(points, np.float64) - self.position
-        pixels = self.lens.pixels(local @ self.world_from_camera[:3, :3])
+        pixels = self.lens.pixels(self.camera.to_camera(np.asarray(points, np.float64)))
         return pixels, self.lens.in_frame(pixels)
 
     def _depth(self, meaning: str | None) -> Floats:
@@ -195,15 +194,22 @@ class Views(Sequence[View]):
             return Views(self._views[key])
         return self._named(key) if isinstance(key, str) else self._views[key]
 
+    @cached_property
+    def _by_name(self) -> dict[str, list[View]]:
+        views: dict[str, list[View]] = {}
+        for view in self._views:
+            views.setdefault(view.name, []).append(view)
+        return views
+
     def _named(self, name: str) -> View:
-        views = [view for view in self._views if view.name == name]
+        views = self._by_name.get(name, [])
         if len(views) == 1:
             return views[0]
         if views:
             raise UserError(f"{name}: is a view of {len(views)} frames; choose one of .frames")
-        names = [view.name for view in self._views]
+        names = [*self._by_name]
         among = f"; they are {names[0]} to {names[-1]}" if names else ""
-        raise UserError(f"{name}: is none of the {len(names)} views{among}")
+        raise UserError(f"{name}: is none of the {len(self)} views{among}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,10 @@ def open_corpus(path: str | os.PathLike[str]) -> list[Dataset]:
     else:
         raise UserError(f"{path}: must be the folder of a dataset, or a .tar")
     if not datasets:
-        raise UserError(f"{path}: has no {NAME}, and no .tar of a dataset")
+        raise UserError(
+            f"{path}: has no {NAME}; open the folder of a dataset, the first .tar of a package, or "
+            "shards"
+        )
     return datasets
 
 
