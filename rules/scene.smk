@@ -4,7 +4,12 @@ from pathlib import Path
 
 rule build_scene:
     input:
-        reads("{name}/build_scene", "build_scene"),
+        reads(
+            "{name}/build_scene",
+            "build_scene",
+            # With a store, each job's folder has a user's own builder, as it has the scene YAMLs.
+            builder=lambda wildcards: [] if STORE else asked(BUILD.scene, wildcards).builder_files,
+        ),
     output:
         # Snakemake copies a file before it is updated, and this one is large.
         blend=PATHS.built_blend,

@@ -96,13 +96,15 @@ def test_code_comments_and_messages_name_pages_that_exist():
 
 
 def complete_scenes():
-    """Return the examples of whole scene YAMLs, with the pages that show them."""
+    """Return the examples of whole scene YAMLs, with the first Python code on their pages."""
     examples = []
     for page in PAGES:
+        builder = re.search(r"^```python\n(.*?)^```$", page.read_text(), re.M | re.S)
         for code in re.findall(r"^```yaml\n(.*?)^```$", page.read_text(), re.M | re.S):
             content = yaml.safe_load(code.replace("…", "x"))
             if {"scene", "render", "rigs"} <= content.keys():
-                examples.append(pytest.param(content, id=name_of(page)))
+                example = pytest.param(content, builder and builder[1], id=name_of(page))
+                examples.append(example)
     return examples
 
 
@@ -122,8 +124,13 @@ def test_the_schemas_that_examples_name_exist():
     assert found > 3
 
 
-@pytest.mark.parametrize("content", complete_scenes())
-def test_an_example_of_a_scene_yaml_is_valid(content):
+@pytest.mark.parametrize(("content", "builder"), complete_scenes())
+def test_an_example_of_a_scene_yaml_is_valid(content, builder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if content["scene"].get("builder", "").endswith(".py"):
+        file = Path(content["scene"]["builder"])
+        file.parent.mkdir()
+        file.write_text(builder)
     checked(TypeAdapter(Scene), content, "example")
 
 

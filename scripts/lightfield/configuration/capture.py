@@ -142,8 +142,11 @@ class Capture:
             # The frame in a .blend may have a fraction. The frame in a scene YAML has none.
             warnings=False,
         )
+        # Without the folders of this machine.
         if self.source.light_file:
             scene["light"] = Path(self.source.light_file).name
+        if self.source.builder:
+            scene["builder"] = Path(self.source.builder).name
         origin["scene"] = {
             "name": self.scene_name,
             **scene,

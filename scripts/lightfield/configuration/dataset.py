@@ -5,9 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
-from lightfield.configuration import scene_yaml
+from lightfield.configuration import own_builder, scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
@@ -117,6 +118,14 @@ class Dataset(Capture):
         if self.source.model:
             return self.paths.model_blend
         return self.source.blend or self.paths.built_blend
+
+    @property
+    def builder_files(self) -> list[str]:
+        """The files of the user's own builder. Built-in builders have none here."""
+        builder = self.source.builder
+        if builder is None or not own_builder.is_own(builder):
+            return []
+        return [str(file) for file in own_builder.files(Path(builder))]
 
     @property
     def blend_check(self) -> str | None:

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from lightfield.configuration.corpus import CorpusOptions, evenly_spread
+from lightfield.configuration.own_builder import is_own
 from lightfield.core.errors import UserError
 from lightfield.core.names import MODELS
 from lightfield.core.settings import Settings, as_list, pattern
@@ -95,7 +96,8 @@ class Family(Settings):
         None,
         pattern=pattern(r"^\d{1,9}-\d{1,9}$", "the first and the last seed, such as 0-999"),
         description="First and last seed: each seed between them makes a member. The builder gets "
-        "it as its seed, and also as its place, unless scene.parameters.place is given.",
+        "it as its seed, and also as its place, unless scene.parameters.place is given. Your own "
+        "builder gets only the seed.",
     )
     models: str | None = Field(
         None,
@@ -211,18 +213,20 @@ def member_content(
         _set(scene_yaml, "scene.model", member.model)
     else:
         _set(scene_yaml, "scene.parameters.seed", member.seed)
-        if not _has_place(scene_yaml):
+        if _takes_place(scene_yaml):
             _set(scene_yaml, "scene.parameters.place", member.seed)
     for key, value in values.items():
         _set(scene_yaml, key, copy.deepcopy(value))
     return scene_yaml
 
 
-def _has_place(content: Mapping[str, Any]) -> bool:
-    """Return whether a scene YAML itself chooses a place of its builder."""
+def _takes_place(content: Mapping[str, Any]) -> bool:
+    """Return whether members get places: of a built-in builder, if the YAML names no place."""
     scene = content.get("scene")
-    parameters = scene.get("parameters") if isinstance(scene, Mapping) else None
-    return isinstance(parameters, Mapping) and "place" in parameters
+    scene = scene if isinstance(scene, Mapping) else {}
+    parameters = scene.get("parameters")
+    has_place = isinstance(parameters, Mapping) and "place" in parameters
+    return not has_place and not is_own(str(scene.get("builder")))
 
 
 def _set(content: dict[str, Any], key: str, value: Any) -> None:

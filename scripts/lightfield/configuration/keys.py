@@ -17,8 +17,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.scene_source import SceneSource
+from lightfield.configuration import own_builder
+from lightfield.configuration.scene_source import Parameters, SceneSource
 from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
 from lightfield.core.names import BUILDERS, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
@@ -67,6 +69,7 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     - A builder: the parameters, bpy's version, and source code: its own, the builders' library, and
       the builders whose pieces it uses. The built .blend does not count: it holds memory addresses,
       which differ between builds.
+    - A user's own builder: likewise, with its own files, and the library only if it uses it.
     """
     if source.blend:
         if source.sha256 is None:
@@ -76,10 +79,19 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
         return _digest(published.fingerprint(source.dataset))
     assert source.builder
     files = []
-    for folder in _builder_folders(source.builder):
+    folders = ["library", source.builder]
+    parameters = source.parameters
+    if isinstance(parameters, Parameters):
+        parameters = parameters.model_dump(exclude_none=True)
+    if own_builder.is_own(source.builder):
+        builder = Path(source.builder)
+        own_files = own_builder.files(builder)
+        files = [[file.relative_to(builder.parent).as_posix(), sha256(file)] for file in own_files]
+        folders = own_builder.imported_builders(own_files)
+    for folder in _builder_folders(folders):
         for file in _sources(folder):
             files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
-    return _digest([files, source.parameters.model_dump(exclude_none=True), version("bpy")])
+    return _digest([files, parameters, version("bpy")])
 
 
 def _sources(folder: str) -> list[Path]:
@@ -87,9 +99,9 @@ def _sources(folder: str) -> list[Path]:
     return [file for file in files_below(BUILDERS / folder) if file.suffix == ".py"]
 
 
-def _builder_folders(builder: str) -> list[str]:
-    """Return the folders with a builder's source: the library, its own, and those that it uses."""
-    folders = ["library", builder]
+def _builder_folders(folders: Sequence[str]) -> list[str]:
+    """Return the folders with the source of builders, and the folders of those that they use."""
+    folders = [*folders]
     for folder in folders:
         for file in _sources(folder):
             imported = re.findall(

@@ -1,10 +1,12 @@
 """The block `scene` of a scene YAML: the builder, .blend, model or views that a scene is from."""
 
+import os
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, WrapValidator, model_validator
 
+from lightfield.configuration import own_builder
 from lightfield.core.names import LIGHTS, MODELS, SOFTBOXES, UP, builders
 from lightfield.core.setting_types import QUOTED
 from lightfield.core.settings import AS_WRITTEN, Address, Settings, pattern
@@ -106,17 +108,50 @@ _BLEND_KEYS = (
 MODEL_KEYS = tuple(ModelOptions.model_fields)
 
 
+def _existing_builder(builder: str) -> str:
+    """Return a builder if it exists. Raises a ValueError or `UserError` that says what is wrong."""
+    if own_builder.is_own(builder):
+        if not os.path.lexists(builder):
+            raise ValueError("must be the path of a file that exists")
+        own_builder.check(Path(builder))
+    elif builder not in builders():
+        raise ValueError(f"must be one of {', '.join(builders())}, or a path that ends in .py")
+    return builder
+
+
+def _of_builder(parameters: Any, _check: Any, others: ValidationInfo) -> Any:
+    """Check parameters by the builder to which they belong."""
+    builder = others.data.get("builder")
+    if builder and own_builder.is_own(builder):
+        return own_builder.check_parameters(Path(builder), parameters)
+    return Parameters.model_validate(parameters)
+
+
+Builder = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            rf"^([a-z][a-z0-9_]*|{QUOTED}\.py)$",
+            "a name of small letters, digits and _ with a letter first, or a path that ends in "
+            ".py, without { } * ? [ ] and line breaks",
+        ),
+        examples=list(builders()),
+    ),
+    AfterValidator(_existing_builder),
+]
+BUILDER = (
+    "Name of the builder, which is a folder in scripts/scenes/. Or path of your own builder, a "
+    "Python file, relative to the folder in which Snakemake runs."
+)
+BuilderParameters = Annotated[Parameters | dict[str, Any], WrapValidator(_of_builder)]
+BUILDER_PARAMETERS = "Parameters of the builder. Your own builder has its own."
+
+
 class Origin(Settings):
     """Where a scene is from: a builder, a .blend, a model file, or views that exist already."""
 
-    builder: str | None = Field(
-        None,
-        pattern=pattern(
-            "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
-        ),
-        description="Name of the builder, which is a folder in scripts/scenes/.",
-    )
-    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
+    builder: Builder | None = Field(None, description=BUILDER)
+    parameters: BuilderParameters = Field(Parameters(), description=BUILDER_PARAMETERS)
     blend: str | None = Field(
         None,
         pattern=pattern(
@@ -190,9 +225,6 @@ class SceneSource(ModelOptions, Origin):
         if [self.builder, self.blend, self.model, self.dataset].count(None) != 3:
             raise ValueError("must have one of builder, blend, model and dataset")
         if self.builder is not None:
-            names = builders()
-            if self.builder not in names:
-                raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
             for name in _BLEND_KEYS:
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name}: is only for blend, not for builder")

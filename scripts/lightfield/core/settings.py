@@ -191,7 +191,7 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
     try:
         return model.validate_python(content)
     except ValidationError as error:
-        first, *_ = _problems(error.errors(), content)
+        first, *_ = problems(error, content)
         raise UserError(f"{file}: {first}") from None
 
 
@@ -204,11 +204,11 @@ def checked_yaml(model: TypeAdapter[Model], content: Any, located: Callable[[str
     try:
         return model.validate_python(content)
     except ValidationError as error:
-        problems = _problems(error.errors(), content)
-    more = len(problems) - _MOST_PROBLEMS
+        lines = problems(error, content)
+    more = len(lines) - _MOST_PROBLEMS
     if more > 0:
-        problems[_MOST_PROBLEMS:] = [f"{more} more mistakes"]
-    raise UserError(*map(located, problems))
+        lines[_MOST_PROBLEMS:] = [f"{more} more mistakes"]
+    raise UserError(*map(located, lines))
 
 
 def read_settings(model: type[Model], path: Path) -> Model:
@@ -216,14 +216,14 @@ def read_settings(model: type[Model], path: Path) -> Model:
     return checked(TypeAdapter(model), read_json(path), str(path))
 
 
-def _problems(errors: list[ErrorDetails], content: Any) -> list[str]:
-    """Return in one line each what is wrong with the wrong keys."""
+def problems(error: ValidationError, content: Any) -> list[str]:
+    """Return in one line each what is wrong with the wrong keys of ``content``."""
     errors_by_place: dict[tuple[int | str, ...], list[ErrorDetails]] = {}
-    for error in errors:
-        place = _place(error, content)
+    for details in error.errors():
+        place = _place(details, content)
         # A value that may have several types has an error for each type.
         near = next((p for p in errors_by_place if _is_within(p, place)), place)
-        errors_by_place.setdefault(near, []).append(error)
+        errors_by_place.setdefault(near, []).append(details)
     return [_problem(of_place, content) for of_place in errors_by_place.values()]
 
 
@@ -322,10 +322,13 @@ def _allowed(error: ErrorDetails) -> str:
         case "bool_type":
             return "be true or false"
         case "string_pattern_mismatch":
-            return f"be {MEANINGS[error['ctx']['pattern']]}"
-        case "list_type":
+            expression = error["ctx"]["pattern"]
+            return f"be {MEANINGS.get(expression, f'a text that matches {expression}')}"
+        case "list_type" | "tuple_type":
             return "be a list"
-        case "literal_error":
+        case "extra_forbidden" | "unexpected_keyword_argument":
+            return "be left out"
+        case "literal_error" | "enum":
             return f"be {error['ctx']['expected']}".replace("'", "")
     for name, comparison in _BOUNDS.items():
         if name in error.get("ctx", {}):

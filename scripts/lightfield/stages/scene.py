@@ -3,13 +3,17 @@
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from lightfield.configuration.keys import import_version
 from lightfield.configuration.scene_source import (
+    BUILDER,
+    BUILDER_PARAMETERS,
     MODEL_KEYS,
+    Builder,
+    BuilderParameters,
     ModelOptions,
     ModelPath,
     Parameters,
@@ -17,34 +21,24 @@ from lightfield.configuration.scene_source import (
     SharedFolder,
     check_model,
 )
-from lightfield.core.names import builders
 from lightfield.core.settings import Settings
 from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.rigs.rig import Frame
 
 
-def _known_builder(name: str) -> str:
-    if name not in builders():
-        raise ValueError(f"must be one of {', '.join(builders())}")
-    return name
-
-
 class BuildSettings(Settings):
     """The settings of scripts/build_scene.py."""
 
-    builder: Annotated[str, AfterValidator(_known_builder)] = Field(
-        description="Name of the builder, which is a folder in scripts/scenes/.",
-        json_schema_extra={"enum": list(builders())},
-    )
-    parameters: Parameters = Field(Parameters(), description="Parameters of the builder.")
+    builder: Builder = Field(description=BUILDER)
+    parameters: BuilderParameters = Field(Parameters(), description=BUILDER_PARAMETERS)
     fingerprint: str | None = cause(
         "Hash of the builder's code. If it changes, the scene is built again."
     )
 
 
 class BuildScene(Stage[BuildSettings]):
-    """Builds a scene with one of the builders in scripts/scenes/."""
+    """Builds a scene with one of the builders in scripts/scenes/, or with a user's own."""
 
     name = "build_scene"
     function = "lightfield.rendering.built_scene:build"
