@@ -81,7 +81,9 @@ def _lens(name: str, camera: Any, width: int, height: int) -> dict[str, Any]:
         "HORIZONTAL": camera.sensor_width / width,
         "VERTICAL": camera.sensor_height / height,
     }[camera.sensor_fit]
-    content: dict[str, Any] = {"type": camera.type, "focal_length": camera.lens}
+    content: dict[str, Any] = {"type": camera.type}
+    if camera.type == "PERSP":
+        content |= {"lens_unit": "MILLIMETERS", "focal_length": camera.lens}
     if camera.type == "PANO":
         kind = camera.panorama_type
         keys = _PANORAMA_KEYS.get(kind, ())

@@ -304,6 +304,58 @@ def test_a_blend_without_a_yaml_gets_one(blender, tmp_path):
     assert read_scene(path).rigs["hemisphere_1"].view_count == 50
 
 
+def test_light_fields_of_silvrs_addon_become_rigs(blender, run_program, tmp_path):
+    """The add-on is not installed when the .blend is read."""
+    blend = tmp_path / "old.blend"
+    run_program(BLENDER / "silvr_light_fields.py", blend)
+    path = tmp_path / "configs/scenes/old.yaml"
+    reading = (("open_blend", [str(blend)]), ("press", ["read_silvr"]), ("save", [str(blend)]))
+    assert blender("register", *reading, written(path))[1:] == [None] * 4
+    fisheye = {"lens": "equidistant", "sensor_size": [36.0, 36.0], "fov": 180.0}
+    assert yaml.safe_load(path.read_text())["rigs"] == {
+        "LFCuboid": {
+            "type": "cuboid",
+            "cameras": [10, 30, 10],
+            "camera": {**fisheye, "resolution": [2048, 2048]},
+            "center": [0, 0, 1.05],
+            "rotation": [0, 0, 45],
+            "size": [1, 3, 1],
+        },
+        "LFSphere": {
+            "type": "sphere",
+            "subdivisions": 4,
+            "frames": {"first": 1, "last": 9, "step": 2},
+            "camera": {**fisheye, "resolution": [1024, 1024]},
+            "center": [0, 0, 1.05],
+            "size": 1.45,
+        },
+        "LFCylinder": {
+            "type": "cylinder",
+            "cameras": [12, 3],
+            "face_inside": True,
+            "camera": {
+                "lens": "rectilinear",
+                "focal_length": 18.0,
+                "resolution": [640, 480],
+                "sensor_size": [36.0, 27.0],
+            },
+            "center": [1, 2, 3],
+            "size": 2,
+        },
+        "Wall_of_mine": {
+            "type": "plane",
+            "cameras": [3, 3],
+            "camera": {
+                "lens": "rectilinear",
+                "focal_length": 18.0,
+                "resolution": [1024, 1024],
+                "sensor_size": [36.0, 36.0],
+            },
+        },
+    }
+    assert {*read_scene(path).rigs} == {"LFCuboid", "LFSphere", "LFCylinder", "Wall_of_mine"}
+
+
 def test_blender_installs_the_zip_and_nothing_stays(archive, run_program, tmp_path):
     command = BLENDER / "rigs_in_viewport.py"
     steps = [("install", [str(archive)], {})]
