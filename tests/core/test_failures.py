@@ -100,3 +100,10 @@ def test_a_cause_that_many_jobs_share_is_said_once(tmp_path):
         "render failed: error: full",
         f"  log: {tmp_path / 'c'}",
     ]
+
+
+def test_a_very_long_message_keeps_its_beginning_and_its_end():
+    message = str(UserError(f"a.json: name: is {'x' * 9000}; must be a text\n\x1b[2J"))
+    assert message.startswith("a.json: name: is xxx")
+    assert message.endswith(r"; must be a text\n\x1b[2J")
+    assert len(message) < 2100

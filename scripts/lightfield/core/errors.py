@@ -1,6 +1,6 @@
 """The one exception that the programs show to the user without a traceback."""
 
-# Longer lines are cut, because they may quote a damaged file.
+# Longer lines are cut in their middle, because they may quote a damaged file.
 LONGEST = 2000
 
 
@@ -15,11 +15,13 @@ class UserError(Exception):
 
 
 def _printable(line: str) -> str:
-    printable = "".join(
+    if len(line) > LONGEST:
+        # The end says what would be right.
+        line = f"{line[: LONGEST // 2]}…{line[-LONGEST // 2 :]}"
+    return "".join(
         letter if letter.isprintable() else letter.encode("unicode_escape").decode()
-        for letter in line[:LONGEST]
+        for letter in line
     )
-    return printable + ("…" if len(line) > LONGEST else "")
 
 
 # What the user can do if memory ran out.

@@ -2,13 +2,13 @@
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
 from lightfield.core.names import CORPUS
-from lightfield.core.paths import case_hint
+from lightfield.core.paths import case_hint, inside
 from lightfield.formats.layout import (
     FRAME_FOLDERS,
     OTHER_FILES,
@@ -88,7 +88,8 @@ def _members(family: Path) -> list[Dataset]:
     with reading(family / CORPUS, "corpus"):
         for entry in content["members"]:
             for rig in entry["datasets"] if entry["state"] == "valid" else ():
-                files = Folder(family / entry["name"] / rig)
+                name = f"{entry['name']}/{rig}"
+                files = Folder(inside(family, name, f"{family / CORPUS}: {name}"))
                 datasets.append(_dataset(files, entry) or Dataset(files, member=entry))
     return datasets
 
@@ -106,23 +107,26 @@ def _dataset(files: Files, member: dict[str, object] | None = None) -> Dataset |
 
 def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
     """Return the datasets in packages or in shards. ``path`` is what the user opened."""
-    members = {archive: members_of(archive) for archive in archives}
-    # The files of a shard lie in no folder.
-    if any("/" not in name for contents in members.values() for name in contents):
-        found = [_dataset(files, member) for files, member in read_shards(path, members)]
+    parts_of_package = {archive: further_parts(archive) for archive in archives}
+    further = [part for parts in parts_of_package.values() for part in parts]
+    members = {archive: members_of(archive) for archive in {*archives, *further}}
+    # The files of a package lie in its folder, and those of a shard in none.
+    if any("/" in name for name in members[archives[0]]):
+        packages = [
+            _package([archive, *parts_of_package[archive]], members)
+            for archive in archives
+            if archive not in further
+        ]
+        found = [_dataset(package) for package in packages]
     else:
-        further = {part for archive in archives for part in further_parts(archive)}
-        found = [_dataset(_package(archive)) for archive in archives if archive not in further]
+        shards = {archive: members[archive] for archive in archives}
+        found = [_dataset(files, member) for files, member in read_shards(path, shards)]
     return [dataset for dataset in found if dataset]
 
 
-def _package(archive: Path) -> Packed:
-    """Return the files of a package, and of its further parts beside it."""
-    further = archive.parent.glob(f"{archive.stem}.*.tar")
-    parts = [
-        part for part in further if re.fullmatch(r"\.\d+\.tar", part.name[len(archive.stem) :])
-    ]
-    contents: dict[str, Member] = {}
-    for part in [archive, *parts]:
-        contents |= {name.partition("/")[2]: file for name, file in members_of(part).items()}
-    return Packed(archive, contents)
+def _package(parts: Sequence[Path], members: Mapping[Path, Mapping[str, Member]]) -> Packed:
+    """Return the files of a package of these parts, without the folder that it unpacks to."""
+    contents = {
+        name.partition("/")[2]: file for part in parts for name, file in members[part].items()
+    }
+    return Packed(parts[0], contents)
