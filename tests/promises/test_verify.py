@@ -124,7 +124,8 @@ def test_a_copys_own_lists_must_agree(one_view):
             str(sums): f"has no checksum of {missing}",
         }
     write_checksums(one_view, listed)
-    for name in ("README.md", "card.json"):
+    for name in ("README.md", "card.json", "read.py", "__pycache__/read.cpython-313.pyc"):
+        (one_view / name).parent.mkdir(exist_ok=True)
         (one_view / name).write_text("of a package")
     assert problems_of(one_view) == {}
     put(one_view / "validation.json", {"valid": False})

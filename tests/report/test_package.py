@@ -17,6 +17,7 @@ from lightfield.core.files import sha256, write_json
 from lightfield.export import transforms
 from lightfield.formats.lightfield import LightField
 from lightfield.report import package
+from lightfield.stages.publishing import Package, PackSettings
 from lightfield.validation.verification import faults
 
 NAME = "smoke_LFPlane"
@@ -31,8 +32,9 @@ def folder(tmp_path_factory):
     write_views(dataset, CAMERA, RIG)
     path = dataset / "lightfield.json"
     LightField.read(path).changed(scene={"name": "smoke"}).write(path)
-    for name in ("perspective/lightfield.json", "perspective/transforms.json"):
-        write_json(dataset / name, {"frames": []})
+    (dataset / "perspective").mkdir()
+    shutil.copy(path, dataset / "perspective/lightfield.json")
+    write_json(dataset / "perspective/transforms.json", {"frames": []})
     write_json(dataset / "perspective/exports/colmap/export.json", {"format": "colmap"})
     write_json(dataset / "perspective/exports/nerfstudio/transforms.json", {"frames": []})
     write_json(dataset / "normal/names.json", {})
@@ -122,7 +124,8 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
     assert card["loaders"]["perspective/exports/colmap"].endswith(
         "Reconstruction('perspective/exports/colmap/sparse/0')"
     )
-    assert card["loaders"]["exr"].endswith("'exr/view_0000f.exr').channels()")
+    assert f'open_dataset("{NAME}")' in card["python"]
+    assert card["python"] in readme
     # This reader does not use nerfstudio's file.
     instant_ngp_files = {
         path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")
@@ -136,6 +139,14 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
     assert again["cite"][1] == credited.credit == "Lone Monk, by Carlo Bergonzini (Monorender)"
 
 
+def test_the_card_names_the_rig_as_the_scene_yaml_does(folder, tmp_path):
+    for rig, said in (("hemisphere", "hemisphere"), (None, "PLANE")):
+        target = tmp_path / f"{NAME}.tar"
+        settings = PackSettings.of(scene=load_scene("smoke"), rig=rig)
+        Package(settings=settings, folder=folder, output=target).run()
+        assert json.loads(target.with_suffix(".json").read_text())["rig"] == said
+
+
 def test_a_folder_may_have_any_name_but_must_hold_a_dataset(folder, tmp_path):
     elsewhere = tmp_path / "exports" / "smoke"
     shutil.copytree(folder, elsewhere)
@@ -147,7 +158,7 @@ def test_a_folder_may_have_any_name_but_must_hold_a_dataset(folder, tmp_path):
 
 
 def test_every_export_has_a_loader():
-    assert package.LOADERS.keys() == {"exr", "mesh", *Exports.model_fields}
+    assert package.LOADERS.keys() == {"mesh", *Exports.model_fields}
 
 
 def test_an_export_in_a_folder_with_another_name_is_recognised_by_its_list(folder, tmp_path):

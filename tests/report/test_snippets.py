@@ -35,7 +35,7 @@ class Built:
     is_transparent: bool
 
 
-@pytest.fixture(params=["opaque", "transparent", "sequence"])
+@pytest.fixture(params=["opaque", "transparent", "sequence", "normals", "no depth"])
 def built(request, tmp_path, monkeypatch):
     """A finished rig's folder in the place of the one in the tutorial."""
     monkeypatch.chdir(tmp_path)
@@ -45,6 +45,10 @@ def built(request, tmp_path, monkeypatch):
         write_dataset(folder, SPHERE)
         if request.param == "transparent":
             make_transparent(folder)
+        if request.param == "normals":
+            add_normals(folder)
+        if request.param == "no depth":
+            remove_depth(folder)
         (folder / "exports/poses_csv").mkdir(parents=True)
         (folder / "exports/poses_csv/poses.csv").write_text("name,x\nview_0000f,1\n")
         write_json(folder / "exports/poses_csv/export.json", {"format": "poses_csv"})
@@ -71,6 +75,23 @@ def make_transparent(folder):
         channels = dict(zip("RGB", np.moveaxis(image.colour, -1, 0), strict=True))
         channels |= {"A": np.ones_like(image.colour[..., 0]), "Z": image.channels["Z"]}
         images.write_exr(view, channels)
+
+
+def add_normals(folder):
+    path = folder / "lightfield.json"
+    lightfield = LightField.read(path)
+    lightfield.changed(render=lightfield.render.changed(passes=["normal"]).to_json()).write(path)
+    for view in folder.glob("exr/*.exr"):
+        plane = np.zeros((64, 64), np.float32)
+        images.write_exr(folder / "normal" / view.name, dict.fromkeys("RGB", plane))
+
+
+def remove_depth(folder):
+    path = folder / "lightfield.json"
+    LightField.read(path).changed(depth=None).write(path)
+    for view in folder.glob("exr/*.exr"):
+        channels = images.read_image(view).channels
+        images.write_exr(view, {name: channels[name] for name in "RGB"})
 
 
 def add_sequence_export(rig):
@@ -102,36 +123,51 @@ def test_the_card_s_code_runs_where_the_package_is_unpacked(built, tmp_path, mon
     monkeypatch.chdir(tmp_path / "unpacked/garden_LFSphere")
     readme = Path("README.md").read_text()
     loaders = re.findall(r"^`(\S+)`\n\n```\n(.*?)\n```$", readme, re.M | re.S)
-    assert len(loaders) == len(card["loaders"]) == 3
-    ran = []
+    assert len(loaders) == len(card["loaders"]) == 2
     for place, code in loaders:
         assert Path(place).exists()
         module = code.split()[1]
         assert importlib.util.find_spec(module), module
-        names, _ = run(code)
-        ran.append(place)
-        if place.endswith("exr"):
-            assert len(names["pixels"]) == 2  # colour with or without alpha, and depth
-    assert len(ran) == 3
+        run(code)
     (check,) = re.findall(r"`(sha256sum -c .*?)`", readme)
     folders = FRAMES if built.rig != built.dataset else ["."]
     for folder in folders:
         subprocess.run(check.split(), cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    (code,) = re.findall(r"```python\n(.*?)```", readme, re.S)
+    assert code.strip() == card["python"]
+    monkeypatch.chdir("..")
+    check_reading(code, built)
     count = "12 at each of 3 frames" if built.rig != built.dataset else "12"
     assert f"| views | {count}, " in readme
     assert f"| transparent | {'yes: channel A' if built.is_transparent else 'no'}" in readme
 
 
-def test_the_page_s_code_reads_the_channels_that_it_names(built, monkeypatch):
-    page = make_page(built.dataset, SPHERE).read_text()
-    (code,) = re.findall(r"<pre><code>(import OpenImageIO.*?)</code>", page, re.S)
-    monkeypatch.chdir(built.dataset)
-    names, _ = run(html.unescape(code))
-    told = code.rpartition("columns, ")[2].replace(" ", "")
-    assert told == channel_names(next(built.dataset.glob("exr/*.exr")))
-    assert names["view"].shape[-1] == len(told)
+def check_reading(code, built):
+    """Run code that reads a dataset. It must name all arrays that a view has, and only these."""
+    names, _ = run(code)
+    view = names["view"]
+    assert view.rgb.shape == (64, 64, 3)
+    (arrays,) = re.findall(r"^(view\.rgb.*?)  #", code, re.M)
+    told = {array.removeprefix("view.") for array in arrays.split(", ")}
+    channels = channel_names(next(built.dataset.glob("exr/*.exr")))
+    there = {"rgb"} | {{"A": "alpha", "Z": "depth"}[each] for each in channels[3:]}
+    if (built.dataset / "normal").is_dir():
+        there.add("normal")
+    assert told == there
+    assert names["origins"].shape == names["directions"].shape == (64, 64, 3)
+    assert names["pixels"].shape == (1, 2)
+    assert names["visible"].shape == (1,)
 
 
+def test_the_page_s_code_reads_the_arrays_that_it_names(built, monkeypatch):
+    name = built.rig.relative_to(Path("results").resolve()).as_posix()
+    page = make_page(built.dataset, SPHERE, name=name).read_text()
+    (code,) = re.findall(r"<pre><code>(from lightfield.*?)</code>", page, re.S)
+    monkeypatch.chdir("results")
+    check_reading(html.unescape(code), built)
+
+
+@pytest.mark.parametrize("built", ["opaque", "transparent", "sequence"], indirect=True)
 def test_the_tutorial_s_code_prints_colour_and_depth(built):
     (code,) = re.findall(
         r"^PYTHONPATH=scripts python - << 'END'\n(.*?)^END$", TUTORIAL.read_text(), re.M | re.S

@@ -802,7 +802,8 @@ def test_stray_files_fail(small_dataset: Path) -> None:
 
 
 def test_an_unpacked_dataset_is_valid_with_its_packages_files(small_dataset: Path) -> None:
-    for name in ("README.md", "card.json"):
+    for name in ("README.md", "card.json", "read.py", "__pycache__/read.cpython-313.pyc"):
+        (small_dataset / name).parent.mkdir(exist_ok=True)
         (small_dataset / name).write_text("{}")
     assert not failed(validate(small_dataset))
 

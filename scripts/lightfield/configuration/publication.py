@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
+from lightfield.core.names import READER
 from lightfield.core.settings import Address, Settings, pattern
 
 
@@ -31,8 +32,8 @@ Date = Annotated[
 PUBLISHED_FOLDER = "published"
 CARD = "README.md"
 CROISSANT = "croissant.json"
-# The files that describe a published dataset, and the checksums of all its files.
-DOCUMENTS = (CARD, CROISSANT, "sha256sums.txt")
+# The files that describe a published dataset and read it, and the checksums of all its files.
+DOCUMENTS = (CARD, CROISSANT, READER, "sha256sums.txt")
 
 # The form of a licence's short name at https://spdx.org/licenses.
 SPDX = r"^[A-Za-z0-9][A-Za-z0-9.+-]*$"

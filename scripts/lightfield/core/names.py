@@ -14,6 +14,9 @@ SPLITS = "splits.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 
+# The file of a package, and of a published dataset, that reads it without Plenoforge.
+READER = "read.py"
+
 # The file that lists the members of a family.
 CORPUS = "corpus.json"
 

@@ -16,8 +16,9 @@ from lightfield.core.files import absolute_path, read_problem
 def files_below(folder: Path, *, strict: bool = True) -> Iterator[Path]:
     """Yield the files in a folder and in its subfolders, in the order of their paths.
 
-    Follows links. Raises `UserError` for a folder that cannot be read, and for a link to a folder
-    that it lies in. If not ``strict``, leaves both out.
+    Follows links. Leaves out what Python compiles beside the read.py of a package. Raises
+    `UserError` for a folder that cannot be read, and for a link to a folder that it lies in. If not
+    ``strict``, leaves both out.
     """
     return _files_below(folder, [folder.resolve()], strict)
 
@@ -42,7 +43,7 @@ def _files_below(folder: Path, real_folders: list[Path], strict: bool) -> Iterat
             is_file = entry.is_file()
         if is_file:
             yield path
-        elif is_folder:
+        elif is_folder and entry.name != "__pycache__":
             real_path = real_folders[-1] / entry.name
             if entry.is_symlink():
                 real_path = path.resolve()

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.files import read_bytes, write_text
+from lightfield.core.names import READER
 from lightfield.core.paths import inside
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
@@ -37,7 +38,8 @@ REPORT = "report"
 
 README = "README.md"
 CARD = "card.json"
-"""README and CARD are the files that a package adds to a dataset."""
+PACKAGED = (README, CARD, READER)
+"""The files that a package adds to a dataset."""
 
 DEPTH_PICTURE = "{view}_depth.png"
 """The picture that scripts/reproject.py puts beside a view with --depth-png."""

@@ -23,7 +23,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
-from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
+from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
 from lightfield.stages.report import ReportHtml
 
@@ -78,7 +78,7 @@ def write(job: ReportHtml) -> None:
         passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,
-        transparent=lightfield.transparent,
+        python=snippet.reading(name, lightfield),
         validation=validation,
         faults={
             (group, check["short"]): faults.collect(folder / (group or IMAGES), check["views"])

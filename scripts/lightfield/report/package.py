@@ -16,6 +16,7 @@ from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256, write_json
+from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.export import transforms
@@ -24,6 +25,7 @@ from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_part
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
+from lightfield.report import reader, snippet
 from lightfield.report.markdown import markdown
 from lightfield.stages.publishing import Package
 
@@ -32,9 +34,8 @@ SILVR = (
     "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
 )
 
-# How to load each format. {} stands for the folder that holds it.
+# How to load each export. {} stands for the folder that holds it.
 LOADERS = {
-    "exr": "import OpenEXR\npixels = OpenEXR.File('{}/{view}.exr').channels()",
     "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
     "nerfstudio": "ns-train nerfacto --data {} nerfstudio-data --orientation-method none "
     "--center-method none --auto-scale-poses False",
@@ -67,7 +68,7 @@ def write(job: Package) -> None:
         raise UserError(f"--output {job.output}: must end in .tar; .json lies beside it")
     if place_in(job.folder, job.output):
         raise UserError(f"--output {job.output}: must not be in the folder that it packs")
-    content = card(job.folder, job.output.stem, job.settings.scene)
+    content = card(job.folder, job.output.stem, job.settings.scene, job.settings.rig)
     written = pack(job.folder, content, job.output, job.settings.most_bytes)
     parts = listed(written)
     card_path = job.output.with_suffix(".json")
@@ -76,12 +77,13 @@ def write(job: Package) -> None:
     print(f"{job.output}: {units.count(len(parts), 'part')}, {units.size(size)}")
 
 
-def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
+def card(folder: Path, name: str, scene: Credits, rig: str | None = None) -> dict[str, Any]:
     """Return the content of card.json for a rig's folder.
 
-    The folder of a sequence has a folder for each frame. The first one counts.
+    The folder of a sequence has a folder for each frame. The first one counts. Without the type of
+    the ``rig``, the card has the type in lightfield.json, which knows fewer.
     """
-    frames = [] if (folder / NAME).is_file() else _frames(folder)
+    frames = _frames(folder)
     first = frames[0] if frames else folder
     lightfield = LightField.read(first / NAME)
     view = lightfield.views[0].name
@@ -94,7 +96,7 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
             "licence": scene.licence,
             "credit": scene.credit,
         },
-        "rig": lightfield.content["lf_type"],
+        "rig": rig or lightfield.content["lf_type"],
         **({"frames": [frame.name for frame in frames]} if frames else {}),
         "views": len(lightfield.views),
         "lens": lightfield.lens.description,
@@ -109,12 +111,18 @@ def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
         "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
         "software": f"Cycles in bpy {bpy}" if bpy else None,
         "cite": [SILVR, *([scene.credit] if scene.credit else [])],
+        "python": snippet.reading(name, lightfield),
         "loaders": dict(_loaders(folder, first, view)),
     }
 
 
 def _frames(folder: Path) -> list[Path]:
-    """Return the folders of a sequence's frames. Raises `UserError` if there are none."""
+    """Return the folders of a sequence's frames. Empty for one dataset.
+
+    Raises `UserError` if there is no dataset.
+    """
+    if (folder / NAME).is_file():
+        return []
     frames = sorted(path.parent for path in folder.glob(f"*/{NAME}"))
     if not frames:
         raise UserError(f"{folder}: has no {NAME}")
@@ -122,7 +130,7 @@ def _frames(folder: Path) -> list[Path]:
 
 
 def _loaders(folder: Path, first: Path, view: str) -> Iterator[tuple[str, str]]:
-    """Yield the places in ``folder`` of the views and of each export, and how to load it.
+    """Yield the places in ``folder`` of each export, and how to load it.
 
     ``first`` is the folder of a sequence's first frame. Without a sequence, it is ``folder``.
     """
@@ -131,8 +139,6 @@ def _loaders(folder: Path, first: Path, view: str) -> Iterator[tuple[str, str]]:
         text = LOADERS[name].replace("{view}", view).replace("{frame}", first.name)
         return text.replace("{}", place.relative_to(folder).as_posix())
 
-    views = first / IMAGES
-    yield views.relative_to(folder).as_posix(), loader("exr", views)
     for path in transforms(first):
         yield path.relative_to(folder).as_posix(), loader("instant_ngp", path.parent)
     lists = [path for path in files_below(first) if path.name == MANIFEST]
@@ -161,7 +167,11 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     package.
     """
     readme = markdown("card.md.j2", **{"frames": None, **content})
-    texts = {CARD: json.dumps(content, indent=1) + "\n", README: readme}
+    texts = {
+        CARD: json.dumps(content, indent=1) + "\n",
+        README: readme,
+        READER: source_of_reader(folder),
+    }
     paths = [
         path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
     ]
@@ -181,6 +191,16 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
                 progress.done()
         written.append(name)
     return written
+
+
+def source_of_reader(folder: Path, shards: bool = False) -> str:
+    """Return the content of read.py for a rig's folder, or for shards of it."""
+    frames = _frames(folder)
+    first = frames[0] if frames else folder
+    lightfields = {"": LightField.read(first / NAME)}
+    for path in sorted(first.glob(f"*/{NAME}")):
+        lightfields[path.parent.name] = LightField.read(path)
+    return reader.source(lightfields, is_sequence=bool(frames), shards=shards)
 
 
 def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
+from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.formats.layout import SUMS
 from lightfield.formats.lightfield import NAME, LightField
@@ -24,22 +25,32 @@ def write(job: Publish) -> None:
         raise UserError(f"--output {job.output}: must not be in the folder that it publishes")
     settings = job.settings
     name = job.output.resolve().name
-    published = publish(job.folder, name, settings.scene, job.output, settings.most_bytes)
+    published = publish(
+        job.folder, name, settings.scene, job.output, settings.most_bytes, settings.rig
+    )
     size = sum(file["bytes"] for file in published.files)
     print(f"{job.output}: {units.count(len(published.files), 'file')}, {units.size(size)}")
 
 
-def publish(folder: Path, name: str, scene: Credits, output: Path, most: float | None) -> Published:
+def publish(
+    folder: Path,
+    name: str,
+    scene: Credits,
+    output: Path,
+    most: float | None,
+    rig: str | None = None,
+) -> Published:
     """Write the shards and the descriptions of the dataset in ``folder`` to ``output``.
 
-    A shard has at most ``most`` bytes, or `shards.SHARD_BYTES`. Raises `UserError` if the dataset
-    is not finished, or if the scene YAML does not say how to publish it.
+    A shard has at most ``most`` bytes, or `shards.SHARD_BYTES`. ``rig`` is the type of the rig.
+    Raises `UserError` if the dataset is not finished, or if the scene YAML does not say how to
+    publish it.
     """
     if scene.publish is None:
         raise UserError(
             "publish: is missing in the scene YAML: see docs/how-to/publish-a-dataset.md"
         )
-    card = package.card(folder, name, scene)
+    card = package.card(folder, name, scene, rig)
     folders = sorted({path.parent for path in files_below(folder) if path.name == SUMS})
     if not folders:
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
@@ -60,7 +71,9 @@ def publish(folder: Path, name: str, scene: Credits, output: Path, most: float |
     )
     write_text(output / CARD, hugging_face.describe(published))
     write_json(output / CROISSANT, croissant.describe(published))
-    entries = [*published.files, *package.listed([output / CARD, output / CROISSANT])]
+    write_text(output / READER, package.source_of_reader(folder, shards=True))
+    documents = [output / name for name in (CARD, CROISSANT, READER)]
+    entries = [*published.files, *package.listed(documents)]
     sums = sorted(f"{entry['sha256']}  {entry['file']}\n" for entry in entries)
     write_text(output / SUMS, "".join(sums))
     return published

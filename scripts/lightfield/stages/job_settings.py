@@ -403,6 +403,7 @@ def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     settings = PackSettings.of(
         datasets=[dataset.name for dataset in datasets],
         gigabytes=build.config.package_gigabytes,
+        rig=datasets[0].rig.type,
         scene=load_scene(datasets[0].scene_name),
     )
     return "pack", settings

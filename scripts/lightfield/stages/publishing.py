@@ -40,6 +40,11 @@ class PackSettings(ReaderSettings):
         "is one file, and shards have at most 1 GB.",
         json_schema_extra={"unit": "GB"},
     )
+    rig: str | None = Field(
+        None,
+        description="Type of the rig, such as ring. Without this key, it is the type in "
+        "lightfield.json.",
+    )
     scene: Credits = Field(
         Credits(), description="What the card says about the scene, and what publishing needs."
     )

@@ -26,11 +26,10 @@ from lightfield.core.paths import (
 from lightfield.core.receipts import Output
 from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import (
-    CARD,
     DEPTH_PICTURE,
     IMAGES,
     OUTPUTS,
-    README,
+    PACKAGED,
     REPORT,
     File,
     ImageSet,
@@ -269,7 +268,7 @@ def strays_among(
 
     Files behind a foreign link count as that link: see `stray_places`.
     """
-    all_owned = {*owned, *OUTPUTS, README, CARD}
+    all_owned = {*owned, *OUTPUTS, *PACKAGED}
     strays = [path for path in present if path not in all_owned]
     return stray_places(dataset, strays, all_owned, own_folders)
 

@@ -18,7 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
 from lightfield.core.names import CORPUS
 from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
-from lightfield.formats.layout import CARD, IMAGES, README, REPORT, SUMS, VALIDATION, read_sums
+from lightfield.formats.layout import IMAGES, PACKAGED, REPORT, SUMS, VALIDATION, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify
 
@@ -208,7 +208,7 @@ class _Verification:
         top = name.partition("/")[0]
         if self._is_corpus(home):
             return top in (THUMBNAILS, SHARDS)
-        return top not in (SUMS, CARD, README, REPORT)
+        return top not in (SUMS, REPORT, *PACKAGED)
 
     def _is_corpus(self, home: Path) -> bool:
         return str(home / CORPUS) in self.listed or (home / CORPUS).exists()
