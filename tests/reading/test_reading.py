@@ -258,6 +258,7 @@ def test_views_are_found_by_number_name_and_part(folder):
     assert data.lightfield.content["scene"]["name"] == "room"
     assert (data.views[0].frame, data.views[0].time) == (None, 0.0)
     assert data.frames == [data]
+    assert f"{data.views[1:3]}".count("<view view_000") == 2
     assert data.names("object") == {"ball": 1}
 
 
@@ -374,6 +375,7 @@ def test_opening_reads_no_pixels(tmp_path):
 def test_loaders_can_send_views_to_other_processes(forms):
     for form in forms.values():
         view = open_dataset(form).views[0]
+        assert len(repr(view)) + len(repr(view.dataset)) < 500
         copy = pickle.loads(pickle.dumps(view))
         np.testing.assert_array_equal(copy.rgb, view.rgb)
 

@@ -31,7 +31,7 @@ Doubles = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class View:
     """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
 
@@ -40,6 +40,9 @@ class View:
 
     dataset: "Dataset"
     camera: Camera
+
+    def __repr__(self) -> str:
+        return f"<view {self.name} of {self.dataset.lightfield.path}>"
 
     @property
     def name(self) -> str:
@@ -181,6 +184,9 @@ class Views(Sequence[View]):
 
     def __init__(self, views: Iterable[View]) -> None:
         self._views = list(views)
+
+    def __repr__(self) -> str:
+        return repr(self._views)
 
     def __len__(self) -> int:
         return len(self._views)

@@ -5,7 +5,7 @@ import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from lightfield.core.errors import UserError
@@ -76,7 +76,7 @@ class Packed(Files):
     """The files in tars. ``contents`` has the place of each, or its bytes."""
 
     path: Path
-    contents: Mapping[str, Member | bytes]
+    contents: Mapping[str, Member | bytes] = field(repr=False)
 
     def has(self, name: str) -> bool:
         return name in self.contents
