@@ -91,11 +91,11 @@ def cameras_at(settings: str, folder: Path) -> Cameras:
 def sync(scene: Any) -> None:
     """Draw each rig that has changed, and remove the drawing of each rig that is gone."""
     empties = rig_objects.empties(scene)
-    for obj in [obj for obj in bpy.data.objects if OF in obj]:
+    for obj in [obj for obj in scene.objects if OF in obj]:
         if obj[OF] not in empties:
             _remove(obj)
     names: set[str] = set()
-    drawn_empties = {obj[OF] for obj in bpy.data.objects if OF in obj}
+    drawn_empties = {obj[OF] for obj in scene.objects if OF in obj}
     # A copy of an Empty is not drawn yet. It gets the new name.
     for empty in sorted(empties, key=lambda empty: empty not in drawn_empties):
         name, settings = rig_objects.kept(empty)
@@ -114,7 +114,9 @@ def sync(scene: Any) -> None:
         if parts["cameras"].get(DRAWN) != drawn:
             _draw(parts, rig, cameras(scene, rig), None)
             parts["cameras"][DRAWN] = drawn
-            empty.lock_scale = [rig_objects.has_fixed_size(rig)] * 3
+            is_fixed = not rig_objects.is_editable(rig)
+            empty.lock_location = empty.lock_rotation = [is_fixed] * 3
+            empty.lock_scale = [is_fixed or rig_objects.has_fixed_size(rig)] * 3
             if rig_objects.has_fixed_size(rig):
                 empty.scale = rig.sides
 
@@ -174,6 +176,7 @@ def _parts(scene: Any, empty: Any) -> dict[str, Any]:
         obj.hide_select = True
         obj.color = COLOURS[part]
         obj.show_wire = part == "volume"
+        obj.show_in_front = part == "inside"
         obj.data.materials.append(_material(part))
         rig_objects.collection(scene).objects.link(obj)
         parts[part] = obj
@@ -261,7 +264,7 @@ def _shape(lens: Lens, points_a_side: int, rings: int) -> tuple[Floats, NDArray[
 
 
 def _draw_hull(mesh: Any, positions: Floats) -> None:
-    """Draw the convex hull of the cameras' places. It has no faces if they are in one plane."""
+    """Draw the convex hull of the cameras' places. It is flat if they are in one plane."""
     shape = bmesh.new()
     for place in np.unique(np.round(positions, 9), axis=0):
         shape.verts.new(place)
