@@ -75,6 +75,8 @@ def _with_rigs(text: str, rigs: Rigs, removed: set[str], file: str) -> str:
     old = content.get("rigs")
     if old is None:
         raise UserError(f"{file}: rigs: come with scene.dataset, so they cannot be changed")
+    if not text.endswith("\n"):
+        text += "\n"
     edits = list(_edits(text, old, rigs, removed))
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]

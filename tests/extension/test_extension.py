@@ -214,6 +214,18 @@ def test_handles_and_the_panel_change_the_yaml_and_nothing_else(blender, project
         np.testing.assert_allclose(cosines, np.linalg.norm(ahead - places, axis=1), atol=1e-5)
 
 
+def test_a_rig_is_added_below_the_last_one(blender, project):
+    """The last line may be that of a rig, with or without a line break."""
+    path = project / "configs/scenes/mine.yaml"
+    text = path.read_text().partition("\nreprojections:")[0].rstrip("\n")
+    path.write_text(text)
+    assert (
+        blender("register", opened(path), ("press", ["add"], {"type": "ring"}), written())[-1]
+        is None
+    )
+    assert path.read_text().startswith(f"{text}\n  ring_1:\n    type: ring\n")
+
+
 def test_opening_and_writing_leaves_every_scene_yaml_as_it_is(blender, tmp_path):
     for path in SCENES.glob("*.yaml"):
         shutil.copy(path, tmp_path)
