@@ -353,6 +353,16 @@ def test_a_sequence_has_views_with_a_time(sequence_form, sequence):
     assert perspective.views[0].rgb.shape == (48, 64, 3)
 
 
+def test_one_shard_of_a_sequence_has_only_the_views_in_it(sequence, tmp_path):
+    publish(sequence, "room_rig", Credits.model_validate(CREDITS), tmp_path / "shards", 30_000)
+    shards = sorted(tmp_path.glob("shards/room_rig-*.tar"))
+    assert len(shards) > 3
+    views = [view for shard in shards for view in open_dataset(shard).views]
+    assert len(views) == 18
+    for view in views:
+        assert view.rgb.shape == (16, 24, 3)
+
+
 def test_the_rigs_of_a_scene_are_a_list(tmp_path):
     for name in ("plane", "moving"):
         write_views(tmp_path / name / "dataset", CAMERA, RIG)

@@ -59,14 +59,18 @@ def read_shards(
     others = _others(archive.parent / OTHER_FILES for archive in shards)
     for dataset in datasets.values():
         if not dataset.member:
-            dataset.contents |= others
+            # Of the frames of a sequence, the shards may have only some.
+            dataset.contents |= {
+                name: file for name, file in others.items() if PurePosixPath(name).name != NAME
+            }
         for folder, shown in dataset.shown.items():
             name = str(PurePosixPath(folder, NAME))
             content = shown.to_json()
             if name in others:
-                content = json.loads(others[name].read())
-                frames = [each for each in content["frames"] if each["name"] in shown.frames]
-                content |= {"frames": frames}
+                with reading(others[name].archive / name, NAME):
+                    content = json.loads(others[name].read())
+                    frames = [each for each in content["frames"] if each["name"] in shown.frames]
+                    content |= {"frames": frames}
             dataset.contents[name] = json.dumps(content).encode()
     return [(Packed(path, found.contents), found.member) for found in datasets.values()]
 
