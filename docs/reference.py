@@ -314,7 +314,7 @@ PROGRAM_PAGES = {
     "programs-check.md": (
         "Programs that check",
         "These programs check files, or show the progress of a build.",
-        ["validate", "validate_sequence", "verify", "status"],
+        ["validate", "validate_sequence", "verify", "diff", "status"],
     ),
     "programs-report.md": (
         "Programs that report",

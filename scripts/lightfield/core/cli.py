@@ -19,32 +19,36 @@ gc.set_threshold(100_000)
 atexit.register(gc.freeze)
 
 
-def run(main: Callable[[], None]) -> None:
-    """Run ``main``. Print a `UserError` as ``error: …`` on standard error, and exit with status 1.
+def run(main: Callable[[], None], error_status: int = 1) -> None:
+    """Run ``main``. Print a `UserError` as ``error: …`` on standard error, and exit with a status.
 
     Do the same if memory runs out, or if the system refuses access to a file or folder.
     """
     sys.argv[1:] = map(_as_value, sys.argv[1:])
     print_everywhere()
-    guarded(main)
+    guarded(main, error_status)
 
 
-def guarded(main: Callable[[], None]) -> None:
+def guarded(main: Callable[[], None], error_status: int = 1) -> None:
     """Run ``main``, and end as `run` does if it raises an exception."""
     try:
         main()
     except UserError as error:
-        sys.exit(f"error: {error}")
+        problem = str(error)
     except MemoryError:
-        sys.exit(f"error: out of memory: {LESS_MEMORY}")
+        problem = f"out of memory: {LESS_MEMORY}"
     except KeyboardInterrupt:
-        sys.exit("error: interrupted")
+        problem = "interrupted"
     except BrokenPipeError:
         # The program that read our output has ended, as `head` does: print nothing more.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        sys.exit(error_status)
     except OSError as error:
-        sys.exit(f"error: {_refusal(error)}")
+        problem = _refusal(error)
+    else:
+        return
+    print(f"error: {problem}", file=sys.stderr)
+    sys.exit(error_status)
 
 
 def _refusal(error: OSError) -> str:

@@ -27,7 +27,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 def program(stage: type[Stage[Any]], description: str | None) -> None:
     """Run a stage on the command line's arguments, as a program that ends with an exit status."""
-    cli.run(lambda: parsed(stage, description).run())
+    cli.run(lambda: parsed(stage, description).run(), stage.error_status)
 
 
 def parsed(

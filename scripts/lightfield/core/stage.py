@@ -64,6 +64,8 @@ class Stage(BaseModel, Generic[StageSettings]):
     # Whether what it makes depends on more than its receipt lists, such as times. It then works at
     # each start.
     reads_history: ClassVar[bool] = False
+    # The exit status of its program after an error.
+    error_status: ClassVar[int] = 1
     # The model whose fields are flags in place of a settings file.
     by_hand: ClassVar[type[Settings] | type[ByHand] | None] = None
 

@@ -120,6 +120,17 @@ class Verify(PlainStage):
     )
 
 
+class Diff(PlainStage):
+    """Says why two datasets differ."""
+
+    name = "diff"
+    function = "lightfield.measurement.dataset_difference:compare"
+    error_status = 2
+
+    a: Path = reads("folder of a dataset", positional=True)
+    b: Path = reads("folder of the other dataset", positional=True)
+
+
 class Status(PlainStage):
     """Prints the progress of the chosen datasets."""
 

@@ -39,6 +39,7 @@ STAGES: list[type[Stage[Any]]] = [
     checks.Validate,
     checks.ValidateSequence,
     checks.Verify,
+    checks.Diff,
     checks.Status,
     publishing.PublishChecksums,
     publishing.Package,
