@@ -418,6 +418,7 @@ REFUSED = [
     *(("render.camera_motion", {"turn": value}) for value in ([0, 180, 0], [0, 1], 5)),
     *(("render.camera_motion", {"travel": [1, 0, 0], "rolling": value}) for value in (0, 1.5)),
     *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
+    *(("reprojections.perspective.look", value) for value in ("agx", None, 7, "Raw - Punchy")),
     *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
     *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
     *(("sensor.rigs", value) for value in ([], ["Nobody"], ["LFSphere", 7])),
@@ -829,6 +830,58 @@ EXPLAINED = [
         "rec709",
         "reprojections.perspective.primaries: is only for format exr; a PNG is sRGB",
     ),
+    (
+        "reprojections.perspective.look",
+        "Filmik",
+        'perspective.look: is "Filmik"; must be none, file, or one of Standard, ACES',
+    ),
+    (
+        "reprojections.perspective.look",
+        "AgX - Punch",
+        "AgX - Very Low Contrast; did you mean AgX - Punchy?",
+    ),
+    ("reprojections.perspective.look", "Raw - High Contrast", "must be Raw without a look"),
+    (
+        "reprojections.perspective.look",
+        "file",
+        "reprojections.perspective.look: file is only for scene.blend; give it a name such as AgX",
+    ),
+    (
+        "reprojections.perspective",
+        {**PERSPECTIVE, "look": "AgX", "reinhard": 5},
+        "reprojections.perspective.reinhard: does not go with look, which tone maps",
+    ),
+    (
+        "reprojections.perspective",
+        {**PERSPECTIVE, "look": "AgX", "format": "exr"},
+        "reprojections.perspective.look: is only for format png; an EXR keeps the light",
+    ),
+    (
+        "exports.nerfstudio",
+        {"sources": ["perspective"], "look": "AgX"},
+        "exports.nerfstudio.look: is for EXR sources; give look to the reprojection perspective",
+    ),
+    (
+        "exports",
+        {"point_cloud": {"sources": ["views"], "look": "AgX", "reinhard": 5}},
+        "exports.point_cloud.reinhard: does not go with look",
+    ),
+    (
+        "exports",
+        {"lichtfeld": {"sources": ["views"], "format": "exr", "look": "AgX"}},
+        "exports.lichtfeld.look: is only for format png",
+    ),
+    (
+        "sensor",
+        {"look": "AgX", "response": {"gamma": 0.5}},
+        "sensor.response: does not go with look, which stands in its place",
+    ),
+    (
+        "sensor",
+        {"look": "AgX", "brackets": [-1, 1]},
+        "sensor.brackets: does not go with look, which cannot be undone",
+    ),
+    ("sensor", {"look": "file"}, "sensor.look: file is only for scene.blend"),
     (
         "sensor",
         {"sources": ["fisheye"]},

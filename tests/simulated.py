@@ -69,7 +69,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     lightfield.write(folder / dataset.paths.lightfield)
     for name, reprojection in dataset.reprojections.items():
         lens = (reprojection.camera or dataset.rig.camera).make()
-        made = lightfield.changed(lens, reprojection=reprojection.published)
+        made = lightfield.changed(lens, reprojection=reprojection.published(None))
         made.write(folder / dataset.paths.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"

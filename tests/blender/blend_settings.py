@@ -24,6 +24,8 @@ END = "<!-- End of the table. -->"
 TAKEN = "taken"
 # The picture is that of Blender with the setting's default.
 IGNORED = "ignored"
+# The settings that the key look applies.
+LOOK = "view transform, look, view exposure, gamma, curves, white balance"
 # The scene is refused with one line.
 REFUSED = "refused"
 
@@ -329,24 +331,25 @@ ROWS = [
             Case(scenes.cut_to_a_colour_strip, note="sequencer ignored"),
         ],
     ),
+    Row("stamp", IGNORED, [Case(scenes.burn_a_stamp, format="PNG")]),
     Row(
-        "stamp, view transform, look, view exposure, gamma, curves, white balance",
+        LOOK,
         IGNORED,
         [
-            Case(scenes.burn_a_stamp, format="PNG"),
-            Case({"view.view_transform": "Raw"}, note="view transform Raw ignored", format="PNG"),
-            Case({"view.look": "AgX - High Contrast"}, note="look AgX", format="PNG"),
-            Case({"view.exposure": 2}, note="view exposure +2 ignored", format="PNG"),
-            Case({"view.gamma": 2}, note="view gamma 2 ignored", format="PNG"),
+            Case({"view.view_transform": "Raw"}, note="view transform Raw: not", format="PNG"),
+            Case({"view.look": "AgX - High Contrast"}, note="look AgX - High", format="PNG"),
+            Case({"view.exposure": 2}, note="view exposure +2: not applied; look: ", format="PNG"),
+            Case({"view.gamma": 2}, note="view gamma 2: not applied; look: ", format="PNG"),
             Case(
                 {"view.use_white_balance": True, "view.white_balance_temperature": 3000},
+                note="white balance: not applied; look: ",
                 format="PNG",
             ),
             Case({"view.use_white_balance": True, "view.white_balance_tint": 90}, format="PNG"),
-            Case(scenes.bend_the_curve, note="view curves ignored", format="PNG"),
+            Case(scenes.bend_the_curve, note="view curves: not applied; look: ", format="PNG"),
         ],
         "views are scene-linear",
-        "`exposure` of a reprojection",
+        "[`look: file`](../how-to/keep-the-look.md) of a reprojection, an export or the sensor",
     ),
     Row(
         "samples of the scene and of the view layer",

@@ -326,7 +326,7 @@ def test_settings_without_light_groups_are_as_before():
     plain = scene(render={"samples": 1}, reprojections={"flat": {}})
     assert "light_groups" not in plain.render.model_dump(exclude_none=True)
     settings = plain.developments["flat"]
-    assert "relight" not in settings.as_json() and "relight" not in settings.development
+    assert "relight" not in settings.as_json() and "relight" not in settings.development(None)
 
 
 @pytest.mark.parametrize(

@@ -371,7 +371,7 @@ def test_a_sensor_leaves_the_other_jobs_as_they_are():
     beside = developments({**NOISY, "sources": ["flat"]}, reprojections=flat)
     assert beside["flat"].as_json() == alone["flat"].as_json()
     assert "sensor" not in alone["flat"].as_json()
-    assert "sensor" not in alone["flat"].published
+    assert "sensor" not in alone["flat"].published(None)
 
 
 def test_the_sensor_sees_a_sources_lens_and_rigs():

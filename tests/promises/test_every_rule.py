@@ -565,6 +565,20 @@ ROUNDS = {
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    # The .blend's look comes through its inventory, and rendered views keep their keys.
+    "a look, and the look of a .blend": {
+        # A look goes neither with EXR nor with a tone mapping, which other rounds ask for.
+        "built": (
+            "format: png\n    exposure: -1\n  cubes",
+            "format: png\n    exposure: -1\n    look: AgX - Punchy\n  cubes",
+            {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+        "brought": (
+            "depth: true}",
+            "depth: true, look: file}",
+            {"inventory", "lightfield", "probe_cameras", "export"},
+        ),
+    },
     "another sensor, and how members are split": {
         "built": (
             "a: 0.01",

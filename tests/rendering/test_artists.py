@@ -47,14 +47,14 @@ rigs:
 TAKEN = {
     "interior": "frame 1, the file's · 1 sample a pixel (the file has 4096) · camera Corner "
     "(24 mm) ignored · compositor ignored · adaptive sampling off · denoising off · view "
-    "transform AgX ignored · 1 texture missing: poster.png",
+    "transform AgX: not applied; look: file applies it · 1 texture missing: poster.png",
     "character": "frame 24, the file's · view layers Main and Stage of 2 in one picture · "
     "1 sample a pixel (the file has 256) · camera Wide (35 mm) taken · adaptive sampling off · "
-    "denoising off · motion blur off · view transform AgX ignored",
+    "denoising off · motion blur off · view transform AgX: not applied; look: file applies it",
     "product": "frame 1, the file's · 4 samples a pixel, the file's · camera Hero (50 mm) taken "
     "· clip planes at 1 and 1000 m ignored · adaptive sampling off · denoising off "
-    "· depth of field ON · view transform AgX ignored · view exposure +1.5 ignored · "
-    "film transparent on, ignored",
+    "· depth of field ON · view transform AgX, view exposure +1.5: not applied; look: "
+    "file applies them · film transparent on, ignored",
 }
 
 

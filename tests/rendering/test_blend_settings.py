@@ -10,15 +10,16 @@ import blend_scenes
 import numpy as np
 import one_shard
 import pytest
-from blend_settings import IGNORED, NO_CASE, OWNERS, PAGE, REFUSED, ROWS, page
+from blend_settings import IGNORED, LOOK, NO_CASE, OWNERS, PAGE, REFUSED, ROWS, page
 
-from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.rendering import lightfield_file
+from lightfield.stages import job_settings
+from lightfield.stages.lenses import Reproject
 from lightfield.workflow.loading import datasets_of
 
 CASES = [
@@ -26,6 +27,9 @@ CASES = [
     for row in ROWS
     for case in row.cases
     if case.since <= tuple(map(int, version("bpy").split(".")[:2]))
+]
+LOOKS = [
+    pytest.param(case, id=case.name) for row in ROWS if row.settings == LOOK for case in row.cases
 ]
 # Two pictures are equal if fewer of their pixels differ, and different if more do.
 EQUAL = 0.002
@@ -147,6 +151,7 @@ def of_plenoforge(path, yaml):
                 "camera": {"lens": "file", "resolution": list(blend_scenes.SIZE)},
             }
         },
+        "reprojections": yaml.get("reprojections", {}),
     }
     written = Scene.model_validate(content)
     (dataset,) = datasets_of("tried", written, "full", Preset(), {})
@@ -154,10 +159,17 @@ def of_plenoforge(path, yaml):
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         inventory_file.write_of_datasets(path, written, [dataset], inventory, False)
-    views = lightfield_file.from_settings(LightfieldSettings.of_capture(dataset), inventory)
+    views = lightfield_file.from_settings(job_settings.lightfield(dataset), inventory)
     folder = path.parent / "exr"
     with contextlib.redirect_stderr(io.StringIO()):
         one_shard.render(views, path.parent, path, inventory=inventory)
+    for name, settings in dataset.reprojections.items():
+        Reproject(
+            settings=settings,
+            input_cfg=path.parent / "lightfield.json",
+            input_dir=folder,
+            output_dir=path.parent / name,
+        ).run()
     channels = "RGBA" if views.transparent else "RGB"
     image = images.read_image(folder / f"{views.views[0].name}.exr", [*channels, "Z"])
     pixels = np.stack([image.channels[name] for name in channels], axis=-1)
@@ -200,6 +212,28 @@ def test_a_setting_of_a_blend_becomes_what_the_reference_says(
         expected, depth = changed, depth_of_blender(reference)
     assert difference(pixels, expected) < EQUAL
     assert difference(own_depth[..., None], np.where(depth < 1e9, depth, np.inf)[..., None]) < EQUAL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("transparent", [False, True])
+@pytest.mark.parametrize("case", LOOKS)
+def test_look_file_gives_blenders_own_picture(case, transparent, tmp_path):
+    def with_film():
+        apply({"render.film_transparent": transparent, "view.exposure": 0.5})
+
+    path = tmp_path / "tried.blend"
+    save(path, case.scene, with_film, case.change)
+    developed = {"png": {"look": "file", "bits": 16}}
+    render = {"render": {"transparent": True}} if transparent else {}
+    _, _, said = of_plenoforge(path, {"reprojections": developed, **render})
+    assert "applied by look: file" in said
+    (file,) = (tmp_path / "png").glob("*.png")
+    channels = "RGBA" if transparent else "RGB"
+    image = images.read_image(file, channels)
+    pixels = np.stack([image.channels[name] for name in channels], axis=-1) / 65535
+    expected = of_blender(path, "PNG")[..., : len(channels)] / 65535
+    assert pixels.max() > 0.5
+    assert np.abs(pixels - expected).max() <= 1 / 255
 
 
 def test_the_reference_has_the_table_of_the_settings_that_were_tried():

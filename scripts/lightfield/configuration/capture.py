@@ -203,6 +203,11 @@ class LightfieldSettings(Settings):
     flow: bool = Field(
         False, description="Whether to choose a neighbour of each view, for its optical flow."
     )
+    file_look: bool | None = Field(
+        None,
+        description="Whether to write the look of the .blend down, because something is developed "
+        "with it.",
+    )
     panorama_width: AtLeastOne | None = Field(
         None,
         description="Width of a panorama from the rig's centre. With this key, the panorama is the "

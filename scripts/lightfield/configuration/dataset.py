@@ -19,6 +19,7 @@ from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
+from lightfield.imaging import look
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,12 @@ class Dataset(Capture):
     def panorama_width(self) -> int:
         """The panorama's width: twice a 180 degree fisheye's angular resolution, at most 4096."""
         return min(4 * self.rig.camera.resolution[0], 4096)
+
+    @property
+    def uses_file_look(self) -> bool | None:
+        """Whether something is developed with the look of the user's .blend. Otherwise None."""
+        made = [*self.reprojections.values(), *self.exports.selected.values()]
+        return any(getattr(each, "look", None) == look.FILE for each in made) or None
 
     # Files that a dataset may lack.
 

@@ -21,6 +21,8 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
+from lightfield.imaging import look
+from lightfield.imaging.look import LookName
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
@@ -91,7 +93,7 @@ class Export(Settings):
 
 
 class Developed(Export):
-    """Exports of 8-bit images. ``exposure`` and ``reinhard`` apply only to EXR sources."""
+    """Exports of 8-bit images. ``exposure``, ``reinhard``, ``look`` apply only to EXR sources."""
 
     exposure: Stops = Field(
         0.0,
@@ -103,6 +105,17 @@ class Developed(Export):
         description=f"Tone mapping of EXR sources: the {REINHARD}",
         json_schema_extra={"unit": "light"},
     )
+    look: LookName = None
+
+    @model_validator(mode="after")
+    def _one_tone_curve(self) -> Self:
+        look.check_beside(self.look, self.reinhard)
+        return self
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        # An export records what the look is, and only if it is used.
+        return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
 _PointCount = Annotated[int, Field(ge=1)]
@@ -354,6 +367,12 @@ class LichtFeld(Developed):
         False, description="Also write normals. The source must have the pass normal."
     )
 
+    @model_validator(mode="after")
+    def _look_is_of_png(self) -> Self:
+        if self.look and self.format == "exr":
+            raise ValueError("look: is only for format png; an EXR keeps the light")
+        return self
+
     @property
     def needed_passes(self) -> tuple[str, ...]:
         return ("normal",) if self.normals else ()
@@ -580,6 +599,9 @@ class ExportSettings(ReaderSettings, Generic[Options]):
     )
     spread_version: int | None = cause(
         "Version of the choice of test views, if the rig has no split."
+    )
+    look_source: str | None = cause(
+        "Version of bpy and SHA-256 of its config.ocio, if there is a look."
     )
 
     @model_validator(mode="after")

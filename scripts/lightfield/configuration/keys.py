@@ -25,6 +25,7 @@ from lightfield.core.names import BUILDERS, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, LightField, View
+from lightfield.imaging.look import FILE_LOOK
 
 # The versions of the steps that make views. The keys of the views that a step concerns have its
 # version, and no other keys have it. Raise a version when equal settings give other files.
@@ -133,7 +134,10 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
 def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.world_from_camera.tolist()
-    content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
+    # Views are light, whatever look is given to versions of them.
+    content = {
+        key: value for key, value in lightfield.content.items() if key not in (MACHINE, FILE_LOOK)
+    }
     key = [VERSIONS["render"], version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
         key.append(VERSIONS["surfaces"])

@@ -13,10 +13,13 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.setting_types import REINHARD, Primaries, Stops, White
 from lightfield.core.settings import Name, Settings, Vector, as_list
+from lightfield.core.stage import cause
 from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.imaging import look
+from lightfield.imaging.look import Look, LookName
 
 MOST_SAMPLES = 64
 """Samples along each side of a pixel."""
@@ -74,6 +77,12 @@ class ReprojectionOptions(Settings):
         description=f"Tone mapping: the {REINHARD}",
         json_schema_extra={"unit": "light"},
     )
+    look: LookName = None
+
+    @model_validator(mode="after")
+    def _one_tone_curve(self) -> Self:
+        look.check_beside(self.look, self.reinhard)
+        return self
 
     @model_validator(mode="after")
     def _camera_fits(self) -> Self:
@@ -134,11 +143,20 @@ class Reprojection(ReprojectionOptions):
     sensor: SensorSettings | None = Field(
         None, description="Sensor that makes the PNG images, instead of exposure and reinhard."
     )
+    look_source: str | None = cause(
+        "Version of bpy and SHA-256 of its config.ocio, if there is a look."
+    )
 
     @model_validator(mode="after")
     def _sensor_writes_png(self) -> Self:
         if self.sensor and self.formats != ["png"]:
             raise ValueError("formats: must be [png] with sensor, which writes no other")
+        return self
+
+    @model_validator(mode="after")
+    def _look_is_of_png(self) -> Self:
+        if self.look and "exr" in self.formats:
+            raise ValueError("look: is only for PNG images; an EXR keeps the light")
         return self
 
     @property
@@ -156,12 +174,15 @@ class Reprojection(ReprojectionOptions):
         """The content of a lens map's settings file."""
         return self.as_json({*OPTICS})
 
-    @property
-    def development(self) -> dict[str, Any]:
-        """The settings that turn light into pixels."""
+    def development(self, look: Look | None) -> dict[str, Any]:
+        """Return the settings that turn light into pixels. ``look`` is that of `look`."""
         settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
         if self.sensor:
             settings = {"sensor": self.sensor.as_json()}
+        elif look:
+            settings = {}
+        if look:
+            settings["look"] = look.to_json()
         if self.primaries:
             settings["primaries"] = self.primaries
         # 8 is left out, so that the keys of earlier versions stay valid.
@@ -171,19 +192,18 @@ class Reprojection(ReprojectionOptions):
             settings["relight"] = self.as_json({"relight"})["relight"]
         return settings
 
-    @property
-    def published(self) -> dict[str, Any]:
-        """The settings in lightfield.json and the images' headers, beside the lens.
+    def published(self, look: Look | None) -> dict[str, Any]:
+        """Return the settings in lightfield.json and the images' headers, beside the lens.
 
         ``rotation`` is pan, pitch and roll in degrees. `lightfield.imaging.tonemap` defines
         ``exposure`` and ``reinhard``, with which a reader can turn a PNG back into light. For a
-        sensor, the file of each view's parameters does that.
+        sensor, the file of each view's parameters does that. After a look, nothing does.
         """
         return {
             "rotation": list(self.rotation),
             "filter": self.filter,
             "samples": self.samples,
-            **self.development,
+            **self.development(look),
         }
 
 
@@ -236,6 +256,8 @@ class ReprojectionEntry(ReprojectionOptions):
             raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
         if self.format == "png" and self.primaries:
             raise ValueError("primaries: is only for format exr; a PNG is sRGB")
+        if self.format == "exr" and self.look:
+            raise ValueError("look: is only for format png; an EXR keeps the light")
         lights = [
             name
             for name in self.passes or ()
@@ -258,6 +280,7 @@ class ReprojectionEntry(ReprojectionOptions):
             passes=self.passes,
             relight=light,
             primaries=self.primaries,
+            look_source=look.source_of(self.look),
         )
 
 

@@ -48,6 +48,7 @@ from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
+from lightfield.imaging import look
 
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.
@@ -270,6 +271,9 @@ class Scene(Credits):
             self._check_sensor(self.sensor)
         for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}", export)
+        if self.scene.blend is None:
+            for key in self._keys_of_file_look:
+                raise ValueError(f"{key}: file is only for scene.blend; give it a name such as AgX")
         for key in ("flow", "mesh"):
             if getattr(self, key) is not None and self.scene.followed_camera == "view":
                 raise ValueError(
@@ -296,6 +300,16 @@ class Scene(Credits):
                 raise ValueError(f"rigs.{name}.frames: does not go with family")
 
     @property
+    def _keys_of_file_look(self) -> list[str]:
+        """The keys that ask for the look of the .blend."""
+        blocks: dict[str, Any] = {
+            **{f"reprojections.{name}": entry for name, entry in self.reprojections.items()},
+            **{f"exports.{name}": export for name, export in self.exports.selected.items()},
+            "sensor": self.sensor,
+        }
+        return [f"{key}.look" for key, block in blocks.items() if _look_of(block) == look.FILE]
+
+    @property
     def developments(self) -> dict[str, Reprojection]:
         """The reprojections, and those that ``sensor`` adds, by the names of their folders."""
         developments = {
@@ -317,6 +331,8 @@ class Scene(Credits):
                 bits=8 if sensor.bits <= 8 else 16,
                 formats=["png"],
                 sensor=sensor,
+                look=sensor.look,
+                look_source=look.source_of(sensor.look),
             )
             for name, sensor in self.sensor.folders(source).items()
         }
@@ -445,6 +461,15 @@ class Scene(Credits):
         key = f"{export_key}.sources"
         developments = self.developments
         allowed_sources = [VIEWS, *developments]
+        if _look_of(export) and not any(
+            source == VIEWS or "exr" in developments[source].formats
+            for source in export.sources
+            if source in allowed_sources
+        ):
+            raise ValueError(
+                f"{export_key}.look: is for EXR sources; give look to the reprojection "
+                f"{export.sources[0]}"
+            )
         for source in export.sources:
             if source not in allowed_sources:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
@@ -567,6 +592,11 @@ class Scene(Credits):
         for reprojection_name, reprojection in self.reprojections.items():
             if reprojection.camera and name in (reprojection.rigs or self.rigs):
                 raise ValueError(f"reprojections.{reprojection_name}: {refusal}")
+
+
+def _look_of(block: Any) -> str | None:
+    """Return the look of a reprojection, of an export or of the sensor, if it has one."""
+    return getattr(block, "look", None)
 
 
 def _export_refusal(

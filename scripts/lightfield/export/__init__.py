@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export, ExportSettings
+from lightfield.configuration.exports import SEQUENCE_EXPORTS, Developed, Export, ExportSettings
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.names import MESH
@@ -43,9 +43,10 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
     if reason:
         raise UserError(f"{source.lightfield.path}: {reason}")
     exporter = importlib.import_module(f"lightfield.export.{name}")
+    look = {"look": source.look.to_json()} if source.look else {}
     return replace_folder(
         name,
-        settings.recorded,
+        {**settings.recorded, **look},
         folder,
         lambda target: exporter.export(source, settings, target),
         is_own=folder.resolve() == (source.dataset / source.name / FOLDER / name).resolve(),
@@ -55,9 +56,13 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
 def source_of(name: str, settings: ExportSettings[Any], dataset: Path) -> Source:
     """Return the views for an export of the folder ``dataset``. For a sequence, it is the rig's."""
     options = settings.options
-    development = {
-        key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
-    }
+    development: dict[str, Any] = {}
+    if isinstance(options, Developed):
+        development = {
+            "exposure": options.exposure,
+            "reinhard": options.reinhard,
+            "look_name": options.look,
+        }
     test_folders = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
     views = (settings.source, settings.suffix, test_folders)
     if name not in SEQUENCE_EXPORTS:

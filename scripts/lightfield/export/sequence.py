@@ -12,6 +12,7 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.layout import frame_times
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
+from lightfield.imaging.look import Look
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class SourceSequence:
         beside: Mapping[str, Path],
         exposure: float = 0.0,
         reinhard: float = 1.0,
+        look_name: str | None = None,
     ) -> "SourceSequence":
         """Return the sequence in the ``folders`` of a rig's folder, such as f00001.
 
@@ -54,6 +56,7 @@ class SourceSequence:
                 {other: folder / frame for other, folder in beside.items()},
                 exposure,
                 reinhard,
+                look_name=look_name,
             )
             for frame in sorted(folders)
         ]
@@ -77,6 +80,11 @@ class SourceSequence:
     def lightfield(self) -> LightField:
         """The views at the first frame."""
         return self.frames[0].lightfield
+
+    @property
+    def look(self) -> Look | None:
+        """The look of the developed views, if they get one."""
+        return self.frames[0].look
 
     @property
     def lens(self) -> Lens:

@@ -15,6 +15,7 @@ from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
+from lightfield.imaging.look import FILE_LOOK, Look
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -33,6 +34,7 @@ class SourceDataset:
     - ``renamed``: if there are any, only these views in this order: new names and the views'.
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
+    - ``look_name``: the look with which EXR views are developed instead, if they are.
     """
 
     dataset: Path
@@ -42,6 +44,7 @@ class SourceDataset:
     exposure: float = 0.0
     reinhard: float = 1.0
     renamed: Mapping[str, str] = field(default_factory=dict)
+    look_name: str | None = None
 
     @cached_property
     def lightfield(self) -> LightField:
@@ -51,6 +54,13 @@ class SourceDataset:
         by_name = {view.name: view for view in lightfield.views}
         views = [replace(by_name[old], name=new) for new, old in self.renamed.items()]
         return lightfield.changed(views=views)
+
+    @cached_property
+    def look(self) -> Look | None:
+        """The look of the developed views, if they get one."""
+        if self.suffix == ".png":
+            return None
+        return Look.of(self.look_name, self.exposure, self.lightfield.content.get(FILE_LOOK))
 
     @cached_property
     def rendered(self) -> LightField:
@@ -112,9 +122,13 @@ class SourceDataset:
         if self.suffix == ".png":
             return image.srgb
         colour = image.colour
+        alpha = None
         if self.lightfield.transparent:
             alpha = image.channels["A"][..., None].astype(np.float32)
-            colour /= np.where(alpha > 0, alpha, 1)
+            alpha = np.where(alpha > 0, alpha, np.float32(1))
+            colour /= alpha
+        if self.look:
+            return np.asarray(self.look.to_pixels(colour, 8, alpha), np.uint8)
         # Only here, because its kernels take long to load, and most exports link developed views.
         from lightfield.imaging.tonemap import to_8_bit, tone_map
 
@@ -149,6 +163,8 @@ class SourceDataset:
         if self.suffix == ".png":
             alpha = image.channels["A"] / np.iinfo(image.channels["A"].dtype).max
             developed = decode_srgb(image.encoded) * alpha[..., np.newaxis]
+        elif self.look:
+            return np.asarray(self.look.developed(image.colour), np.float64)
         else:
             developed = tone_map(image.colour, self.exposure, self.reinhard)
         return np.asarray(encode_srgb(developed), np.float64)

@@ -22,6 +22,8 @@ _ENGINES = {
 
 # The clipping planes of a new camera in Blender, in metres.
 _BLENDERS_CLIP = (0.1, 1000)
+# Blender's name for the display of all PNGs.
+_DISPLAY = "sRGB"
 # Blender's name for the colour space of all datasets.
 REC_709 = "Linear Rec.709"
 
@@ -108,11 +110,13 @@ def usage_notes(
     render: RenderBlock,
     uses_camera: bool,
     followed: str | None,
+    uses_look: bool,
 ) -> list[str]:
     """Return notes on which settings of a .blend a dataset takes and which it ignores.
 
     ``frames`` and the ``render`` block say what is rendered. ``uses_camera`` says whether a rig
-    uses the .blend's own camera, and ``followed`` is `followed_camera`.
+    uses the .blend's own camera, and ``followed`` is `followed_camera`. ``uses_look`` says whether
+    something is developed with the .blend's look.
     """
     blend = inventory["blend"]
     return [
@@ -122,7 +126,7 @@ def usage_notes(
         *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
         *_switches(blend, render),
         *_exposure(blend, render),
-        *_display(blend),
+        *_display(blend, uses_look),
         *_film(blend, render),
         *_missing(inventory["missing"]),
     ]
@@ -197,17 +201,54 @@ def _exposure(blend: Settings, render: RenderBlock) -> Iterator[str]:
         yield "rolling shutter ignored"
 
 
-def _display(blend: Settings) -> Iterator[str]:
-    """Yield notes on the .blend's changes of colours for display, which are ignored."""
-    yield f"view transform {blend['view_transform']} ignored"
+def _display(blend: Settings, uses_look: bool) -> Iterator[str]:
+    """Yield notes on the .blend's changes of colours for display.
+
+    ``uses_look`` says whether something is developed with them. Views are light in any case.
+    """
+    parts = [f"view transform {blend['view_transform']}"]
     if blend["look"] != "None":
-        yield f"look {blend['look']} ignored"
+        parts.append(f"look {blend['look']}")
     if blend["exposure"]:
-        yield f"view exposure {blend['exposure']:+g} ignored"
+        parts.append(f"view exposure {blend['exposure']:+g}")
     if blend["gamma"] != 1:
-        yield f"view gamma {blend['gamma']:g} ignored"
+        parts.append(f"view gamma {blend['gamma']:g}")
     if blend["curves"]:
-        yield "view curves ignored"
+        parts.append("view curves")
+    if blend.get("white"):
+        parts.append("white balance")
+    them = "it" if len(parts) == 1 else "them"
+    use = "applied by look: file" if uses_look else f"not applied; look: file applies {them}"
+    yield f"{', '.join(parts)}: {use}"
+
+
+def look_of(blend: Settings) -> dict[str, Any]:
+    """Return how the .blend develops its light, as `lightfield.imaging.look` has it.
+
+    Raises `UserError` for what would not give Blender's own pictures.
+    """
+    if blend["display"] != _DISPLAY:
+        raise UserError(
+            f"look: file: the .blend's display is {blend['display']}, and PNGs are {_DISPLAY}; "
+            f"choose {_DISPLAY} in Blender's Color Management, or give look a name"
+        )
+    if blend["curves"] and blend["curve_tone"] != "STANDARD":
+        raise UserError(
+            "look: file: the .blend's curves keep hues (Film Like), which is not possible here; "
+            "choose Standard in Blender's Color Management, or give look a name"
+        )
+    if blend["working_space"] != REC_709 and (blend["curves"] or blend["white"]):
+        raise UserError(
+            f"look: file: the .blend's curves or white balance change {blend['working_space']}, "
+            f"and light here is {REC_709}; give look a name"
+        )
+    content = {"view": blend["view_transform"], "look": blend["look"]}
+    content |= {key: blend[key] for key in ("exposure", "gamma")}
+    if blend["white"]:
+        content["white"] = blend["white"]
+    if blend["curves"]:
+        content["curves"] = blend["curve_tables"]
+    return content
 
 
 def _film(blend: Settings, render: RenderBlock) -> Iterator[str]:

@@ -308,6 +308,11 @@ class LightField:
         return "relight" in self.content.get("reprojection", {})
 
     @property
+    def has_look(self) -> bool:
+        """Whether the views are developed with one of Blender's looks."""
+        return "look" in self.content.get("reprojection", {})
+
+    @property
     def follows_views(self) -> bool:
         """Whether objects of the scene follow each view's camera: each view shows another scene."""
         scene = self.content.get("scene")

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
 from lightfield.core.names import VIEWS
 from lightfield.core.settings import Settings, as_list, checked
+from lightfield.imaging.look import LookName
 
 # The files beside a view of a bracket, by their kinds.
 BRACKET_FILES = {"clipped": "{view}_clipped.png", "weights": "{view}_weights.exr"}
@@ -157,6 +158,7 @@ class SensorOptions(Settings):
         None,
         description="Response curve, the same in all views. Without this key, it is sRGB's.",
     )
+    look: LookName = None
     bits: int = Field(
         8,
         ge=1,
@@ -176,6 +178,8 @@ class SensorOptions(Settings):
             value = getattr(self, key)
             if isinstance(value, Varied) and value.reaches_beyond(limit):
                 raise ValueError(f"{key}: must be from {-limit:g} to {limit:g}")
+        if self.look and self.response:
+            raise ValueError("response: does not go with look, which stands in its place")
         return self
 
 
@@ -214,6 +218,14 @@ class Sensor(SensorOptions):
         "with clipping masks and weights.",
         json_schema_extra={"unit": "stops"},
     )
+
+    @model_validator(mode="after")
+    def _can_be_merged(self) -> Self:
+        if self.look and self.brackets:
+            raise ValueError(
+                "brackets: does not go with look, which cannot be undone to merge them"
+            )
+        return self
 
     def folders(self, source: str) -> dict[str, SensorSettings]:
         """Return the settings of a source's folders, by their names."""

@@ -4,6 +4,8 @@ All light here is scene-linear Rec. 709. An EXR names another space by its attri
 ``chromaticities``. Without it, a file has Rec. 709 (OpenEXR's Technical Introduction).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,6 +50,17 @@ def conversion(source: Chromaticities, target: Chromaticities) -> Floats:
     adaptation = np.linalg.inv(_CONES) @ np.diag(scale) @ _CONES
     to_target = np.linalg.inv(xyz_matrix(target))
     return np.asarray(to_target @ adaptation @ xyz_matrix(source))
+
+
+def white_balance(white: Sequence[float], space: Chromaticities) -> Floats:
+    """Return the matrix (3, 3) that makes the colour ``white`` (3,) of a space its white.
+
+    The adaptation is Bradford's.
+    """
+    to_xyz = xyz_matrix(space)
+    scale = (_CONES @ to_xyz @ np.ones(3)) / (_CONES @ to_xyz @ np.array(white, np.float64))
+    adaptation = np.linalg.inv(_CONES) @ np.diag(scale) @ _CONES
+    return np.asarray(np.linalg.inv(to_xyz) @ adaptation @ to_xyz)
 
 
 def to_rec_709(

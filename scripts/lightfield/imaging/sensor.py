@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.imaging.look import Look
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb
 
 Floats = NDArray[np.float64]
@@ -71,6 +72,7 @@ class SensorParameters:
       saturates.
     - ``bits``: the number of bits of a code.
     - ``seed``: the seed of the noise, from 0 to 2⁶⁴ − 1.
+    - ``has_look``: whether Blender's look stands in place of the response.
     """
 
     exposure: float
@@ -81,6 +83,7 @@ class SensorParameters:
     floor: float
     bits: int
     seed: int
+    has_look: bool = False
 
     @property
     def has_noise(self) -> bool:
@@ -136,6 +139,7 @@ class SensorParameters:
                 floor=float(content["noise"]["b"]),
                 bits=int(content["bits"]),
                 seed=int(content["noise"]["seed"]),
+                has_look="look" in content,
             )
         except (LookupError, TypeError, ValueError):
             raise UserError("has no parameters of a sensor") from None
@@ -162,8 +166,16 @@ class Sensed:
     weights: NDArray[np.float32] | None
 
 
-def sense(light: NDArray[Any], parameters: SensorParameters, with_weights: bool = True) -> Sensed:
-    """Develop scene-linear ``light`` (h, w, 3). NaN counts as 0."""
+def sense(
+    light: NDArray[Any],
+    parameters: SensorParameters,
+    with_weights: bool = True,
+    look: Look | None = None,
+) -> Sensed:
+    """Develop scene-linear ``light`` (h, w, 3). NaN counts as 0.
+
+    A ``look`` stands in place of the response. Then there are no weights.
+    """
     height, width = light.shape[:2]
     dtype = np.uint8 if parameters.stored_largest == 255 else np.uint16
     pixels: NDArray[np.uint8 | np.uint16] = np.empty((height, width, 3), dtype)
@@ -175,7 +187,9 @@ def sense(light: NDArray[Any], parameters: SensorParameters, with_weights: bool 
         strip = np.nan_to_num(light[rows].astype(np.float64), posinf=_BRIGHTEST).clip(0)
         clean = np.minimum(strip * 2.0**parameters.exposure * falloff, _BRIGHTEST)
         raw = noisy(clean, parameters, random)
-        codes = np.rint(_respond(_recolour(raw, parameters), parameters) * parameters.largest)
+        colour = _recolour(raw, parameters)
+        shown = look.developed(colour.clip(0, 1)) if look else _respond(colour, parameters)
+        codes = np.rint(shown * parameters.largest)
         scale = parameters.stored_largest / parameters.largest
         pixels[rows] = np.rint(codes * scale).astype(dtype)
         is_white = (codes == parameters.largest) | (raw >= 1)
@@ -335,8 +349,10 @@ def light_of(pixels: NDArray[Any], parameters: SensorParameters) -> Floats:
     """Return the scene-linear light (h, w, 3) that a sensor's ``pixels`` (h, w, 3) show.
 
     It differs from the light that was developed by noise, by rounding, and where it was clipped.
-    Light is NaN where vignetting leaves none.
+    Light is NaN where vignetting leaves none. Raises `UserError` after a look.
     """
+    if parameters.has_look:
+        raise UserError("look: cannot be turned back into light")
     height, width = pixels.shape[:2]
     encoded = pixels / parameters.stored_largest
     raw = _colour_undone(_response_undone(encoded, parameters), parameters)

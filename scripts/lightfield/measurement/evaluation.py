@@ -161,7 +161,14 @@ def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, F
         alpha = np.rint(alpha * largest) / largest
         covered = image.channels["A"][..., np.newaxis].astype(np.float32)
         light = light / np.where(covered > 0, covered, 1)
+    if source.look:
+        return source.look.to_pixels(light, 16, _covered(alpha)) / largest, alpha
     return to_16_bit(tone_map(light, source.exposure, source.reinhard)) / largest, alpha
+
+
+def _covered(alpha: Floats | None) -> Floats | None:
+    """Return alpha (h, w, 1) by which colour can be divided. None without alpha."""
+    return None if alpha is None else np.where(alpha > 0, alpha, 1)[..., np.newaxis]
 
 
 def _alpha(image: images.Image) -> Floats | None:
@@ -184,7 +191,13 @@ def _developed(
     if image.channels["R"].dtype.kind == "u":
         largest = np.iinfo(image.channels["R"].dtype).max
         return _on_background(image.encoded, alpha, background, largest)
-    light = tone_map(image.colour, source.exposure, source.reinhard)
+    if source.look:
+        covered = _covered(alpha)
+        straight = image.colour if covered is None else image.colour / covered
+        light = np.asarray(decode_srgb(source.look.developed(straight, covered)))
+        light = light if alpha is None else light * alpha[..., np.newaxis]
+    else:
+        light = tone_map(image.colour, source.exposure, source.reinhard)
     if alpha is not None:
         light = _with_background(light, alpha, background)
     return np.asarray(encode_srgb(light), np.float64)

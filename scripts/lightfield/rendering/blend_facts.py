@@ -11,6 +11,9 @@ from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
 from lightfield.rendering import frames, motion_blur
 from lightfield.rendering.cycles import view_layer
 
+# The steps of Blender's table of a curve.
+_CURVE_STEPS = 256
+
 
 def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
     """Return the open .blend's render settings, and its camera at some frames.
@@ -46,11 +49,15 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
         ),
         "environment": bool(layer.use_sky),
         "film_transparent": bool(render.film_transparent),
+        "display": scene.display_settings.display_device,
         "view_transform": view.view_transform,
         "look": view.look,
         "exposure": round(view.exposure, 4),
         "gamma": round(view.gamma, 4),
         "curves": bool(view.use_curve_mapping),
+        "curve_tone": view.curve_mapping.tone,
+        "curve_tables": _curve_tables(view.curve_mapping) if view.use_curve_mapping else None,
+        "white": list(view.white_balance_whitepoint) if view.use_white_balance else None,
         "pixel_aspect": round(render.pixel_aspect_x / render.pixel_aspect_y, 4),
         "border": bool(render.use_border),
         "stereoscopy": bool(render.use_multiview),
@@ -64,6 +71,50 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
         "scripts": bool(bpy.app.autoexec_fail),
         "camera": camera,
     }
+
+
+def _curve_tables(mapping: Any) -> dict[str, Any]:
+    """Return the curves of light as `lightfield.imaging.look.Curves` has them.
+
+    Blender, too, evaluates tables, each of a channel's curve followed by the curve of all channels.
+    """
+    mapping.initialize()
+    together = mapping.curves[3]
+    tables = []
+    slopes = []
+    starts = []
+    ends = []
+    for curve in list(mapping.curves)[:3]:
+        places = [point.location.x for point in curve.points]
+        start = min(mapping.clip_min_x, *places)
+        end = max(mapping.clip_max_x, *places)
+        table = [
+            mapping.evaluate(together, mapping.evaluate(curve, float(place)))
+            for place in np.linspace(start, end, _CURVE_STEPS + 1)
+        ]
+        slope = np.prod([_slopes(mapping, each) for each in (curve, together)], axis=0)
+        starts.append(start)
+        ends.append(end)
+        tables.append(table)
+        slopes.append(slope.tolist())
+    return {
+        "black": list(mapping.black_level),
+        "white": list(mapping.white_level),
+        "start": starts,
+        "end": ends,
+        "tables": tables,
+        "slopes": slopes,
+    }
+
+
+def _slopes(mapping: Any, curve: Any) -> tuple[float, float]:
+    """Return the slopes with which a curve goes on before its start and after its end."""
+    places = [point.location.x for point in curve.points]
+    start = min(mapping.clip_min_x, *places)
+    end = max(mapping.clip_max_x, *places)
+    before = mapping.evaluate(curve, start) - mapping.evaluate(curve, start - 1)
+    after = mapping.evaluate(curve, end + 1) - mapping.evaluate(curve, end)
+    return before, after
 
 
 def _exposure(scene: Any) -> dict[str, Any]:

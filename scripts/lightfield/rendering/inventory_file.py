@@ -127,7 +127,8 @@ def _print_notes(
     shown = sorted({dataset.frame for dataset in resolved})
     own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
     followed = resolved[0].source.followed_camera if resolved else None
-    notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera, followed)
+    uses_look = any(dataset.uses_file_look for dataset in datasets)
+    notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera, followed, uses_look)
     print(f"note: {path}: {' · '.join(notes)}")
 
 

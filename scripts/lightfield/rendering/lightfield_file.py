@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
-from lightfield.formats import light_groups, published
+from lightfield.formats import blend, light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
+from lightfield.imaging.look import FILE, FILE_LOOK, Look
 from lightfield.planning.sampling import calibrated
 from lightfield.stages.rig import MakeLightfield
 
@@ -64,12 +66,27 @@ def from_settings(
             print(f"note: {capture.rig.file}: is imported without {', '.join(unused_keys)}")
     else:
         keys[MACHINE] = machine.describe(capture.render.denoise)
+    if settings.file_look:
+        keys[FILE_LOOK] = _file_look(capture.source.blend, inventory)
     lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
     if settings.flow:
         lightfield = lightfield.with_flow()
     if capture.render.camera_motion:
         lightfield = lightfield.with_exposure()
     return lightfield
+
+
+def _file_look(path: str | None, inventory: Path | None) -> dict[str, Any]:
+    """Return the look of the .blend at ``path``. Raises `UserError` if it is not possible."""
+    if inventory is None:
+        raise UserError("--inventory: is missing; scripts/inventory.py reads the .blend's look")
+    facts = read_inventory(inventory, "blend")["blend"]
+    try:
+        content = blend.look_of(facts)
+        Look.of(FILE, 0.0, content)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+    return content
 
 
 def _with_groups(render: RenderBlock, inventory: Path | None) -> RenderBlock:

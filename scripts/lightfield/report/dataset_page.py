@@ -23,6 +23,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
+from lightfield.imaging.look import FILE_LOOK
 from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
 from lightfield.stages.report import ReportHtml
@@ -134,7 +135,12 @@ def _taken(job: ReportHtml, lightfield: LightField) -> list[str]:
     uses_camera = isinstance(job.settings.rig, rigs.BlendCamera)
     followed = lightfield.scene.get("followed_camera")
     return blend.usage_notes(
-        inventory, [lightfield.frame], lightfield.render, uses_camera, followed
+        inventory,
+        [lightfield.frame],
+        lightfield.render,
+        uses_camera,
+        followed,
+        FILE_LOOK in lightfield.content,
     )
 
 

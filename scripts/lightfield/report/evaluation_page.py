@@ -47,7 +47,12 @@ def _source(dataset: Path, settings: EvaluationSettings) -> SourceDataset:
     """Return the true views of a dataset."""
     name = "" if settings.source == VIEWS else settings.source
     return SourceDataset(
-        dataset, name, settings.suffix, exposure=settings.exposure, reinhard=settings.reinhard
+        dataset,
+        name,
+        settings.suffix,
+        exposure=settings.exposure,
+        reinhard=settings.reinhard,
+        look_name=settings.look,
     )
 
 

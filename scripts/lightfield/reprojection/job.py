@@ -22,6 +22,7 @@ from lightfield.formats.sensors import sensor_files
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
+from lightfield.imaging.look import FILE_LOOK, Look
 from lightfield.imaging.sensor import SensorParameters
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import ReprojectionGeometry, Target
@@ -71,6 +72,7 @@ class ReprojectionJob:
             self.lightfield.require_centre()
         if settings.sensor and self.lightfield.transparent:
             raise UserError("sensor: does not go with transparent views")
+        self.look = self._chosen_look()
         self.passes = self._chosen_passes()
         self.lights = self._chosen_lights()
         # For each 16-bit depth map, the number of depths that no step of it can hold.
@@ -83,6 +85,26 @@ class ReprojectionJob:
                 raise UserError(f"{stage.source_receipt}: is missing, or is no receipt")
             for path, output in receipt.outputs.items():
                 self.source_sums[path] = output.stamp.sha256
+
+    def _chosen_look(self) -> Look | None:
+        """Return the look of the images, if they get one.
+
+        Raises `UserError` for images that have one already: they are no light.
+        """
+        if self.lightfield.has_look:
+            raise UserError(
+                f"{self.stage.input_cfg}: reprojection.look: its images are no light any more; "
+                "reproject the views from which they were made"
+            )
+        settings = self.settings
+        chosen = Look.of(settings.look, settings.exposure, self.lightfield.content.get(FILE_LOOK))
+        # A sensor has an exposure of its own.
+        return replace(chosen, exposure=0.0) if chosen and settings.sensor else chosen
+
+    @cached_property
+    def published(self) -> dict[str, Any]:
+        """The settings in lightfield.json and the images' headers, beside the lens."""
+        return self.settings.published(self.look)
 
     def _chosen_passes(self) -> list[Pass]:
         """Return the passes to reproject. Raises `UserError` for a pass that the views lack."""
@@ -173,7 +195,7 @@ class ReprojectionJob:
         content = {
             "version": Reproject.version,
             "map": self.geometry.map_settings(target),
-            **self.settings.development,
+            **self.settings.development(self.look),
             "depth_png": self.settings.depth_png,
             "depth": self.lightfield.content.get("depth"),
             "source": identity,
@@ -235,7 +257,7 @@ class ReprojectionJob:
             for light in self.lights
             for target in self.targets
         ]
-        changes: dict[str, Any] = {"reprojection": self.settings.published}
+        changes: dict[str, Any] = {"reprojection": self.published}
         if self.lightfield.passes:
             changes["passes"] = [each.name for each in self.passes]
         return self.lightfield.changed(lens, views, depth=depth, **changes)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -176,8 +177,10 @@ def write(
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
     image = _developed(job, target, lens_map, source, outputs, parameters)
     attributes: dict[str, Attribute] = {KEY_ATTRIBUTE: key}
-    for name, value in job.settings.published.items():
+    for name, value in job.published.items():
         attributes[f"plenoforge:{name}"] = str(value)
+    if job.look:
+        attributes["plenoforge:look"] = job.look.header
     if "exr" in outputs and image.depth is not None:
         attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
         if source.unshown is not None:
@@ -197,7 +200,9 @@ def write(
                 write_png(path, mask, {KEY_ATTRIBUTE: key})
             case _:
                 assert parameters and image.sensed
-                _write_of_sensor(kind, path, image.sensed, parameters, key)
+                look = {"look": job.look.to_json()} if job.look else {}
+                described = {"key": key, **parameters.to_json(), **look}
+                _write_of_sensor(kind, path, image.sensed, described)
         shard_log.add(path, key)
 
 
@@ -258,6 +263,10 @@ def _developed(
         if parameters:
             light[rows] = strip[:, :, :3]
             continue
+        if job.look:
+            covering = alpha if transparent else None
+            pixels[rows] = job.look.to_pixels(strip[:, :, :3], settings.bits, covering)
+            continue
         colour = tone_map(strip[:, :, :3], settings.exposure, settings.reinhard)
         if "png" in outputs:
             pixels[rows] = encode(colour)
@@ -267,30 +276,29 @@ def _developed(
     if empty.any():
         covered[empty] = 0
         half[:, empty] = 0
+        pixels[empty] = 0
         if depth is not None:
             depth[empty] = np.nan
     if parameters:
-        sensed = _sensed(light, empty, parameters, "weights" in outputs)
+        sensed = _sensed(sense(light, parameters, "weights" in outputs, job.look), empty)
         return _Image(half, sensed.pixels, covered, depth, empty, transparent, sensed)
     return _Image(half, pixels, covered, depth, empty, transparent)
 
 
-def _sensed(light: Array, empty: Array, parameters: SensorParameters, with_weights: bool) -> Sensed:
-    """Return light as a sensor sees it. Pixels without a source are 0."""
-    sensed = sense(light, parameters, with_weights)
+def _sensed(sensed: Sensed, empty: Array) -> Sensed:
+    """Return what a sensor sees, with pixels without a source as 0."""
     for pixels in (sensed.pixels, sensed.clipped, sensed.weights):
         if pixels is not None:
             pixels[empty] = 0
     return sensed
 
 
-def _write_of_sensor(
-    kind: str, path: Path, sensed: Sensed, parameters: SensorParameters, key: str
-) -> None:
-    """Write a file that lies beside the PNG of a sensor."""
+def _write_of_sensor(kind: str, path: Path, sensed: Sensed, parameters: dict[str, Any]) -> None:
+    """Write a file that lies beside the PNG of a sensor. ``parameters`` have the view's key."""
+    key = parameters["key"]
     match kind:
         case "parameters":
-            write_json(path, {"key": key, **parameters.to_json()})
+            write_json(path, parameters)
         case "clipped":
             write_png(path, sensed.clipped, {KEY_ATTRIBUTE: key, **_PNG_OPTIONS})
         case "weights":

@@ -50,6 +50,7 @@ def parameters_of(
         floor=noise.b if noise else 0.0,
         bits=settings.bits,
         seed=_number([seed, frame, "noise", settings.bracket, name + face]),
+        has_look=settings.look is not None,
     )
 
 

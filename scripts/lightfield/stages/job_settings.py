@@ -28,6 +28,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
+from lightfield.imaging import look
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
@@ -126,6 +127,8 @@ def _inventory(dataset: Dataset) -> InventorySettings:
         camera_frames=camera_frames,
         # Raise this number when the program takes or refuses other cameras.
         camera_version=1 if camera_frames else None,
+        # Raise this number when the program reads more of the .blend's look, or refuses others.
+        look_version=1 if any(each.uses_file_look for each in datasets) else None,
         followed_camera=source.followed_camera,
         light_groups=written.render.light_groups or None,
     )
@@ -164,6 +167,7 @@ def lightfield(dataset: Dataset) -> LightfieldSettings:
     return LightfieldSettings.of_capture(
         dataset,
         flow=bool(dataset.flow),
+        file_look=dataset.uses_file_look,
         fingerprint=dataset.builder_fingerprint,
         poses_sha256=sha256(file) if file else None,
     )
@@ -340,6 +344,7 @@ def _export_settings(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
         spread_version=keys.VERSIONS["spread"] if _chooses_tests(dataset, options) else None,
+        look_source=look.source_of(getattr(options, "look", None)),
         **roles,
     )
 

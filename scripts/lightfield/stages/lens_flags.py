@@ -24,6 +24,7 @@ from lightfield.core.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.imaging.look import LOOK_FLAG, LookName
 
 if TYPE_CHECKING:
     from lightfield.formats.lightfield import LightField
@@ -238,6 +239,8 @@ class ReprojectFlags(LensMapFlags):
         group="Colour",
     )
 
+    look: LookName = option(LOOK_FLAG, None, group="Colour")
+
     def settings(self, given: Mapping[str, Any]) -> Reprojection:
         formats = [name for name in ("exr", "png") if getattr(self, name)]
         if not formats:
@@ -245,8 +248,9 @@ class ReprojectFlags(LensMapFlags):
         content = self._content(given) | {"formats": formats}
         for name in ("bits", "exposure", "reinhard", "mask", "passes"):
             content[name] = getattr(self, name)
-        if self.depth_png is not None:
-            content["depth_png"] = self.depth_png
+        for name in ("depth_png", "look"):
+            if getattr(self, name) is not None:
+                content[name] = getattr(self, name)
         return checked_flags(FlagSettings, content)
 
 

@@ -11,6 +11,8 @@ from lightfield.core.names import INVENTORY, VIEWS
 from lightfield.core.setting_types import REINHARD, AtLeastOne, Stops, White
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
+from lightfield.imaging import look
+from lightfield.imaging.look import LookName
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
 
 
@@ -282,12 +284,18 @@ class EvaluationSettings(Settings):
         description=f"Tone mapping of EXR views, as in the export: the {REINHARD}",
         json_schema_extra={"unit": "light"},
     )
+    look: LookName = None
     background: Annotated[str, AfterValidator(_colour)] = Field(
         "black",
         validate_default=True,
         description="Colour behind transparent pixels: black, white or rrggbb.",
         json_schema_extra={"metavar": "COLOUR"},
     )
+
+    @model_validator(mode="after")
+    def _one_tone_curve(self) -> Self:
+        look.check_beside(self.look, self.reinhard)
+        return self
 
 
 class Evaluate(Stage[EvaluationSettings]):

@@ -131,6 +131,7 @@ class InventorySettings(Settings):
     rendered_frames: Any = cause("Frames that the rigs render.")
     camera_frames: list[float | None] | None = cause("Frames of rigs of the file's own camera.")
     camera_version: int | None = cause("Version of the choice of cameras.")
+    look_version: int | None = cause("Version of what is read of the file's look, if it is used.")
     followed_camera: str | None = cause("As in the scene YAML.")
     light_groups: Any = cause("As in the scene YAML.")
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from lightfield.core.setting_types import AtLeastOne, Stops
 from lightfield.core.stage import PlainStage, option, reads, writes
+from lightfield.imaging.look import LOOK_FLAG, LookName
 
 # A picture is made of this many views.
 BEST = 6
@@ -26,8 +27,10 @@ class Synthesize(PlainStage):
     )
     best: AtLeastOne = option("views a picture is made of", BEST, metavar="K")
     exposure: Stops | None = option(
-        "exposure of the PNGs, in stops (default: chosen from the first picture)", None
+        "exposure of the PNGs, in stops (default: chosen from the first picture; 0 with --look)",
+        None,
     )
+    look: LookName = option(LOOK_FLAG, None)
     video: bool = option("also write the video walk.mp4, with ffmpeg", False)
     rate: AtLeastOne = option("pictures per second of the video", 25)
     output: Path = writes("folder to write", metavar="FOLDER")

@@ -17,6 +17,7 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import FILE_LOOK, Look
 from lightfield.imaging.video import video
 from lightfield.stages.synthesis import Synthesize
 from lightfield.synthesis.view import Sources, reader
@@ -44,6 +45,7 @@ def run(job: Synthesize) -> None:
     targets.changed(depth=depth).write(job.output / NAME)
     rays = lens.pixel_rays()
     exposure = job.exposure
+    look = Look.of(job.look, job.exposure or 0.0, source.lightfield.content.get(FILE_LOOK))
     holes = []
     path = job.output / "walk.mp4"
     progress = Progress(len(targets.views), "synthesize", "views")
@@ -56,7 +58,8 @@ def run(job: Synthesize) -> None:
             images.write_exr(
                 job.output / "exr" / f"{view.name}.exr", synthesised.channels(depth, rays)
             )
-            picture = pictures.develop(np.nan_to_num(synthesised.colour), exposure)
+            colour = np.nan_to_num(synthesised.colour)
+            picture = look.to_pixels(colour, 8) if look else pictures.develop(colour, exposure)
             opaque = np.where(np.isfinite(synthesised.colour[..., 0]), 255, 0).astype(np.uint8)
             images.write_png(job.output / "png" / f"{view.name}.png", np.dstack([picture, opaque]))
             if add_to_video:

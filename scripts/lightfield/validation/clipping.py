@@ -114,7 +114,9 @@ def _developments(
     """Yield the PNG reprojections, and the exports that develop EXR views."""
     for number, image_set in enumerate(sets):
         if number in sets_of_png:
-            is_known = not (image_set.sensor or image_set.lightfield.is_relit)
+            lightfield = image_set.lightfield
+            # A look brings bright light below white.
+            is_known = not (image_set.sensor or lightfield.is_relit or lightfield.has_look)
             settings = image_set.lightfield.content.get("reprojection", {})
             if is_known and 0 in lights and not sets[0].name:
                 yield _Development(
@@ -128,7 +130,8 @@ def _developments(
         elif number in lights:
             for path in lists_of(dataset, image_set, IN_FOLDERS, export_lists):
                 options = _options(path)
-                if "exposure" in options and options.get("format") != "exr":
+                is_developed = "exposure" in options and options.get("format") != "exr"
+                if is_developed and "look" not in options:
                     yield _Development(
                         f"{path.parent.parent.relative_to(dataset).as_posix()}/",
                         path.parent.name,

@@ -93,6 +93,8 @@ def has_same_light(target: ImageSet) -> bool:
     """Return whether the views show the light of their source, with a known tone mapping."""
     lightfield = target.lightfield
     is_changed = lightfield.is_relit or lightfield.transparent or target.sensor is not None
+    # A look mixes channels, so its colours do not lie between the looks of the colours around.
+    is_changed |= lightfield.has_look
     return "reprojection" in lightfield.content and not is_changed
 
 
