@@ -26,29 +26,32 @@ def run(main: Callable[[], None], error_status: int = 1) -> None:
     """
     sys.argv[1:] = map(_as_value, sys.argv[1:])
     print_everywhere()
-    guarded(main, error_status)
+    try:
+        guarded(main)
+    except SystemExit as end:
+        # Python prints a message, and then exits with status 1.
+        if not isinstance(end.code, str) or error_status == 1:
+            raise
+        print(end.code, file=sys.stderr)
+        sys.exit(error_status)
 
 
-def guarded(main: Callable[[], None], error_status: int = 1) -> None:
+def guarded(main: Callable[[], None]) -> None:
     """Run ``main``, and end as `run` does if it raises an exception."""
     try:
         main()
     except UserError as error:
-        problem = str(error)
+        sys.exit(f"error: {error}")
     except MemoryError:
-        problem = f"out of memory: {LESS_MEMORY}"
+        sys.exit(f"error: out of memory: {LESS_MEMORY}")
     except KeyboardInterrupt:
-        problem = "interrupted"
+        sys.exit("error: interrupted")
     except BrokenPipeError:
         # The program that read our output has ended, as `head` does: print nothing more.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(error_status)
+        sys.exit(1)
     except OSError as error:
-        problem = _refusal(error)
-    else:
-        return
-    print(f"error: {problem}", file=sys.stderr)
-    sys.exit(error_status)
+        sys.exit(f"error: {_refusal(error)}")
 
 
 def _refusal(error: OSError) -> str:
