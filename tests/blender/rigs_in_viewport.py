@@ -7,6 +7,7 @@ of this file and its arguments. OUTPUT gets the list of what they return.
 import importlib
 import json
 import sys
+import types
 from pathlib import Path
 
 import bpy
@@ -174,6 +175,43 @@ def facts(name):
     scene = bpy.context.scene
     obj = bpy.data.objects[name]
     return module.panel.facts(scene, module.panel.rig_objects.rig_of(scene, obj)[0], obj)
+
+
+class Layout:
+    """A layout without windows. It takes what Blender's takes, and notes the texts."""
+
+    def __init__(self, texts):
+        self.texts = texts
+
+    def __getattr__(self, name):
+        function = bpy.types.UILayout.bl_rna.functions[name]
+
+        def add(*arguments, **options):
+            names = [each.identifier for each in function.parameters if not each.is_output]
+            given = dict(zip(names, arguments, strict=False)) | options
+            assert given.keys() <= {*names}
+            if "icon" in given:
+                assert given["icon"] in function.parameters["icon"].enum_items
+            if "property" in given and "data" in given:
+                assert given["property"] in given["data"].bl_rna.properties
+                self.texts.append(str(getattr(given["data"], given["property"])))
+            if "operator" in given:
+                group, operator = given["operator"].split(".")
+                operator_type = getattr(getattr(bpy.ops, group), operator).get_rna_type()
+                self.texts.append(given.get("text") or operator_type.name)
+                return types.SimpleNamespace()
+            self.texts += [given["text"]] if "text" in given else []
+            return Layout(self.texts)
+
+        return add
+
+
+def panel():
+    """Return the texts of the panel."""
+    texts = []
+    drawn = types.SimpleNamespace(layout=Layout(texts))
+    package().panel.RigPanel.draw(drawn, bpy.context)
+    return texts
 
 
 def main():

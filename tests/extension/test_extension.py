@@ -214,6 +214,29 @@ def test_handles_and_the_panel_change_the_yaml_and_nothing_else(blender, project
         np.testing.assert_allclose(cosines, np.linalg.norm(ahead - places, axis=1), atol=1e-5)
 
 
+def test_the_panel_shows_the_active_rig(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    *_, nothing, _, _, texts = blender(
+        "register", "panel", opened(path), ("select", ["wall"]), "panel"
+    )
+    assert nothing == ["Open scene YAML", "Add rig", "Remove", "Check cameras", "Write YAML"]
+    assert texts == [
+        "Open scene YAML",
+        "mine.yaml",
+        *("around", "wall", "walk"),
+        *("Add rig", "Remove"),
+        *("wall", "3", "2"),
+        "Type: plane",
+        "Cameras: 6",
+        "Size: 1 × 1 × 1 m",
+        "Spacing: 0.5 m",
+        "Lens: rectilinear, 31.18 mm",
+        "Resolution: 64 × 48",
+        "Inside objects: 0",
+        *("Check cameras", "Write YAML"),
+    ]
+
+
 def test_a_rig_is_added_below_the_last_one(blender, project):
     """The last line may be that of a rig, with or without a line break."""
     path = project / "configs/scenes/mine.yaml"
