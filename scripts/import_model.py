@@ -1,4 +1,4 @@
-"""Make a scene from a model file in glTF, USD, OBJ, PLY or STL, and save it as a .blend.
+"""Make a scene from a model file in glTF, USD, FBX, OBJ, PLY or STL, and save it as a .blend.
 
 A settings file is JSON: {"model": "chair.glb", "unit": "box", "light": "softboxes"}.
 """

@@ -652,12 +652,12 @@ EXPLAINED = [
     ("scene.parameters", {"balls": 3}, "scene.parameters.balls: unknown key; allowed here: seed"),
     ("scene.parameters", 3, "scene.parameters: is 3; must be a mapping of keys to values"),
     ("scene.blend", "a.blend", "scene: must have one of builder, blend, model and dataset"),
-    ("scene", {"model": "a.fbx"}, 'scene.model: is "a.fbx"; must be a path that ends in .glb'),
+    ("scene", {"model": "a.dae"}, 'scene.model: is "a.dae"; must be a path that ends in .fbx'),
     ("scene", {"model": "a{b}.glb"}, 'scene.model: is "a{b}.glb"; must be a path that ends in'),
     (
         "scene",
         {"model": "a.glb", "up": "z"},
-        "scene.up: is only for OBJ, PLY and STL; glTF and USD files define it themselves",
+        "scene.up: is only for OBJ, PLY and STL; glTF, USD and FBX files define it themselves",
     ),
     (
         "scene",

@@ -1,4 +1,4 @@
-"""Exports a model with Blender to five formats, imports each again, and renders it.
+"""Exports a model with Blender to six formats, imports each again, and renders it.
 
 Runs in a process of its own, because bpy keeps one global state. The argument is a folder. It gets
 the models. It also gets the records of all imports by name in records.json, and pictures
@@ -20,10 +20,11 @@ from scenes.library.scene import Scene
 from scenes.library.shapes import box, transform
 
 RED = (0.9, 0.1, 0.05, 1)
-FILES = ("shape.glb", "shape.gltf", "shape.obj", "shape.ply", "shape.stl")
+FILES = ("shape.fbx", "shape.glb", "shape.gltf", "shape.obj", "shape.ply", "shape.stl")
 FILES += ("shape.usda", "shape.usdc", "shape.usdz")
 # Imports of which the tests need only the record.
-NOT_SHOWN = ("metres", "turned", "city", "first frame", "glowing.glb", "glowing.obj")
+NOT_SHOWN = ("metres", "turned", "city", "first frame", "glowing.fbx", "glowing.glb")
+NOT_SHOWN += ("glowing.obj",)
 
 
 def textured(path):
@@ -63,6 +64,7 @@ def build(folder):
 
 def export(folder):
     paths = {file: str(folder / file) for file in FILES}
+    bpy.ops.export_scene.fbx(filepath=paths["shape.fbx"], path_mode="RELATIVE")
     bpy.ops.export_scene.gltf(filepath=paths["shape.glb"], export_lights=True, export_cameras=True)
     bpy.ops.export_scene.gltf(filepath=paths["shape.gltf"], export_format="GLTF_SEPARATE")
     bpy.ops.wm.obj_export(filepath=paths["shape.obj"], path_mode="RELATIVE")
@@ -77,6 +79,7 @@ def export_others(folder):
     shader = bpy.data.materials["red"].node_tree.nodes["Principled BSDF"]
     shader.inputs["Emission Color"].default_value = RED
     shader.inputs["Emission Strength"].default_value = 1
+    bpy.ops.export_scene.fbx(filepath=str(folder / "glowing.fbx"))
     bpy.ops.export_scene.gltf(filepath=str(folder / "glowing.glb"))
     bpy.ops.wm.obj_export(filepath=str(folder / "glowing.obj"))
     shader.inputs["Emission Strength"].default_value = 0
@@ -86,6 +89,7 @@ def export_others(folder):
     cone.keyframe_insert("location", index=0, frame=11)
     bpy.data.objects["slab"].scale = (-1, 1, 1)
     bpy.context.scene.frame_end = 11
+    bpy.ops.export_scene.fbx(filepath=str(folder / "moving.fbx"))
     bpy.ops.export_scene.gltf(filepath=str(folder / "moving.glb"))
     bpy.ops.wm.usd_export(filepath=str(folder / "moving.usdc"), export_animation=True)
 
@@ -134,7 +138,9 @@ def main():
         ("city", {"model": str(folder / "shape.glb"), "light": "city"}),
         ("first frame", moving),
         ("last frame", moving | {"frame": 11}),
+        ("moving.fbx", {"model": str(folder / "moving.fbx"), "frame": 11}),
         ("moving.usdc", {"model": str(folder / "moving.usdc"), "frame": 11}),
+        ("glowing.fbx", {"model": str(folder / "glowing.fbx")}),
         ("glowing.glb", {"model": str(folder / "glowing.glb")}),
         ("glowing.obj", {"model": str(folder / "glowing.obj")}),
     ]

@@ -1,4 +1,4 @@
-"""Scenes of model files: upright, of unit size and textured in five formats, or refused."""
+"""Scenes of model files: upright, of unit size and textured in six formats, or refused."""
 
 import base64
 import json
@@ -20,8 +20,8 @@ from lightfield.core.errors import UserError
 from lightfield.rendering import model_files
 
 # The files of `exported_models`.
-FORMATS = ("glb", "gltf", "obj", "ply", "stl", "usda", "usdc", "usdz")
-TEXTURED = ("glb", "gltf", "obj", "usda", "usdc", "usdz")
+FORMATS = ("fbx", "glb", "gltf", "obj", "ply", "stl", "usda", "usdc", "usdz")
+TEXTURED = ("fbx", "glb", "gltf", "obj", "usda", "usdc", "usdz")
 # The model of 2 × 1 × 3 m in a box of 1 m.
 HALF = np.array([2, 1, 3]) / 3 / 2
 
@@ -91,7 +91,7 @@ def test_softboxes_do_without_the_light_tree(renders, name):
     assert not renders.records[name]["sampling"]["light_tree"]
 
 
-@pytest.mark.parametrize("name", ["glowing.glb", "glowing.obj", "city"])
+@pytest.mark.parametrize("name", ["glowing.fbx", "glowing.glb", "glowing.obj", "city"])
 def test_models_that_glow_and_environments_keep_the_light_tree(renders, name):
     assert renders.records[name]["sampling"]["light_tree"]
 
@@ -110,6 +110,7 @@ def test_another_light_of_the_softboxes_leaves_models_in_environments_alone(monk
 @pytest.mark.parametrize(
     ("name", "files"),
     [
+        ("shape.fbx", {"shape.fbx", "red.png"}),
         ("shape.glb", {"shape.glb"}),
         ("shape.gltf", {"shape.gltf", "shape.bin", "red.png"}),
         ("shape.obj", {"shape.obj", "shape.mtl", "red.png"}),
@@ -150,7 +151,7 @@ def test_the_ground_catches_the_shadow_of_the_model(renders):
     np.testing.assert_allclose(box, [-HALF, HALF], atol=1e-5)
 
 
-@pytest.mark.parametrize("name", ["last frame", "moving.usdc"])
+@pytest.mark.parametrize("name", ["last frame", "moving.fbx", "moving.usdc"])
 def test_an_animated_model_is_measured_at_its_frame(renders, name):
     """The cone moves 4 m to the left. So the model is 5 m wide, and the slab at its right end."""
     low, high = np.array(renders.records[name]["box"])
@@ -441,7 +442,7 @@ def test_a_file_of_another_format_is_said_not_to_be_gltf(tmp_path, name, content
     assert "codec" not in message and message.isprintable()
 
 
-@pytest.mark.parametrize("name", ["glb", "gltf", "ply", "stl", "usda", "usdc", "usdz"])
+@pytest.mark.parametrize("name", ["fbx", "glb", "gltf", "ply", "stl", "usda", "usdc", "usdz"])
 def test_half_a_model_is_refused_in_one_line(renders, tmp_path, monkeypatch, name):
     """Half of an OBJ is a smaller OBJ: nothing in it says how much is missing."""
     content = (renders.folder / f"shape.{name}").read_bytes()

@@ -49,7 +49,7 @@ class ModelOptions(Settings):
     up: Literal["auto", "y", "z"] = Field(
         "auto",
         description="Axis that points up in an OBJ, PLY or STL model. auto: y for OBJ, z for PLY "
-        "and STL. glTF and USD files define it themselves.",
+        "and STL. glTF, USD and FBX files define it themselves.",
     )
     ground: bool = Field(
         False,
@@ -79,7 +79,7 @@ def check_model(model: str, up: str) -> None:
     """Raise a ValueError if ``up`` is given for a model that says itself which axis points up."""
     if up != "auto" and Path(model).suffix.lower() not in UP:
         raise ValueError(
-            "up: is only for OBJ, PLY and STL; glTF and USD files define it themselves"
+            "up: is only for OBJ, PLY and STL; glTF, USD and FBX files define it themselves"
         )
 
 
@@ -161,8 +161,8 @@ class Origin(Settings):
     )
     model: ModelPath | None = Field(
         None,
-        description="Path of a model file (glTF, USD, OBJ, PLY or STL), relative to the folder in "
-        "which Snakemake runs.",
+        description="Path of a model file (glTF, USD, FBX, OBJ, PLY or STL), relative to the "
+        "folder in which Snakemake runs.",
     )
     dataset: str | None = Field(
         None,

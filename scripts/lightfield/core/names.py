@@ -24,7 +24,7 @@ CORPUS = "corpus.json"
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 
 # The formats of model files that scripts/import_model.py reads.
-MODELS = (".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")
+MODELS = (".fbx", ".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz")
 # The usual up axis of formats whose files do not say which axis points up.
 UP = {".obj": "y", ".ply": "z", ".stl": "z"}
 SOFTBOXES = "softboxes"

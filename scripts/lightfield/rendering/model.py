@@ -1,4 +1,4 @@
-"""Makes a scene of a model file in glTF, USD, OBJ, PLY or STL, with Blender's importers."""
+"""Makes a scene of a model file in glTF, USD, FBX, OBJ, PLY or STL, with Blender's importers."""
 
 import logging
 import os
@@ -109,6 +109,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     blend_file.new_scene()
     skipped, printed = _import(path, settings.up)
     left_out += skipped
+    if path.suffix.lower() == ".fbx":
+        left_out += _forget_folders()
     unread_materials = _unread_materials()
     left_out += [
         f"the shader of the material {printable(material.name)}, which is no UsdPreviewSurface, "
@@ -178,6 +180,7 @@ def _import(path: Path, up: str) -> tuple[list[str], bytes]:
     if suffix in UP:
         options |= _AXES[UP[suffix] if up == "auto" else up]
     operators: dict[str, Callable[..., set[str]]] = {
+        "fbx": bpy.ops.wm.fbx_import,
         "gltf": bpy.ops.import_scene.gltf,
         "obj": bpy.ops.wm.obj_import,
         "ply": bpy.ops.wm.ply_import,
@@ -285,6 +288,21 @@ def _textures(path: Path, references: Sequence[FileReference]) -> Iterator[FileR
 def _images() -> list[Any]:
     """Return the images that the importer has loaded from files."""
     return [image for image in bpy.data.images if image.source in ("FILE", "TILED", "SEQUENCE")]
+
+
+def _forget_folders() -> list[str]:
+    """Remove textures whose path is a folder, and return them as parts that are left out.
+
+    Blender takes the model's folder for a texture of an FBX that has no relative path.
+    """
+    folders = [
+        image
+        for image in _images()
+        if not image.packed_files and any(file.is_dir() for file in _image_files(image))
+    ]
+    for image in folders:
+        bpy.data.images.remove(image)
+    return ["it has a texture without a relative path"] if folders else []
 
 
 def _image_files(image: Any) -> list[Path]:

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
-from lightfield.rendering import obj_files, ply_files, usd_files
+from lightfield.rendering import fbx_files, obj_files, ply_files, usd_files
 from lightfield.rendering.model_references import FileReference, Survey
 
 
@@ -53,6 +53,8 @@ def check(path: Path) -> None:
             least = ply_files.least_bytes(path)
             if size < least:
                 raise UserError(f"{path}: is cut short: it has {size} bytes of at least {least}")
+        case ".fbx":
+            fbx_files.check(path)
         case ".usdz" if not zipfile.is_zipfile(path):
             raise UserError(f"{path}: is cut short, or not a USDZ file, which is a ZIP archive")
 
@@ -76,6 +78,8 @@ def survey(path: Path) -> Survey:
             return obj_files.survey(path)
         case ".usd" | ".usda" | ".usdc" | ".usdz":
             return usd_files.survey(path)
+        case ".fbx":
+            return fbx_files.survey(path)
         case _:
             return Survey([], [])
 

@@ -82,7 +82,7 @@ class ImportSettings(ModelOptions):
 
 
 class ImportModel(Stage[ImportSettings]):
-    """Makes a scene from a model file in glTF, USD, OBJ, PLY or STL."""
+    """Makes a scene from a model file in glTF, USD, FBX, OBJ, PLY or STL."""
 
     name = "import_model"
     function = "lightfield.rendering.model:import_model"
