@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 LIBRARY = ROOT / "scripts" / "lightfield"
 # The parts of the library that the extension uses, and all that they import.
-PARTS = ("core", "geometry", "formats", "configuration", "rendering/clearance.py")
+PARTS = ("core", "geometry", "imaging", "formats", "configuration", "rendering/clearance.py")
 # Wheels for the Pythons of Blender 5.0 and later, on the systems that the manifest names.
 PACKAGES = "pydantic pydantic-core pyyaml annotated-types typing-extensions typing-inspection"
 LOCK = ROOT / "envs" / "requirements-3.13.txt"

@@ -113,6 +113,13 @@ def ball(center, properties):
         setattr(bpy.context.object, name, value)
 
 
+def type_location(name, location):
+    """Type a location into Blender's own panel: the undo step is made before anything is drawn."""
+    bpy.data.objects[name].location = location
+    push("typed")
+    bpy.context.view_layer.update()
+
+
 def parent(name):
     other = bpy.data.objects.new("other", None)
     other.location.x = 1

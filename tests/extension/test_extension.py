@@ -280,19 +280,22 @@ def test_rigs_are_added_removed_copied_and_renamed(blender, project):
 
 def test_undo_brings_the_drawing_back(blender, project):
     path = project / "configs/scenes/mine.yaml"
-    *_, before, _, after, _, _, undone = blender(
+    *_, before, _, after, _, _, undone, _, undone_again = blender(
         "register",
         opened(path),
         ("push", ["opened"]),
         "rigs",
-        ("change", ["around"], {"location": [1, 0, 0]}),
+        ("type_location", ["around", [1, 0, 0]]),
         "rigs",
-        ("push", ["moved"]),
+        ("type_location", ["around", [2, 0, 0]]),
+        "undo",
+        "rigs",
         "undo",
         "rigs",
     )
     assert before["around"] != after["around"]
-    assert undone == before
+    assert undone == after
+    assert undone_again == before
 
 
 @pytest.mark.parametrize(
