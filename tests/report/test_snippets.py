@@ -14,6 +14,7 @@ import OpenImageIO as oiio
 import pytest
 import trimesh
 from checkouts import ROOT
+from reading.test_reading import CREDITS
 from test_report_html import SPHERE, make_page, write_dataset
 
 from lightfield.configuration.scene_yaml import Credits
@@ -21,6 +22,7 @@ from lightfield.core.files import sha256, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.report import package
+from lightfield.report.publish import publish
 
 FRAMES = ("f00001", "f00002", "f00003")
 TUTORIAL = ROOT / "docs/tutorials/first-dataset.md"
@@ -157,6 +159,15 @@ def check_reading(code, built):
     assert names["origins"].shape == names["directions"].shape == (64, 64, 3)
     assert names["pixels"].shape == (1, 2)
     assert names["visible"].shape == (1,)
+
+
+def test_the_published_readme_s_code_reads_the_shards(built, tmp_path, monkeypatch):
+    folder = tmp_path / "published/garden_LFSphere"
+    publish(built.rig, folder.name, Credits.model_validate(CREDITS), folder, None)
+    readme = (folder / "README.md").read_text()
+    (code,) = re.findall(r"```python\n(from lightfield.*?)```", readme, re.S)
+    monkeypatch.chdir(folder.parent)
+    check_reading(code, built)
 
 
 def test_the_page_s_code_reads_the_arrays_that_it_names(built, monkeypatch):
