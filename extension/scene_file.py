@@ -41,7 +41,7 @@ def write(path: Path, rigs: Rigs, removed: set[str], blend: Path | None, is_save
     anything if the YAML would not be valid, or if the .blend is not saved.
     """
     folder = home(path)
-    text = read_settings_text(path, path.name) if path.exists() else _new(blend, folder)
+    text = read_settings_text(path, path.name) if path.exists() else _new(path, blend, folder)
     text = _with_rigs(text, rigs, removed, path.name)
     with chdir(folder):
         scene = check_scene(text, path.name)
@@ -57,13 +57,21 @@ def write(path: Path, rigs: Rigs, removed: set[str], blend: Path | None, is_save
     return f"{path.name} written"
 
 
-def _new(blend: Path | None, folder: Path) -> str:
-    """Return the text of a scene YAML for a .blend, with no rigs yet."""
+def _new(path: Path, blend: Path | None, folder: Path) -> str:
+    """Return the text of a scene YAML for a .blend, with no rigs yet.
+
+    In the repository, its first line tells editors the schema.
+    """
     if blend is None:
         raise UserError("the .blend has no file yet; save it, or open a scene YAML")
     inside = blend.is_relative_to(folder)
     source = blend.relative_to(folder) if inside else blend
-    return f"scene:\n  blend: {_flow(str(source))}\n\nrender:\n  samples: file\n\nrigs:\n"
+    schema = "schema/scene.schema.json"
+    # The folder scenes may not exist yet.
+    has_schema = (path.parent.parent / schema).is_file()
+    first_line = f"# yaml-language-server: $schema=../{schema}\n" if has_schema else ""
+    blocks = f"scene:\n  blend: {_flow(str(source))}\n\nrender:\n  samples: file\n\nrigs:\n"
+    return first_line + blocks
 
 
 def _with_rigs(text: str, rigs: Rigs, removed: set[str], file: str) -> str:

@@ -342,6 +342,19 @@ def test_a_blend_without_a_yaml_gets_one(blender, tmp_path):
     assert read_scene(path).rigs["hemisphere_1"].view_count == 50
 
 
+def test_a_new_yaml_in_the_repository_tells_editors_the_schema(blender, tmp_path):
+    schema = tmp_path / "configs/schema/scene.schema.json"
+    schema.parent.mkdir(parents=True)
+    schema.write_text("{}")
+    path = tmp_path / "configs/scenes/character.yaml"
+    add = ("press", ["add"], {"type": "hemisphere"})
+    save = ("save", [str(tmp_path / "character.blend")])
+    assert blender("register", add, save, written(path))[-1] is None
+    first_line = path.read_text().splitlines()[0]
+    named = first_line.removeprefix("# yaml-language-server: $schema=")
+    assert (path.parent / named).resolve() == schema
+
+
 def test_light_fields_of_silvrs_addon_become_rigs(blender, run_program, tmp_path):
     """The add-on is not installed when the .blend is read."""
     blend = tmp_path / "old.blend"
