@@ -17,14 +17,15 @@ from lightfield.export.source import SourceDataset
 from lightfield.formats import blend
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.imaging import images, look
-from lightfield.imaging.look import FILE_LOOK, Look
+from lightfield.imaging import blender_looks, images
+from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.look import Look
 from lightfield.imaging.sensor import SensorParameters, light_of
 from lightfield.validation.validate import validate
 
 SIZE = 32
 CAMERA = {"lens": "rectilinear", "fov": 60, "resolution": [SIZE, SIZE]}
-VIEWS = look.views()
+VIEWS = blender_looks.views()
 # Exposures with gammas.
 TRIED = [(0.0, 1.0), (0.7, 1.0), (-1.3, 1.4)]
 
@@ -80,7 +81,7 @@ def of_blender(folder, bits, alpha=None, **settings):
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("bits", [8, 16])
 def test_each_look_gives_blenders_own_pixels(view, bits, tmp_path):
-    for name in ("None", *look.looks(view)):
+    for name in ("None", *blender_looks.looks(view)):
         for (exposure, gamma), alpha in itertools.product(TRIED, (None, coverage())):
             expected = of_blender(
                 tmp_path,
@@ -111,7 +112,7 @@ def test_the_names_of_looks_are_blenders():
     for view in VIEWS:
         settings.view_transform = view
         # Blender has looks for a view transform that shows numbers, too.
-        assert names("look") == ["None", *look.looks(view)] or view == "Raw"
+        assert names("look") == ["None", *blender_looks.looks(view)] or view == "Raw"
 
 
 @pytest.mark.parametrize("name", ["AgX", "AgX - Punchy", "Filmic - High Contrast", "False Color"])
@@ -301,5 +302,5 @@ def test_a_look_changes_neither_other_jobs_nor_rendered_views(tmp_path):
 
 def test_another_bpy_or_configuration_makes_the_pictures_again():
     (made,) = developments(reprojections={"png": {"look": "AgX"}}).values()
-    assert made.as_json()["look_source"] == look.source_of("AgX")
-    assert look.source()["config_sha256"] in made.as_json()["look_source"]
+    assert made.as_json()["look_source"] == blender_looks.source_of("AgX")
+    assert blender_looks.source()["config_sha256"] in made.as_json()["look_source"]

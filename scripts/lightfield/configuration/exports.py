@@ -21,8 +21,8 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
-from lightfield.imaging import look
-from lightfield.imaging.look import LookName
+from lightfield.imaging import blender_looks
+from lightfield.imaging.blender_looks import LookName
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
@@ -109,7 +109,7 @@ class Developed(Export):
 
     @model_validator(mode="after")
     def _one_tone_curve(self) -> Self:
-        look.check_beside(self.look, self.reinhard)
+        blender_looks.check_beside(self.look, self.reinhard)
         return self
 
     @property

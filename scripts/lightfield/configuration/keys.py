@@ -25,7 +25,7 @@ from lightfield.core.names import BUILDERS, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, LightField, View
-from lightfield.imaging.look import FILE_LOOK
+from lightfield.imaging.blender_looks import FILE_LOOK
 
 # The versions of the steps that make views. The keys of the views that a step concerns have its
 # version, and no other keys have it. Raise a version when equal settings give other files.

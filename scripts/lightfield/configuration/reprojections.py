@@ -18,8 +18,9 @@ from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
-from lightfield.imaging import look
-from lightfield.imaging.look import Look, LookName
+from lightfield.imaging import blender_looks
+from lightfield.imaging.blender_looks import LookName
+from lightfield.imaging.look import Look
 
 MOST_SAMPLES = 64
 """Samples along each side of a pixel."""
@@ -81,7 +82,7 @@ class ReprojectionOptions(Settings):
 
     @model_validator(mode="after")
     def _one_tone_curve(self) -> Self:
-        look.check_beside(self.look, self.reinhard)
+        blender_looks.check_beside(self.look, self.reinhard)
         return self
 
     @model_validator(mode="after")
@@ -280,7 +281,7 @@ class ReprojectionEntry(ReprojectionOptions):
             passes=self.passes,
             relight=light,
             primaries=self.primaries,
-            look_source=look.source_of(self.look),
+            look_source=blender_looks.source_of(self.look),
         )
 
 

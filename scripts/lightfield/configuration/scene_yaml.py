@@ -48,7 +48,7 @@ from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
-from lightfield.imaging import look
+from lightfield.imaging import blender_looks
 
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.
@@ -307,7 +307,9 @@ class Scene(Credits):
             **{f"exports.{name}": export for name, export in self.exports.selected.items()},
             "sensor": self.sensor,
         }
-        return [f"{key}.look" for key, block in blocks.items() if _look_of(block) == look.FILE]
+        return [
+            f"{key}.look" for key, block in blocks.items() if _look_of(block) == blender_looks.FILE
+        ]
 
     @property
     def developments(self) -> dict[str, Reprojection]:
@@ -332,7 +334,7 @@ class Scene(Credits):
                 formats=["png"],
                 sensor=sensor,
                 look=sensor.look,
-                look_source=look.source_of(sensor.look),
+                look_source=blender_looks.source_of(sensor.look),
             )
             for name, sensor in self.sensor.folders(source).items()
         }

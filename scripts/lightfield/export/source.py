@@ -15,7 +15,8 @@ from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.imaging.look import FILE_LOOK, Look
+from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.look import Look
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

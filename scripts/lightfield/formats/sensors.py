@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
 from lightfield.core.names import VIEWS
 from lightfield.core.settings import Settings, as_list, checked
-from lightfield.imaging.look import LookName
+from lightfield.imaging.blender_looks import LookName
 
 # The files beside a view of a bracket, by their kinds.
 BRACKET_FILES = {"clipped": "{view}_clipped.png", "weights": "{view}_weights.exr"}

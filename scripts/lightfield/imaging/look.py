@@ -1,178 +1,33 @@
-"""Develops light to display pixels as Blender does: its view transforms and looks.
+"""Develops light to display pixels as Blender does: its view transforms and looks."""
 
-Blender's own OpenColorIO and its configuration do it. They lie in bpy's package, and are used
-without importing bpy. Every version of bpy brings the library that can read its configuration.
-"""
-
-import hashlib
-import importlib.util
 import json
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
-from importlib import metadata
-from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import suggestion
+from lightfield.imaging.blender_looks import (
+    DISPLAY,
+    FILE,
+    NO_LOOK,
+    blender,
+    is_data,
+    looks,
+    source,
+    view_and_look,
+)
 from lightfield.imaging.primaries import REC_709, white_balance
 
 Floats = NDArray[np.float32]
 
-FILE = "file"
-"""Instead of a look's name: the look of the .blend."""
-FILE_LOOK = "file_look"
-"""The key of lightfield.json with the look of the .blend, if something is developed with it."""
-
-# Our pictures are sRGB.
-_DISPLAY = "sRGB"
 # Blender's name for the colour space of all light here.
 _LIGHT = "Linear Rec.709"
-# Blender's name for no look.
-_NO_LOOK = "None"
-# What stands between a view transform and a look, also in Blender's own names.
-_SEPARATOR = " - "
 # Brighter light would become NaN.
 _BRIGHTEST = 1e6
-
-
-class _Blender(NamedTuple):
-    """Blender's OpenColorIO, its configuration, and the SHA-256 of this file."""
-
-    ocio: Any
-    config: Any
-    sha256: str
-
-
-@cache
-def _blender() -> _Blender:
-    """Load Blender's colour management. Raises `UserError` without bpy's package."""
-    package = importlib.util.find_spec("bpy")
-    if package is None or package.origin is None:
-        raise UserError("look: needs Blender's colours, which the package bpy brings; install bpy")
-    folder = Path(package.origin).parent
-    (file,) = folder.glob("*/datafiles/colormanagement/config.ocio")
-    (library,) = folder.glob("*/python/lib/python*/site-packages/PyOpenColorIO")
-    ocio = _import(library)
-    return _Blender(
-        ocio,
-        ocio.Config.CreateFromFile(str(file)),
-        hashlib.sha256(file.read_bytes()).hexdigest(),
-    )
-
-
-def _import(library: Path) -> Any:
-    """Import a package from a folder that is not in Python's path."""
-    if library.name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            library.name, library / "__init__.py", submodule_search_locations=[str(library)]
-        )
-        assert spec and spec.loader
-        module = importlib.util.module_from_spec(spec)
-        # The package imports its own library by this name.
-        sys.modules[library.name] = module
-        spec.loader.exec_module(module)
-    return sys.modules[library.name]
-
-
-def source() -> dict[str, str]:
-    """Return what the pixels of all looks depend on: bpy's version, and its configuration."""
-    return {"bpy": metadata.version("bpy"), "config_sha256": _blender().sha256}
-
-
-def source_of(name: str | None) -> str | None:
-    """Return `source` as a text, for the settings of a job. None without a look."""
-    return None if name is None else " ".join(source().values())
-
-
-def views() -> list[str]:
-    """Return the names of Blender's view transforms."""
-    ocio, config, _ = _blender()
-    # With these arguments, environment variables hide no view.
-    return [*config.getViews(ocio.VIEW_DISPLAY_DEFINED, _DISPLAY)]
-
-
-def looks(view: str) -> list[str]:
-    """Return the names of the looks that Blender has for a view transform.
-
-    A look whose name begins with a view transform is for this one alone. The looks without such a
-    name are for the view transforms that have none of their own.
-    """
-    if _is_data(view):
-        return []
-    names = [look.getName() for look in _blender().config.getLooks()]
-    own = [name for name in names if name.partition(_SEPARATOR)[0] == view]
-    return own or [name for name in names if _SEPARATOR not in name]
-
-
-def _is_data(view: str) -> bool:
-    """Return whether a view transform shows numbers as they are.
-
-    Versions of Blender differ by up to 117 levels of 255 in what a look does to such a picture.
-    """
-    config = _blender().config
-    space = config.getColorSpace(config.getDisplayViewColorSpaceName(_DISPLAY, view))
-    return bool(space and space.isData())
-
-
-def view_and_look(name: str) -> tuple[str, str]:
-    """Return the view transform and the look in a name such as AgX or AgX - Punchy.
-
-    Raises ``ValueError`` for another name.
-    """
-    view, separator, look = name.partition(_SEPARATOR)
-    if view not in views():
-        hint = suggestion(view, views())
-        raise ValueError(f"must be none, {FILE}, or one of {', '.join(views())}{hint}")
-    if not separator:
-        return view, _NO_LOOK
-    shown = {each.removeprefix(f"{view}{_SEPARATOR}"): each for each in looks(view)}
-    if look not in shown:
-        allowed = [f"{view}{_SEPARATOR}{each}" for each in shown]
-        if not allowed:
-            raise ValueError(f"must be {view} without a look")
-        hint = suggestion(name, allowed)
-        raise ValueError(f"must be one of {', '.join(allowed)}{hint}")
-    return view, shown[look]
-
-
-def _checked(name: str | None) -> str | None:
-    """Return the name of a look, or None for ``none``. Raises ``ValueError`` if there is none."""
-    if name is None or name == "none":
-        return None
-    if name != FILE:
-        view_and_look(name)
-    return name
-
-
-LOOK_FLAG = (
-    "Blender's look of PNGs: file, as lightfield.json has it from the .blend; or a view transform "
-    "of Blender, alone or with a look, such as AgX or AgX - Punchy"
-)
-LookName = Annotated[
-    str | None,
-    AfterValidator(_checked),
-    Field(
-        description="Blender's look, instead of plain sRGB. none: no look. file: as the .blend "
-        "sets it, with its exposure, gamma, curves and white balance. Otherwise a view transform "
-        "of Blender, such as AgX, Filmic or Khronos PBR Neutral, or one with a look, such as "
-        "AgX - Punchy."
-    ),
-]
-
-
-def check_beside(name: str | None, reinhard: float, key: str = "look") -> None:
-    """Raise ``ValueError`` for a look beside a tone mapping of its own."""
-    if name is not None and reinhard != 1:
-        raise ValueError(
-            f"reinhard: does not go with {key}, which tone maps; leave out one of them"
-        )
 
 
 @dataclass(frozen=True)
@@ -221,7 +76,7 @@ class Look:
     """
 
     view: str
-    look: str = _NO_LOOK
+    look: str = NO_LOOK
     exposure: float = 0.0
     gamma: float = 1.0
     white: list[float] | None = None
@@ -245,14 +100,14 @@ class Look:
                 "look: file needs the .blend's look, which lightfield.json does not have"
             )
         own = cls.from_json(file_look)
-        if own.look != _NO_LOOK and _is_data(own.view):
+        if own.look != NO_LOOK and is_data(own.view):
             raise UserError(
                 f"look: file: the .blend shows {own.view} with the look {own.look}, which versions "
                 "of Blender show differently; choose another view transform or no look in "
                 "Blender's Color Management, or give look a name"
             )
         # Like Blender, ignore a look that is not for the view transform.
-        look = own.look if own.look in looks(own.view) else _NO_LOOK
+        look = own.look if own.look in looks(own.view) else NO_LOOK
         return replace(own, look=look, exposure=own.exposure + exposure)
 
     @classmethod
@@ -312,18 +167,18 @@ class Look:
     @cached_property
     def _processor(self) -> Any:
         """What turns light into pixels, built of the steps that Blender takes, in its order."""
-        ocio, config, _ = _blender()
+        ocio, config, _ = blender()
         steps = ocio.GroupTransform()
         space = _LIGHT
         steps.appendTransform(ocio.MatrixTransform(self._matrix.reshape(-1).tolist()))
-        has_look = self.look != _NO_LOOK
+        has_look = self.look != NO_LOOK
         if has_look:
             look_space = config.getLook(self.look).getProcessSpace()
             steps.appendTransform(ocio.LookTransform(src=space, dst=look_space, looks=self.look))
             space = look_space
         steps.appendTransform(
             ocio.DisplayViewTransform(
-                src=space, display=_DISPLAY, view=self.view, looksBypass=has_look
+                src=space, display=DISPLAY, view=self.view, looksBypass=has_look
             )
         )
         if self.gamma != 1:

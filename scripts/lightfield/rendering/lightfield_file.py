@@ -12,7 +12,8 @@ from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
-from lightfield.imaging.look import FILE, FILE_LOOK, Look
+from lightfield.imaging.blender_looks import FILE, FILE_LOOK
+from lightfield.imaging.look import Look
 from lightfield.planning.sampling import calibrated
 from lightfield.stages.rig import MakeLightfield
 

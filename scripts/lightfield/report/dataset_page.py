@@ -23,7 +23,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
-from lightfield.imaging.look import FILE_LOOK
+from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
 from lightfield.stages.report import ReportHtml

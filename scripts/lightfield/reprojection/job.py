@@ -22,7 +22,8 @@ from lightfield.formats.sensors import sensor_files
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
-from lightfield.imaging.look import FILE_LOOK, Look
+from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.look import Look
 from lightfield.imaging.sensor import SensorParameters
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import ReprojectionGeometry, Target

@@ -28,7 +28,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
-from lightfield.imaging import look
+from lightfield.imaging import blender_looks
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
@@ -344,7 +344,7 @@ def _export_settings(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
         spread_version=keys.VERSIONS["spread"] if _chooses_tests(dataset, options) else None,
-        look_source=look.source_of(getattr(options, "look", None)),
+        look_source=blender_looks.source_of(getattr(options, "look", None)),
         **roles,
     )
 

@@ -24,7 +24,7 @@ from lightfield.core.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap
-from lightfield.imaging.look import LOOK_FLAG, LookName
+from lightfield.imaging.blender_looks import LOOK_FLAG, LookName
 
 if TYPE_CHECKING:
     from lightfield.formats.lightfield import LightField

@@ -11,8 +11,8 @@ from lightfield.core.names import INVENTORY, VIEWS
 from lightfield.core.setting_types import REINHARD, AtLeastOne, Stops, White
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
-from lightfield.imaging import look
-from lightfield.imaging.look import LookName
+from lightfield.imaging import blender_looks
+from lightfield.imaging.blender_looks import LookName
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
 
 
@@ -294,7 +294,7 @@ class EvaluationSettings(Settings):
 
     @model_validator(mode="after")
     def _one_tone_curve(self) -> Self:
-        look.check_beside(self.look, self.reinhard)
+        blender_looks.check_beside(self.look, self.reinhard)
         return self
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lightfield.core.setting_types import AtLeastOne, Stops
 from lightfield.core.stage import PlainStage, option, reads, writes
-from lightfield.imaging.look import LOOK_FLAG, LookName
+from lightfield.imaging.blender_looks import LOOK_FLAG, LookName
 
 # A picture is made of this many views.
 BEST = 6

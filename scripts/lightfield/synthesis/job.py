@@ -17,7 +17,8 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
-from lightfield.imaging.look import FILE_LOOK, Look
+from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.look import Look
 from lightfield.imaging.video import video
 from lightfield.stages.synthesis import Synthesize
 from lightfield.synthesis.view import Sources, reader
