@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -353,6 +354,30 @@ def test_a_new_yaml_in_the_repository_tells_editors_the_schema(blender, tmp_path
     first_line = path.read_text().splitlines()[0]
     named = first_line.removeprefix("# yaml-language-server: $schema=")
     assert (path.parent / named).resolve() == schema
+
+
+def test_blender_itself_has_the_looks_of_its_python_module(tmp_path):
+    """Blender has its package bpy in scripts/modules, beside its data."""
+    package = Path(importlib.util.find_spec("bpy").origin).parent
+    (version,) = package.glob("[0-9]*")
+    modules = tmp_path / version.name / "scripts" / "modules"
+    (modules / "bpy").mkdir(parents=True)
+    (modules / "bpy" / "__init__.py").touch()
+    for name in ("datafiles", "python"):
+        (tmp_path / version.name / name).symlink_to(version / name)
+    (tmp_path / "lib").symlink_to(package / "lib")
+    code = "from lightfield.imaging import blender_looks; print(blender_looks.looks('AgX'))"
+    looks = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join([*folders, str(ROOT / "scripts")])},
+        ).stdout
+        for folders in ([], [str(modules)])
+    ]
+    assert "AgX - Punchy" in looks[0]
+    assert looks[1] == looks[0]
 
 
 def test_light_fields_of_silvrs_addon_become_rigs(blender, run_program, tmp_path):

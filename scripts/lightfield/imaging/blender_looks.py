@@ -45,8 +45,11 @@ def blender() -> Blender:
     if package is None or package.origin is None:
         raise UserError("look: needs Blender's colours, which the package bpy brings; install bpy")
     folder = Path(package.origin).parent
-    (file,) = folder.glob("*/datafiles/colormanagement/config.ocio")
-    (library,) = folder.glob("*/python/lib/python*/site-packages/PyOpenColorIO")
+    # Blender itself has the package in a folder beside its data: 5.2/scripts/modules/bpy.
+    if folder.parts[-3:-1] == ("scripts", "modules"):
+        folder = folder.parents[3]
+    (file,) = folder.glob("[0-9]*/datafiles/colormanagement/config.ocio")
+    (library,) = folder.glob("[0-9]*/python/lib/python*/site-packages/PyOpenColorIO")
     ocio = _import(library)
     return Blender(
         ocio,
