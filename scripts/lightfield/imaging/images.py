@@ -172,7 +172,7 @@ class Header:
 # The quality of a JPEG, of 100. Most values are off by one level at most.
 _JPEG_QUALITY = 98
 # As a texture, a square of this side takes 4 GB or more.
-_LARGEST_SIDE = 32768
+_LARGEST_TEXTURE = 32768
 # Warnings of libjpeg about complete pictures.
 _HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
@@ -191,11 +191,11 @@ def is_readable(path: Path | str) -> bool:
         oiio.geterror()
         return False
     spec = file.spec()
-    if spec.width * spec.height > _LARGEST_SIDE**2:
+    if spec.width * spec.height > _LARGEST_TEXTURE**2:
         file.close()
         raise UserError(
             f"{path}: has {spec.width} × {spec.height} pixels, and a texture may have as many as "
-            f"{_LARGEST_SIDE} × {_LARGEST_SIDE}; make it smaller"
+            f"{_LARGEST_TEXTURE} × {_LARGEST_TEXTURE}; make it smaller"
         )
     pixels = file.read_image(oiio.UNKNOWN)
     warnings = file.geterror().splitlines()
