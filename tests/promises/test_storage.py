@@ -219,7 +219,8 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     assert len([*rig.glob("exports/dnerf/*/f0000?_view_*.png")]) == 4
     (shard,) = (tmp_path / PUBLISHED).glob("modelled_LFPair-*.tar")
     with tarfile.open(shard) as archive:
-        assert len(archive.getnames()) == 8
+        # Four samples, each with its pose, its view and a thumbnail.
+        assert len(archive.getnames()) == 12
     with tarfile.open(tmp_path / PUBLISHED / "other_files.tar") as archive:
         assert "modelled_LFPair/exports/dnerf/transforms_train.json" in archive.getnames()
 
