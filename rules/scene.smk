@@ -8,7 +8,9 @@ rule build_scene:
             "{name}/build_scene",
             "build_scene",
             # With a store, each job's folder has a user's own builder, as it has the scene YAMLs.
-            builder=lambda wildcards: [] if STORE else asked(BUILD.scene, wildcards).builder_files,
+            builder=lambda wildcards: (
+                [] if STORE else asked(BUILD.scene, wildcards).builder_files
+            ),
         ),
     output:
         # Snakemake copies a file before it is updated, and this one is large.
@@ -27,12 +29,6 @@ rule build_scene:
         f"python {SCRIPTS}/build_scene.py"
         " --settings {input.settings} --output {output.blend} --receipt {output.receipt}"
         " > {log} 2>&1"
-
-
-def light_of(wildcards):
-    """Return the picture that lights a scene's model. Empty for a light that has a name."""
-    light_file = asked(BUILD.scene, wildcards).source.light_file
-    return local(light_file) if light_file else []
 
 
 rule import_model:

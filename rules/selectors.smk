@@ -39,6 +39,12 @@ def blend_of(wildcards):
     return local(dataset.blend) if dataset.source.blend else dataset.blend or []
 
 
+def light_of(wildcards):
+    """Return the picture that lights a scene's model. Empty for a light that has a name."""
+    light_file = asked(BUILD.scene, wildcards).source.light_file
+    return local(light_file) if light_file else []
+
+
 def status_arguments(wildcards):
     """Return the arguments that name each chosen dataset and family to scripts/status.py."""
     arguments = []
