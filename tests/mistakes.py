@@ -1076,7 +1076,7 @@ PROGRAMS = [
     *(
         ("import_model.json", {"model": "a.obj", **content}, said)
         for content, said in (
-            ({"model": "a.txt"}, 'model: is "a.txt"; must be a path that ends in .glb'),
+            ({"model": "a.txt"}, 'model: is "a.txt"; must be a path that ends in .fbx'),
             ({"model": "a.glb", "up": "y"}, "up: is only for OBJ, PLY and STL"),
             ({"light": "day"}, 'light: is "day"; must be one of softboxes'),
             ({"frame": "file"}, 'frame: is "file"; must be a whole number'),
