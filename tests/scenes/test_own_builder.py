@@ -16,6 +16,7 @@ from lightfield.configuration.scene_yaml import read_scene
 from lightfield.core import names
 from lightfield.core.errors import UserError
 from lightfield.imaging.images import write_png
+from lightfield.stages.scene import BuildSettings
 
 PAGE = (ROOT / "docs/how-to/write-a-scene-in-python.md").read_text()
 # The scene and the YAML that the page shows.
@@ -48,12 +49,22 @@ MOST = 9
 class Wood(Enum):
     OAK = "oak"
 
+class Tree(BaseModel):
+    height: float = 1.0
+
+    @field_validator("height")
+    @classmethod
+    def _grown(cls, height):
+        assert height < 100, "too high"
+        return height
+
 class Parameters(BaseModel):
     count: Annotated[int, Field(ge=1, le=MOST)]
     size: tuple[float, float] = (1, 1)
     kind: Literal["round", "square"] = "round"
     wood: Wood = Wood.OAK
     tint: str = Field("red", pattern="^[a-z]+$")
+    trees: list[Tree] = []
 
     @field_validator("size")
     @classmethod
@@ -128,6 +139,12 @@ def test_parameters_are_typed_and_a_plan_runs_only_their_class(monkeypatch):
         ("{count: 3, wood: pine}", 'wood: is "pine"; must be oak'),
         ("{count: 3, tint: Red}", 'tint: is "Red"; must be a text that matches ^[a-z]+$'),
         ("{count: 3, tint: null}", "tint: is null; must have a value, or be left out"),
+        (
+            "{count: 3, trees: [{}, {height: x}]}",
+            'parameters.trees.[1].height: is "x"; must be a nu',
+        ),
+        ("{count: 3, trees: [{heihgt: 2}]}", "parameters.trees.[0].heihgt: is 2; must be left out"),
+        ("{count: 3, trees: [{height: 101}]}", "trees.[0].height: is 101: too high"),
         ("{count: 2026-01-01}", "scene.parameters: must have only texts, finite numbers"),
         ("{count: .nan}", "scene.parameters: must have only texts, finite numbers"),
         ("3", "scene.parameters: is 3; must be a mapping of keys to values"),
@@ -144,6 +161,48 @@ def test_a_wrong_parameter_is_named_with_what_is_allowed(parameters, said):
 def test_without_the_class_all_keys_are_allowed():
     written(CUBE)
     assert read("{a: 1, b: {c: [x]}}").parameters == {"a": 1, "b": {"c": ["x"]}}
+
+
+CHECKED = """from dataclasses import dataclass
+@dataclass
+class Parameters:
+    x: int = 0
+    def __post_init__(self):
+"""
+# Of a name with several values, all statements count.
+STEPS = f"""
+try:
+    from dataclasses import dataclass
+except ImportError:
+    raise
+MOST = 1
+MOST += 1
+if MOST > 1:
+    def double(x):
+        return 2 * x
+{CUBE}
+@dataclass
+class Parameters:
+    x: int = double(MOST)
+"""
+
+
+@pytest.mark.usefixtures("folder")
+def test_parameters_may_be_left_out_unless_one_is_needed():
+    for text in (CUBE, TYPED.replace("MOST)]\n", "MOST)] = 1\n"), STEPS):
+        scene = read_without_parameters(text)
+        assert scene.parameters == {}
+        BuildSettings(builder=scene.builder, parameters=scene.parameters)
+    with pytest.raises(UserError, match="is missing the key count"):
+        read_without_parameters(TYPED)
+
+
+def read_without_parameters(text):
+    written(text)
+    # A file that was read is known by its text.
+    note = f"# {hash(text)}"
+    Path("mine.yaml").write_text(f"scene: {{builder: scenes/mine.py}} {note}{RENDERED}")
+    return read_scene(Path("mine.yaml")).scene
 
 
 WRONG = {
@@ -168,6 +227,20 @@ WRONG = {
         f"{CUBE}\nclass Parameters:\n    x = 1 / 0\n",
         "scenes/mine.py:8: ZeroDivisionError: division by zero",
     ),
+    "parameters whose check fails": (
+        f"{CHECKED}        self.x = 1 / self.x\n{CUBE}",
+        "scenes/mine.py:6: ZeroDivisionError: division by zero",
+    ),
+    "parameters whose check exits": (
+        f"{CHECKED}        raise SystemExit\n{CUBE}",
+        "scenes/mine.py:6: SystemExit",
+    ),
+    "parameters of an unknown type": (
+        f"from __future__ import annotations\n{CHECKED}        y: Unknown\n{CUBE}".replace(
+            "x: int", "x: Unknown"
+        ),
+        "scenes/mine.py: PydanticUserError",
+    ),
     "a file outside": (
         f"FILES = ['../secret.png']\n{CUBE}",
         "scenes/mine.py:1: FILES: is '../secret.png'; must be the path of a file in its folder",
@@ -176,7 +249,12 @@ WRONG = {
         f"FILES = ['oak.png']\n{CUBE}",
         "scenes/oak.png: cannot be read: No such file",
     ),
-    "computed files": (f"FILES = sorted('ab')\n{CUBE}", "scenes/mine.py:1: FILES: must be a list"),
+    "computed files": (f"FILES = sorted('ab')\n{CUBE}", "scenes/mine.py:1: FILES: must be one li"),
+    "one text for files": (f"FILES = 'mine.py'\n{CUBE}", "scenes/mine.py:1: FILES: must be one li"),
+    "files in two steps": (
+        f"FILES = ['mine.py']\nFILES += ['oak.png']\n{CUBE}",
+        "scenes/mine.py:2: FILES: must be one list",
+    ),
 }
 
 

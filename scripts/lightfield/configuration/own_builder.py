@@ -95,7 +95,12 @@ def check_parameters(builder: Path, parameters: Any) -> dict[str, Any]:
     tree = _parsed(builder)
     if _PARAMETERS in _definitions(tree):
         with _parameters_of(tree, builder) as model:
-            typed(model, parameters, builder)
+            try:
+                typed(model, parameters, builder)
+            except (UserError, ValueError):
+                raise
+            except (Exception, SystemExit) as error:
+                raise UserError(problem([builder], builder, error)) from None
     return dict(parameters)
 
 
@@ -109,7 +114,7 @@ def typed(model: type | None, parameters: Mapping[str, Any], builder: Path) -> A
     if dataclasses.is_dataclass(model):
         allowed_keys = [field.name for field in dataclasses.fields(model)]
     elif isinstance(model, type) and issubclass(model, BaseModel):
-        allowed_keys = [*model.model_fields]
+        allowed_keys = [each.alias or name for name, each in model.model_fields.items()]
     else:
         raise UserError(f"{builder}: {_PARAMETERS} must be a dataclass or a pydantic model")
     for key in parameters:
@@ -120,7 +125,8 @@ def typed(model: type | None, parameters: Mapping[str, Any], builder: Path) -> A
             raise ValueError(f"{key}: is null; must have a value, or be left out")
     try:
         # As JSON, a list may be a tuple, and a text a member of an enumeration.
-        return TypeAdapter(model).validate_json(json.dumps(parameters), strict=True)
+        text = json.dumps(parameters)
+        return TypeAdapter(model).validate_json(text, strict=True, extra="forbid")
     except ValidationError as error:
         (first, *_) = problems(error, parameters)
         raise ValueError(first) from None
@@ -156,21 +162,32 @@ def _parsed(file: Path) -> ast.Module:
         raise UserError(f"{file}: is no Python file: {error}") from None
 
 
-def _definitions(tree: ast.Module) -> dict[str, ast.stmt]:
-    """Return the statements that give a file's names their values, by name."""
-    return {name: statement for statement in tree.body for name in _defined(statement)}
+def _definitions(tree: ast.Module) -> dict[str, list[ast.stmt]]:
+    """Return the statements that give a file's names their values, by name, in their order."""
+    definitions: dict[str, list[ast.stmt]] = {}
+    for statement in tree.body:
+        for name in dict.fromkeys(_defined(statement)):
+            definitions.setdefault(name, []).append(statement)
+    return definitions
 
 
 def _defined(statement: ast.stmt) -> Iterator[str]:
-    match statement:
-        case ast.Import(names=names) | ast.ImportFrom(names=names):
-            yield from (each.asname or each.name.partition(".")[0] for each in names)
-        case ast.ClassDef(name=name) | ast.FunctionDef(name=name):
-            yield name
-        case ast.Assign() | ast.AnnAssign():
-            for node in ast.walk(statement):
-                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                    yield node.id
+    for node in _outside_functions(statement):
+        match node:
+            case ast.Import(names=names) | ast.ImportFrom(names=names):
+                yield from (each.asname or each.name.partition(".")[0] for each in names)
+            case ast.ClassDef(name=name) | ast.FunctionDef(name=name):
+                yield name
+            case ast.Name(id=name, ctx=ast.Store()):
+                yield name
+
+
+def _outside_functions(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield a statement and its parts, but not what is in functions and classes."""
+    yield node
+    if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        for child in ast.iter_child_nodes(node):
+            yield from _outside_functions(child)
 
 
 def _imported_modules(tree: ast.Module, package: str = "") -> Iterator[str]:
@@ -205,14 +222,17 @@ def _imported_files(tree: ast.Module, file: Path, folder: Path) -> Iterator[Path
 
 def _data_files(tree: ast.Module, file: Path) -> Iterator[Path]:
     """Yield the files in a file's list `FILES`, which are named from its folder."""
-    statement = _definitions(tree).get(_FILES)
-    if statement is None:
+    statements = _definitions(tree).get(_FILES)
+    if not statements:
         return
-    where = f"{file}:{statement.lineno}: {_FILES}"
+    where = f"{file}:{statements[-1].lineno}: {_FILES}"
     try:
-        names = [*ast.literal_eval(statement.value)]  # type: ignore[attr-defined]
+        (statement,) = statements
+        names = ast.literal_eval(statement.value)  # type: ignore[attr-defined]
     except (ValueError, TypeError, AttributeError):
-        raise UserError(f"{where}: must be a list of texts, without computing") from None
+        names = None
+    if not isinstance(names, list | tuple | set):
+        raise UserError(f"{where}: must be one list of texts, without computing")
     for name in names:
         path = inside(file.parent, name, where)
         check_readable(path)
@@ -241,14 +261,21 @@ def _needed(tree: ast.Module, builder: Path) -> list[ast.stmt]:
     """Return the statements that the class `Parameters` needs, in their order."""
     definitions = _definitions(tree)
     names = [_PARAMETERS]
+    needed: set[ast.stmt] = set()
     for name in names:
-        statement = definitions[name]
-        _check_plain(statement, builder)
-        for node in ast.walk(statement):
-            if isinstance(node, ast.Name) and node.id in definitions and node.id not in names:
-                names.append(node.id)
-    wanted = {id(definitions[name]) for name in names}
-    return [each for each in tree.body if id(each) in wanted or _is_of_future(each)]
+        for statement in definitions[name]:
+            _check_plain(statement, builder)
+            needed.add(statement)
+            names += definitions.keys() & _read_names(statement) - {*names}
+    return [each for each in tree.body if each in needed or _is_of_future(each)]
+
+
+def _read_names(statement: ast.stmt) -> set[str]:
+    return {
+        node.id
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
+    }
 
 
 def _is_of_future(statement: ast.stmt) -> bool:
@@ -257,16 +284,17 @@ def _is_of_future(statement: ast.stmt) -> bool:
 
 def _check_plain(statement: ast.stmt, builder: Path) -> None:
     """Raise `UserError` if the class `Parameters` needs a module that a plan does not import."""
-    match statement:
-        case ast.Import(names=names):
-            modules = [each.name for each in names]
-        case ast.ImportFrom(module=module, level=level):
-            modules = [f"{'.' * level}{module or ''}"]
-        case _:
-            return
-    for module in modules:
-        if module.partition(".")[0] not in _PLAIN_MODULES:
-            raise UserError(
-                f"{builder}:{statement.lineno}: {_PARAMETERS} needs {module}, but a plan runs this "
-                f"class without your files; it may use {', '.join(_PLAIN_MODULES[1:])}"
-            )
+    for node in _outside_functions(statement):
+        modules = []
+        match node:
+            case ast.Import(names=names):
+                modules = [each.name for each in names]
+            case ast.ImportFrom(module=module, level=level):
+                modules = [f"{'.' * level}{module or ''}"]
+        for module in modules:
+            if module.partition(".")[0] not in _PLAIN_MODULES:
+                raise UserError(
+                    f"{builder}:{statement.lineno}: {_PARAMETERS} needs {module}, but a plan runs "
+                    "this class without your files; it may use "
+                    f"{', '.join(_PLAIN_MODULES[1:])}"
+                )

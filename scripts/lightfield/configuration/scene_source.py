@@ -151,7 +151,7 @@ class Origin(Settings):
     """Where a scene is from: a builder, a .blend, a model file, or views that exist already."""
 
     builder: Builder | None = Field(None, description=BUILDER)
-    parameters: BuilderParameters = Field(Parameters(), description=BUILDER_PARAMETERS)
+    parameters: BuilderParameters = Field({}, validate_default=True, description=BUILDER_PARAMETERS)
     blend: str | None = Field(
         None,
         pattern=pattern(

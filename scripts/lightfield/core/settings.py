@@ -233,6 +233,10 @@ def _is_within(place: tuple[int | str, ...], other: tuple[int | str, ...]) -> bo
     return place[:length] == other[:length]
 
 
+# The key with which a problem begins, such as trees.[1].height.
+_KEY = r"[\w.\[\]-]+(?=: )"
+
+
 def _place(error: ErrorDetails, content: Any) -> tuple[int | str, ...]:
     """Return the keys that lead to a mistake, with the key that is missing or wrong."""
     path, value = _locate(error, content)
@@ -242,7 +246,7 @@ def _place(error: ErrorDetails, content: Any) -> tuple[int | str, ...]:
     if "discriminator" in context:
         return (*path, context["discriminator"].strip("'"))
     if error["type"] == "value_error" and isinstance(value, Mapping):
-        key = re.match(r"[\w.-]+(?=: )", str(context["error"]))
+        key = re.match(_KEY, str(context["error"]))
         return (*path, *key[0].split(".")) if key else path
     return path
 
@@ -261,8 +265,12 @@ def _problem(errors: list[ErrorDetails], content: Any) -> str:
     match error["type"]:
         case "value_error" if isinstance(value, Mapping):
             problem = str(context["error"])
-            below = key and re.match(r"[\w.-]+: ", problem)
+            below = key and re.match(_KEY, problem)
             return f"{key}.{problem}" if below else f"{prefix}{problem}"
+        case "value_error" | "assertion_error":
+            # A user's own check may say it in other words.
+            if not str(context["error"]).startswith("must "):
+                return f"{prefix}is {_shown(value)}: {context['error']}"
         case "missing" | "union_tag_not_found":
             name = context["discriminator"] if "discriminator" in context else error["loc"][-1]
             return f"{prefix}is missing the key {str(name).strip(chr(39))}"
@@ -288,7 +296,8 @@ def _shown(value: Any) -> str:
 def _locate(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
     """Return the keys that lead to a wrong value, and the value.
 
-    Leaves out pydantic's names of types, which are not keys of ``content``.
+    Leaves out pydantic's names of types, which are not keys of ``content``. A key that ``content``
+    lacks counts if its default is wrong.
     """
     path: list[int | str] = []
     for part in error["loc"]:
@@ -297,6 +306,9 @@ def _locate(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], A
         if is_key or is_index:
             content = content[part]
             path.append(part)
+    if error["type"] == "value_error" and path != [*error["loc"]] and error["input"] != content:
+        path.append(error["loc"][-1])
+        content = error["input"]
     return tuple(path), content
 
 
@@ -306,7 +318,7 @@ _BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 def _allowed(error: ErrorDetails) -> str:
     """Return what pydantic allows, as text that follows ``must``."""
     match error["type"]:
-        case "value_error":
+        case "value_error" | "assertion_error":
             return str(error["ctx"]["error"]).removeprefix("must ")
         case "missing":
             return f"have the key {error['loc'][-1]}"

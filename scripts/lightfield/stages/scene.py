@@ -16,7 +16,6 @@ from lightfield.configuration.scene_source import (
     BuilderParameters,
     ModelOptions,
     ModelPath,
-    Parameters,
     SceneSource,
     SharedFolder,
     check_model,
@@ -31,7 +30,7 @@ class BuildSettings(Settings):
     """The settings of scripts/build_scene.py."""
 
     builder: Builder = Field(description=BUILDER)
-    parameters: BuilderParameters = Field(Parameters(), description=BUILDER_PARAMETERS)
+    parameters: BuilderParameters = Field({}, validate_default=True, description=BUILDER_PARAMETERS)
     fingerprint: str | None = cause(
         "Hash of the builder's code. If it changes, the scene is built again."
     )
