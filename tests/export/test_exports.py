@@ -1423,6 +1423,16 @@ def test_the_first_point_in_each_voxel_is_kept(size):
     assert one_a_voxel(positions, 0.25).tolist() == list(first.values())
 
 
+def test_a_point_cloud_may_have_views_that_see_no_surface(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "sky")
+    path = tmp_path / "sky/exr/view_0000f.exr"
+    image = images.read_image(path)
+    miss = np.full_like(image.channels["Z"], np.inf)
+    images.write_exr(path, image.channels | {"Z": miss}, image.attributes)
+    folder = exported(tmp_path / "sky", "point_cloud", "views", tmp_path / "export", voxel=0.1)
+    assert len(ply(folder / "points.ply")[0]) > 2000
+
+
 def test_views_of_another_lens_do_not_test(dataset):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
     with pytest.raises(UserError, match="camera: must be the same as in"):

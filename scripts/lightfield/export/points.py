@@ -134,6 +134,8 @@ def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
 
 def one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
     """Return the index of the first point in each cube of side ``voxel``."""
+    if not len(positions):
+        return np.arange(0)
     cells = _cells(positions, voxel)
     return np.sort(np.unique(cells, axis=0, return_index=True)[1])
 
