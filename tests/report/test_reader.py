@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import exr_windows
 import numpy as np
 import pytest
 from checkouts import ROOT
@@ -138,6 +139,17 @@ def test_it_reads_alpha_other_primaries_and_a_camera_without_depth(form, tmp_pat
     folder = form(finish(dataset), tmp_path)
     compared = compare(read(folder), open_dataset(folder))
     assert compared == {"/rgb", "/alpha", "/depth", "/distance", "aces/rgb"}
+
+
+@pytest.mark.parametrize("form", [unpacked, shards])
+def test_it_reads_views_whose_files_store_other_pixels(form, tmp_path):
+    dataset = write_dataset(tmp_path / "dataset")
+    exr_windows.crop(dataset / "exr/view_0001f.exr", slice(3, 12), slice(4, 20))
+    exr_windows.widen(dataset / "panorama/view_0002f.exr")
+    finish(dataset)
+    folder = form(dataset, tmp_path)
+    compared = compare(read(folder), open_dataset(folder))
+    assert compared >= {"/rgb", "/depth", "panorama/rgb", "panorama/depth"}
 
 
 def test_it_has_no_rays_for_omnidirectional_stereo(tmp_path):

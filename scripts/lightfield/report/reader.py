@@ -1,6 +1,6 @@
 """Writes read.py, a file of a package that reads the dataset without Plenoforge."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jinja2
@@ -47,6 +47,7 @@ def source(
         bases=lens_source.bases,
         depths=lens_source.text(depths, "DEPTHS = "),
         has_centre=OMNIDIRECTIONAL not in own.content,
+        has_windows=_has_windows(lightfields),
         is_sequence=is_sequence,
         matrices=lens_source.text(matrices, "TO_REC_709 = ") if matrices else None,
         needs_math="math." in repr(definitions),
@@ -59,9 +60,25 @@ def _matrices(lightfields: Mapping[str, LightField]) -> dict[str, Any]:
     """Return the matrix (3, 3) to Rec. 709 of each light field in other primaries, by its name."""
     matrices = {}
     for name, lightfield in lightfields.items():
-        folder = lightfield.folder if name else lightfield.folder / IMAGES
-        path = folder / f"{lightfield.views[0].name}.exr"
-        chromaticities = images.read_header(path).chromaticities if path.is_file() else None
-        if chromaticities and not are_rec_709(chromaticities):
-            matrices[name] = conversion(chromaticities, REC_709)
+        header = next(_headers(name, lightfield), None)
+        if header and header.chromaticities and not are_rec_709(header.chromaticities):
+            matrices[name] = conversion(header.chromaticities, REC_709)
     return matrices
+
+
+def _has_windows(lightfields: Mapping[str, LightField]) -> bool:
+    """Return whether files store only a part of a view's pixels, or pixels beside them."""
+    return any(
+        not header.window.is_stored_whole
+        for name, lightfield in lightfields.items()
+        for header in _headers(name, lightfield)
+    )
+
+
+def _headers(name: str, lightfield: LightField) -> Iterator[images.Header]:
+    """Yield the headers of the EXR files of a light field, by its name in the dataset."""
+    folder = lightfield.folder if name else lightfield.folder / IMAGES
+    for view in lightfield.views:
+        path = folder / f"{view.name}.exr"
+        if path.is_file():
+            yield images.read_header(path)
