@@ -390,6 +390,24 @@ def test_loaders_can_send_views_to_other_processes(forms):
         np.testing.assert_array_equal(copy.rgb, view.rgb)
 
 
+def test_views_are_read_after_a_change_of_directory(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(folder.parent)
+    data = open_dataset(folder.name)
+    monkeypatch.chdir(tmp_path)
+    assert data.views[0].rgb.shape == (16, 24, 3)
+
+
+def test_who_changes_an_array_changes_no_view(folder):
+    data = open_dataset(folder)
+    for view in (data.views[0], data.reprojections["perspective"].views[0]):
+        poses = [view.position, view.world_from_camera, *view.rays()]
+        images_read = [view.rgb, *map(view.read, view.dataset.passes)]
+        for array in poses + images_read:
+            array[:] = 7
+        assert not np.any(view.world_from_camera == 7)
+        assert not np.any(view.rays()[1] == 7)
+
+
 def test_omnidirectional_stereo_has_no_rays_in_any_form(tmp_path):
     rig = tmp_path / "rig/dataset"
     write_views(rig, LENSES["panorama"], RIG)

@@ -56,7 +56,7 @@ class View:
     @property
     def world_from_camera(self) -> Doubles:
         """The camera-to-world matrix (4, 4). The camera looks along −Z, and +Y is up."""
-        return self.camera.world_from_camera
+        return self.camera.world_from_camera.copy()
 
     @property
     def position(self) -> Doubles:
@@ -128,9 +128,10 @@ class View:
         image = self._read(
             view_pass.path(Path(self.dataset.folder), view).as_posix(), view_pass.channels
         )
-        planes = [image.channels[channel] for channel in view_pass.channels]
-        pixels = np.stack(planes, axis=-1) if len(planes) > 1 else planes[0]
-        return pixels.astype(np.float32, copy=False) if pixels.dtype.kind == "f" else pixels
+        pixels = np.stack([image.channels[channel] for channel in view_pass.channels], axis=-1)
+        if pixels.dtype.kind == "f":
+            pixels = pixels.astype(np.float32, copy=False)
+        return pixels if len(view_pass.channels) > 1 else pixels[..., 0]
 
     def rays(self) -> tuple[Doubles, Doubles]:
         """Return the rays of all pixels' centres in the world: origins and unit directions.

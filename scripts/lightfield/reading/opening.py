@@ -48,7 +48,8 @@ def open_corpus(path: str | os.PathLike[str]) -> list[Dataset]:
     ``member`` of a family's dataset has what its corpus.json says of the scene. Takes all that
     `open_dataset` takes, too. Raises `UserError` if there is no dataset.
     """
-    path = Path(path)
+    # Files are read later, when the program may have changed its directory.
+    path = Path(path).absolute()
     if path.is_dir():
         datasets = _in_folder(path)
     elif run := _RUN.search(path.name):
