@@ -164,11 +164,59 @@ def test_the_worst_images_come_first_and_ten_lines_at_most(pair, diff):
     assert section(lines, "files only in B: 12")[-1] == "and 2 more"
 
 
+def test_a_cut_view_is_the_cause_also_without_checksums(pair, diff):
+    dataset, copy = pair
+    (copy / "sha256sums.txt").unlink()
+    (copy / VIEW).write_bytes((dataset / VIEW).read_bytes()[:300])
+    assert (
+        diff(dataset, copy)[1][0] == f"the views differ because B has damaged files, such as {VIEW}"
+    )
+    assert "because A has damaged files" in diff(copy, dataset)[1][0]
+
+
+def planes(folder, name, **channels):
+    """Write a file of a pass by OpenEXR alone."""
+    path = folder / name
+    path.parent.mkdir()
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(str(path))
+
+
+def test_passes_are_compared_by_what_they_hold(pair, diff):
+    """Objects have numbers, of which no difference has a meaning. Flow is in pixels."""
+    dataset, copy = pair
+    dataset = shutil.copytree(dataset, copy.with_name("with_passes"))
+    zeros = np.zeros((4, 6), np.float32)
+    for folder, change in ((dataset, 0), (copy, 1)):
+        changed = zeros.copy()
+        changed[2, 5] = 0.5 * change
+        planes(folder, "normal/view_0000f.exr", R=zeros, G=changed, B=zeros)
+        flow = changed.copy()
+        flow[0, 1] = np.nan if change else 0
+        planes(folder, "flow/view_0000f.exr", X=flow, Y=zeros, V=zeros)
+        numbers = np.full((4, 6), 3, np.uint32)
+        numbers[3, :2] += change
+        planes(folder, "object/view_0000f.exr", Y=numbers)
+    _, lines, _ = diff(dataset, copy)
+    line = {name: section(lines, f"pixels in {name}") for name in ("normal", "flow", "object")}
+    assert line == {
+        "normal": ["view_0000f.exr: G differs in 1 pixel, at most by 0.5 at (5, 2)"],
+        "flow": [
+            "view_0000f.exr: X differs in 2 pixels, at most by 0.5 at (5, 2), X is 0 → nan at "
+            "(1, 0), 1 pixel like that"
+        ],
+        "object": ["view_0000f.exr: numbers differ in 2 pixels, first 3 → 4 at (0, 3)"],
+    }
+
+
 def test_trouble_has_a_status_of_its_own(pair, diff, tmp_path):
     dataset, copy = pair
     status, lines, errors = diff(dataset, tmp_path / "nowhere")
     assert (status, lines) == (2, []) and errors.splitlines()[-1].startswith("error: ")
-    assert diff(tmp_path, dataset)[0] == 2
+    status, _, errors = diff(dataset.parent, dataset)
+    assert status == 2 and f"such as {dataset.name} in it" in errors
+    (tmp_path / "x.tar").write_text("")
+    assert "unpack a package first" in diff(dataset, tmp_path / "x.tar")[2]
     (copy / "lightfield.json").write_text("{")
     assert diff(dataset, copy)[0] == 2
     assert diff(dataset, "--wrong")[0] == 2

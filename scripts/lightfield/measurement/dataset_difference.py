@@ -66,7 +66,7 @@ class _Difference:
     only_in: dict[str, list[str]] = field(default_factory=dict)
     # What differs in files that both have.
     files: dict[str, str] = field(default_factory=dict)
-    # The files that are not as the sha256sums.txt of their dataset says.
+    # Unreadable images, and files that are not as the sha256sums.txt of their dataset says.
     damaged: dict[str, str] = field(default_factory=dict)
     pictures: dict[str, PictureDifference] = field(default_factory=dict)
     file_count: int = 0
@@ -163,7 +163,9 @@ class _Difference:
             return
         progress = Progress(len(names), "diff", "images")
         for name in names:
-            self.pictures[name] = picture_difference.compare(*self._paths(name))
+            found = self.pictures[name] = picture_difference.compare(*self._paths(name))
+            if found.unreadable:
+                self.damaged.setdefault(name, found.unreadable[0])
             progress.done()
 
     def _paths(self, name: str) -> tuple[Path, Path]:

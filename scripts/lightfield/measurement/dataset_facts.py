@@ -59,7 +59,8 @@ class ReceiptFacts:
 def read(folder: Path) -> Facts:
     """Return what a dataset says of itself. Raises `UserError` for a folder that is no dataset."""
     if not folder.is_dir():
-        raise UserError(f"{folder}: is no folder; must be the folder of a dataset")
+        hint = "; unpack a package first" if folder.suffix == ".tar" else ""
+        raise UserError(f"{folder}: is no folder; must be the folder of a dataset{hint}")
     is_sequence = not (folder / NAME).is_file()
     parts = sorted(folder.glob(FRAME_FOLDERS)) if is_sequence else [folder]
     lightfields = {
@@ -68,7 +69,9 @@ def read(folder: Path) -> Facts:
         for path in (*part.glob(NAME), *sorted(part.glob(f"*/{NAME}")))
     }
     if not lightfields:
-        raise UserError(f"{folder}: has no {NAME}; must be the folder of a dataset")
+        datasets = [path.parent.name for path in sorted(folder.glob(f"*/{NAME}"))]
+        hint = f", such as {datasets[0]} in it" if datasets else ""
+        raise UserError(f"{folder}: has no {NAME}; must be the folder of a dataset{hint}")
     settings = _merged(
         [_settings(reprojection_of(place), lightfield) for place, lightfield in lightfields.items()]
         + [_of_export(path) for path in _lists(folder)]

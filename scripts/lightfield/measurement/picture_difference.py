@@ -26,21 +26,28 @@ class PictureDifference:
     """How two images differ. ``psnr`` is None for images without colour, and inf for equal pixels.
 
     ``remarks`` say what differs, in words. ``size`` is the largest difference of a value.
+    ``unreadable`` has A and B, if they cannot be read.
     """
 
     remarks: list[str]
     psnr: float | None = None
     size: float = 0.0
     has_equal_pixels: bool = False
+    unreadable: str = ""
 
 
 def compare(a: Path, b: Path) -> PictureDifference:
     """Return how two images differ."""
-    try:
-        image_a = images.read_image(a)
-        image_b = images.read_image(b)
-    except UserError as error:
-        return PictureDifference([str(error)], size=math.inf)
+    found: list[images.Image] = []
+    errors: dict[str, str] = {}
+    for where, path in (("A", a), ("B", b)):
+        try:
+            found.append(images.read_image(path))
+        except UserError as error:
+            errors[where] = str(error)
+    if errors:
+        return PictureDifference([*errors.values()], size=math.inf, unreadable="".join(errors))
+    image_a, image_b = found
     remarks = list(_form(image_a.channels, image_b.channels))
     if remarks:
         return PictureDifference(remarks, size=math.inf)
