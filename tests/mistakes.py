@@ -149,6 +149,7 @@ EXPLAINED_TEXTS = [
     ),
     ("1: 2\n", "the key 1 is not a text"),
     ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
+    ("{}\n---\n{}\n", ":2:1: expected a single document in the stream, but found another"),
     ("scene:\n\tbuilder: room\n", ":2:1: is indented with a tab; use spaces"),
     ("a:\n  - b\n\t- c\n", ":3:1: is indented with a tab; use spaces"),
     ("scene: {blend: a.blend, sha256: 0123}\n", 'scene.sha256: is "0123"; must be 64 hex'),

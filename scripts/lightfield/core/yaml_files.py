@@ -140,7 +140,11 @@ def parse_yaml(text: str, file: str) -> Any:
         mark = error.problem_mark
         where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         keys = ".".join(_keys_to(mark.index, node)) if mark and node else ""
-        problem = f"{keys}: {error.problem}" if keys else error.problem
+        problem = error.problem
+        if problem and problem.startswith("but "):
+            # The context is the other half of the sentence.
+            problem = f"{error.context}, {problem}"
+        problem = f"{keys}: {problem}" if keys else problem
         if mark and _is_indented_by_tabs(text, mark.line):
             problem = "is indented with a tab; use spaces"
         raise UserError(f"{file}{where}: {problem}") from None
