@@ -1,9 +1,11 @@
 """Blender's looks: beside Blender's own pictures of the same light, and in everything developed."""
 
+import importlib.util
 import itertools
 import json
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,6 +160,14 @@ FACTS = {
 def test_a_blend_whose_picture_is_not_blenders_is_refused(change, said):
     with pytest.raises(UserError, match=said):
         Look.of("file", 0.0, blend.look_of(FACTS | change))
+
+
+def test_a_missing_file_of_blender_is_named(tmp_path, monkeypatch):
+    package = SimpleNamespace(origin=str(tmp_path / "bpy/__init__.py"))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: package)
+    blender_looks.blender.cache_clear()
+    with pytest.raises(UserError, match=r"bpy/.*config\.ocio, which is missing; install bpy"):
+        Look.of("AgX", 0.0)
 
 
 def test_a_look_of_another_view_transform_is_ignored_as_in_blender():

@@ -48,14 +48,23 @@ def blender() -> Blender:
     # Blender itself has the package in a folder beside its data: 5.2/scripts/modules/bpy.
     if folder.parts[-3:-1] == ("scripts", "modules"):
         folder = folder.parents[3]
-    (file,) = folder.glob("[0-9]*/datafiles/colormanagement/config.ocio")
-    (library,) = folder.glob("[0-9]*/python/lib/python*/site-packages/PyOpenColorIO")
-    ocio = _import(library)
+    file = _part_of_blender(folder, "[0-9]*/datafiles/colormanagement/config.ocio")
+    ocio = _import(
+        _part_of_blender(folder, "[0-9]*/python/lib/python*/site-packages/PyOpenColorIO")
+    )
     return Blender(
         ocio,
         ocio.Config.CreateFromFile(str(file)),
         hashlib.sha256(file.read_bytes()).hexdigest(),
     )
+
+
+def _part_of_blender(folder: Path, pattern: str) -> Path:
+    """Return the path in Blender's folder that matches. Raises `UserError` if there is none."""
+    path = next(folder.glob(pattern), None)
+    if path is None:
+        raise UserError(f"look: needs Blender's {folder / pattern}, which is missing; install bpy")
+    return path
 
 
 def _import(library: Path) -> Any:

@@ -97,7 +97,8 @@ class Look:
             return cls(view, look, exposure)
         if file_look is None:
             raise UserError(
-                "look: file needs the .blend's look, which lightfield.json does not have"
+                "look: file needs the .blend's look, which lightfield.json has only if the scene "
+                "YAML says look: file; give look a name"
             )
         own = cls.from_json(file_look)
         if own.look != NO_LOOK and is_data(own.view):
