@@ -118,11 +118,11 @@ def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
             for archive in archives
             if archive not in further
         ]
-        found = [_dataset(package) for package in packages]
+        datasets = [_dataset(package) for package in packages]
     else:
         shards = {archive: members[archive] for archive in archives}
-        found = [_dataset(files, member) for files, member in read_shards(path, shards)]
-    return [dataset for dataset in found if dataset]
+        datasets = [_dataset(files, member) for files, member in read_shards(path, shards)]
+    return [dataset for dataset in datasets if dataset]
 
 
 def _package(parts: Sequence[Path], members: Mapping[Path, Mapping[str, Member]]) -> Packed:

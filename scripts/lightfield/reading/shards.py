@@ -20,7 +20,7 @@ _OF_MEMBER = ("values", "split")
 
 
 @dataclass
-class _Shown:
+class _ShownViews:
     """The views of one lightfield.json, as far as the shards have them."""
 
     content: dict[str, Any] = field(default_factory=dict)
@@ -33,11 +33,11 @@ class _Shown:
 
 
 @dataclass
-class _Found:
+class _DatasetInShards:
     """A dataset in shards: its files, its lightfield.jsons by their folders, and its member."""
 
     contents: dict[str, Member | bytes] = field(default_factory=dict)
-    shown: dict[str, _Shown] = field(default_factory=dict)
+    shown: dict[str, _ShownViews] = field(default_factory=dict)
     member: dict[str, Any] = field(default_factory=dict)
 
 
@@ -50,7 +50,7 @@ def read_shards(
     view are taken from the tar that lies beside published shards. Without that tar, the samples
     give each lightfield.json.
     """
-    datasets: dict[str, _Found] = {}
+    datasets: dict[str, _DatasetInShards] = {}
     for archive, members in shards.items():
         for name in members:
             if name.endswith(".json") and name.count(".") == 1:
@@ -72,7 +72,7 @@ def read_shards(
                     frames = [each for each in content["frames"] if each["name"] in shown.frames]
                     content |= {"frames": frames}
             dataset.contents[name] = json.dumps(content).encode()
-    return [(Packed(path, found.contents), found.member) for found in datasets.values()]
+    return [(Packed(path, each.contents), each.member) for each in datasets.values()]
 
 
 def _others(archives: Iterable[Path]) -> dict[str, Member]:
@@ -84,12 +84,14 @@ def _others(archives: Iterable[Path]) -> dict[str, Member]:
     return others
 
 
-def _add_sample(datasets: dict[str, _Found], key: str, members: Mapping[str, Member]) -> None:
+def _add_sample(
+    datasets: dict[str, _DatasetInShards], key: str, members: Mapping[str, Member]
+) -> None:
     """Add the pictures of a sample to its dataset."""
     sample = json.loads(members[f"{key}.json"].read())
     is_of_family = "member" in sample
     name = f"{sample['member']}/{sample['rig']}" if is_of_family else ""
-    dataset = datasets.setdefault(name, _Found())
+    dataset = datasets.setdefault(name, _DatasetInShards())
     frame = "" if is_of_family else key.removesuffix(sample["view"].replace(".", "_")).rstrip("_")
     if is_of_family:
         dataset.member = {"name": sample["member"], **{k: sample[k] for k in _OF_MEMBER}}
@@ -101,13 +103,13 @@ def _add_sample(datasets: dict[str, _Found], key: str, members: Mapping[str, Mem
 
 
 def _add_picture(
-    dataset: _Found, frame: str, view: str, split: str, picture: Mapping[str, Any]
+    dataset: _DatasetInShards, frame: str, view: str, split: str, picture: Mapping[str, Any]
 ) -> None:
     """Add a picture's view to the lightfield.json of its folder."""
     path = PurePosixPath(picture["path"])
     folders = [folder for folder in path.parent.parts if folder != IMAGES]
     view_pass = folders.pop() if folders and _is_pass(folders[-1]) else None
-    shown = dataset.shown.setdefault(str(PurePosixPath(frame, *folders)), _Shown())
+    shown = dataset.shown.setdefault(str(PurePosixPath(frame, *folders)), _ShownViews())
     shown.content |= {key: picture[key] for key in _OF_LENS if key in picture}
     name = view if view_pass == FLOW.name else path.stem
     pose = {"name": name, "world_matrix": picture["world_matrix"], "split": split}
