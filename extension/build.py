@@ -20,10 +20,11 @@ ROOT = HERE.parent
 LIBRARY = ROOT / "scripts" / "lightfield"
 # The parts of the library that the extension uses, and all that they import.
 PARTS = ("core", "geometry", "imaging", "formats", "configuration", "rendering/clearance.py")
-# Wheels for the Pythons of Blender 5.0 and later, on the systems that the manifest names.
+# Wheels for the systems that the manifest names, and for the Pythons of Blender 5.0 and later.
+# Linux distributions build Blender with a later Python.
 PACKAGES = "pydantic pydantic-core pyyaml annotated-types typing-extensions typing-inspection"
 LOCK = ROOT / "envs" / "requirements-3.13.txt"
-PYTHONS = ("3.11", "3.13")
+PYTHONS = ("3.11", "3.13", "3.14")
 SYSTEMS = ("manylinux_2_17_x86_64", "macosx_11_0_arm64")
 
 

@@ -148,9 +148,25 @@ class WriteYaml(Button):
         self.report({"INFO"}, line)
 
 
+# Whether something was undone or redone since the .blend was saved or opened.
+is_undone = [False]
+
+
 def is_saved() -> bool:
-    """Return whether the .blend's file has all changes."""
-    return not bpy.data.is_dirty
+    """Return whether the .blend's file has all changes. Blender itself does not count an undo."""
+    return not (bpy.data.is_dirty or is_undone[0])
+
+
+@persistent
+def on_undo(*_: Any) -> None:
+    """Note that the .blend's file may differ. Blender calls this after each undo and redo."""
+    is_undone[0] = True
+
+
+@persistent
+def on_file(*_: Any) -> None:
+    """Note that the .blend's file is as shown. Blender calls this after it saves or opens one."""
+    is_undone[0] = False
 
 
 class AddRig(Change):
@@ -282,7 +298,8 @@ def _draw_rig(layout: Any, scene: Any, empty: Any) -> None:
     column = layout.column(align=True)
     column.enabled = rig_objects.is_editable(rig)
     for index in range(len(rig_objects.counts(settings))):
-        column.prop(empty.plenoforge, f"count_{index}")
+        key = rig_objects.count_key(settings)
+        column.prop(empty.plenoforge, f"count_{index}", text=key.capitalize())
     for line in facts(scene, rig, empty):
         layout.label(text=line)
 
@@ -338,6 +355,13 @@ def on_change(scene: Any, depsgraph: Any) -> None:
         _check_soon()
 
 
+HANDLERS = (
+    (bpy.app.handlers.depsgraph_update_post, on_change),
+    (bpy.app.handlers.undo_post, on_undo),
+    (bpy.app.handlers.redo_post, on_undo),
+    (bpy.app.handlers.save_post, on_file),
+    (bpy.app.handlers.load_post, on_file),
+)
 CLASSES = (
     *(RigProperties, OpenYaml, WriteYaml, AddRig, RemoveRig, SelectRig, CheckRigs, ReadSilvr),
     RigPanel,
@@ -349,13 +373,15 @@ def register() -> None:
         bpy.utils.register_class(each)
     bpy.types.Object.plenoforge = bpy.props.PointerProperty(type=RigProperties)
     bpy.types.Scene.plenoforge_yaml = bpy.props.StringProperty(subtype="FILE_PATH")
-    bpy.app.handlers.depsgraph_update_post.append(on_change)
+    for handlers, function in HANDLERS:
+        handlers.append(function)
 
 
 def unregister() -> None:
     if bpy.app.timers.is_registered(_check_now):
         bpy.app.timers.unregister(_check_now)
-    bpy.app.handlers.depsgraph_update_post.remove(on_change)
+    for handlers, function in HANDLERS:
+        handlers.remove(function)
     del bpy.types.Scene.plenoforge_yaml
     del bpy.types.Object.plenoforge
     for each in reversed(CLASSES):

@@ -147,15 +147,20 @@ def numbers(values: Any) -> list[float]:
     return [int(value) if value.is_integer() else value for value in rounded]
 
 
+def count_key(settings: dict[str, Any]) -> str | None:
+    """Return the key that counts a rig's cameras."""
+    return next((key for key in COUNTS if key in settings), None)
+
+
 def counts(settings: dict[str, Any]) -> list[int]:
     """Return a rig's numbers of cameras, as its key has them."""
-    value = next((settings[key] for key in COUNTS if key in settings), [])
+    value = settings.get(count_key(settings), [])
     return list(value) if isinstance(value, list) else [value]
 
 
 def with_count(settings: dict[str, Any], index: int, count: int) -> dict[str, Any]:
     """Return a rig's keys with another number of cameras along one axis."""
-    key = next(key for key in COUNTS if key in settings)
+    key = count_key(settings)
     changed = counts(settings)
     changed[index] = count
     return {**settings, key: changed if isinstance(settings[key], list) else count}

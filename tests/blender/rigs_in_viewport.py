@@ -5,6 +5,7 @@ of this file and its arguments. OUTPUT gets the list of what they return.
 """
 
 import importlib
+import itertools
 import json
 import sys
 import types
@@ -28,6 +29,20 @@ def register():
     package().register()
 
 
+def reload():
+    """Reload the extension as Blender does after it installs another version of it.
+
+    Return the names of the extension's files that are not loaded anew.
+    """
+    before = loaded()
+    importlib.reload(package())
+    return [name for name, module in loaded().items() if before.get(name) is module]
+
+
+def loaded():
+    return {name: each for name, each in sys.modules.items() if name.startswith("plenoforge_rigs.")}
+
+
 def unregister():
     package().unregister()
     return traces()
@@ -37,7 +52,8 @@ def traces():
     """Return what is registered in Blender that names the extension."""
     names = [name for name in dir(bpy.types) if "plenoforge" in name.lower()]
     names += [f"{kind}.plenoforge" for kind in ("Object", "Scene") if has_property(kind)]
-    names += ["handler" for each in bpy.app.handlers.depsgraph_update_post if of_extension(each)]
+    lists = [each for each in bpy.app.handlers if isinstance(each, list)]
+    names += ["handler" for each in itertools.chain(*lists) if of_extension(each)]
     return names + [name for name in dir(bpy.ops) if "plenoforge" in name]
 
 
@@ -147,6 +163,10 @@ def select(name):
 def undo():
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         bpy.ops.ed.undo()
+
+
+def is_undone():
+    return package().panel.is_undone[0]
 
 
 def push(message):

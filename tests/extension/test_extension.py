@@ -226,7 +226,7 @@ def test_the_panel_shows_the_active_rig(blender, project):
         "mine.yaml",
         *("around", "wall", "walk"),
         *("Add rig", "Remove"),
-        *("wall", "3", "2"),
+        *("wall", "3", "Cameras", "2", "Cameras"),
         "Type: plane",
         "Cameras: 6",
         "Size: 1 × 1 × 1 m",
@@ -235,6 +235,15 @@ def test_the_panel_shows_the_active_rig(blender, project):
         "Resolution: 64 × 48",
         "Inside objects: 0",
         *("Check cameras", "Write YAML"),
+    ]
+
+
+def test_the_panel_names_a_count_as_the_yaml_does(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    *_, texts = blender("register", opened(path), ("select", ["around"]), "panel")
+    assert texts[texts.index("Type: sphere") - 2 :][:4] == [
+        *("2", "Subdivisions"),
+        *("Type: sphere", "Cameras: 42"),
     ]
 
 
@@ -328,6 +337,19 @@ def test_the_lock_records_the_saved_blend(blender, project):
     assert blender("register", save, opened(path), save, written())[-1] is None
     sha256 = subprocess.run(["sha256sum", blend], capture_output=True, text=True).stdout.split()[0]
     assert json.loads(lock.read_text()) == {"blend": "mine.blend", "sha256": sha256}
+
+
+def test_an_undo_after_saving_is_a_change(blender, project):
+    """The .blend's file has what was undone. With windows, Blender calls the .blend saved then."""
+    blend = str(project / "mine.blend")
+    path = project / "configs/scenes/mine.yaml"
+    moved = ("type_location", ["around", [1, 0, 0]])
+    *_, saved, _, undone, _, saved_again, _, _, _, opened_again = blender(
+        *("register", opened(path), ("push", ["opened"]), moved),
+        *(("save", [blend]), "is_undone", "undo", "is_undone", ("save", [blend]), "is_undone"),
+        *(moved, "undo", ("open_blend", [blend]), "is_undone"),
+    )
+    assert (saved, undone, saved_again, opened_again) == (False, True, False, False)
 
 
 def test_a_blend_without_a_yaml_gets_one(blender, tmp_path):
@@ -451,3 +473,8 @@ def test_unregistering_leaves_nothing(blender, project):
         "traces", "register", opened(project / "configs/scenes/mine.yaml"), "unregister"
     )
     assert before == after == []
+
+
+def test_a_later_version_replaces_all_code_without_a_restart(blender):
+    """Blender reloads the first file alone."""
+    assert blender("register", "unregister", "reload")[-1] == []
