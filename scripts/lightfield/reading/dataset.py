@@ -131,7 +131,7 @@ class View:
         pixels = np.stack([image.channels[channel] for channel in view_pass.channels], axis=-1)
         if pixels.dtype.kind == "f":
             pixels = pixels.astype(np.float32, copy=False)
-        return pixels if len(view_pass.channels) > 1 else pixels[..., 0]
+        return pixels if len(view_pass.channels) > 1 else pixels.squeeze(axis=-1)
 
     def rays(self) -> tuple[Doubles, Doubles]:
         """Return the rays of all pixels' centres in the world: origins and unit directions.
