@@ -128,7 +128,9 @@ class View:
         image = self._read(
             view_pass.path(Path(self.dataset.folder), view).as_posix(), view_pass.channels
         )
-        pixels = np.stack([image.channels[channel] for channel in view_pass.channels], axis=-1)
+        pixels: Array = np.stack(
+            [image.channels[channel] for channel in view_pass.channels], axis=-1
+        )
         if pixels.dtype.kind == "f":
             pixels = pixels.astype(np.float32, copy=False)
         return pixels if len(view_pass.channels) > 1 else pixels.squeeze(axis=-1)
