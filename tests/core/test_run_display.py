@@ -105,6 +105,22 @@ def test_bars_and_one_line_show_the_progress_of_the_whole_run(run):
 
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
+def test_a_first_view_that_takes_long_is_not_taken_for_no_progress(run):
+    run.tasks = {
+        "a": run.task("a", "views", views=10, seconds=100.0),
+        "place": run.task("place", "cameras", seconds=5.0),
+    }
+    run.begin()
+    run.shown(running=["place"])
+    run.shown(5, finished=["place"], running=["a"])
+    run.log("a", "render scene a: 10 views to do")
+    # By its estimate, a view takes 10 s. The other nine will take as long as this one.
+    *_, line = run.shown(300)
+    minutes = int(line.split(" · ")[-1].split()[0])
+    assert 20 < minutes <= 9 * 300 / 60
+
+
+@pytest.mark.parametrize("run", [Terminal], indirect=True)
 @pytest.mark.parametrize("columns", [20, 40, 200])
 def test_no_line_of_the_progress_is_wider_than_the_terminal(run, monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", str(columns))

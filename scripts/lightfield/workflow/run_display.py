@@ -64,6 +64,17 @@ class Task:
             return 1.0
         return (self.already + self.done) / self.total if self.total else 0.0
 
+    def part_at(self, now: float, seconds: float) -> float:
+        """Return the part of its work that is done at ``now``, if all of it takes ``seconds``.
+
+        Its log tells of whole pieces. The piece at work counts by its time, and at most as done.
+        """
+        if self.began is None or self.ended is not None or not seconds:
+            return self.part
+        pieces = self.total or self.views or 1
+        untold = (now - self.began) / seconds * pieces - self.done
+        return min(1.0, self.part + min(max(untold, 0.0), 1.0) / pieces)
+
     @property
     def views_done(self) -> int:
         return round(self.views * self.part)
@@ -390,8 +401,9 @@ class RunDisplay:
         remaining = 0.0
         for task in self._tasks.values():
             seconds = slowness * (task.seconds or 0.0)
-            done += seconds * task.part * (1 - task.already / (task.total or 1))
-            remaining += seconds * (1 - task.part)
+            part = task.part_at(now, seconds)
+            done += seconds * part * (1 - task.already / (task.total or 1))
+            remaining += seconds * (1 - part)
         elapsed = now - self._began
         # Before much is done, assume that all cores work.
         rate = done / elapsed if done > _SURE_AFTER else float(self._cores)
