@@ -418,7 +418,9 @@ FILES = ["oak.png"]
 """
     )
     result = run_program(folder / program, cwd=folder)
-    *scenes, modules, paths = result.stdout.strip().splitlines()[-4:]
+    # Blender 5.0 also prints what it packs.
+    lines = [line for line in result.stdout.splitlines() if not line.startswith("Info:")]
+    *scenes, modules, paths = lines[-4:]
     assert scenes == ["['Cube', 'called 1 with 4']"] * 2
     assert (modules, paths) == ("[]", "[]")
 
