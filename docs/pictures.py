@@ -184,18 +184,16 @@ def main() -> None:
     arguments = parser.parse_args()
     draw_rigs(FOLDER / "rig_types.png")
     draw_places(FOLDER / "way_cluster.jpg")
-    if arguments.passes:
-        draw_passes(FOLDER / "passes.jpg", arguments.passes)
-    if arguments.lenses:
-        draw_lenses(FOLDER / "lenses.jpg", arguments.lenses)
-    if arguments.walk:
-        draw_walk(FOLDER / "garden_walk.webp", arguments.walk)
-    if arguments.points:
-        draw_points(FOLDER / "way_train.jpg", arguments.points)
-    if arguments.depth:
-        draw_depth(FOLDER / "way_study.jpg", arguments.depth)
-    if arguments.blend:
-        draw_blend(FOLDER / "way_blend.jpg", arguments.blend)
+    for flag, draw, name in (
+        ("passes", draw_passes, "passes.jpg"),
+        ("lenses", draw_lenses, "lenses.jpg"),
+        ("walk", draw_walk, "garden_walk.webp"),
+        ("points", draw_points, "way_train.jpg"),
+        ("depth", draw_depth, "way_study.jpg"),
+        ("blend", draw_blend, "way_blend.jpg"),
+    ):
+        if source := getattr(arguments, flag):
+            draw(FOLDER / name, source)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,8 @@ NEW_RIGS: dict[str, dict[str, Any]] = {
     "spiral": {"count": 50},
 }
 NEW_CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [1024, 1024]}
+# Custom property of a scene: the names of the rigs that were read from the scene YAML.
+_OPENED = "plenoforge_opened"
 # Seconds without a change after which cameras are checked, if a check takes less than the second.
 _PAUSE = 0.5
 _QUICK = 1.0
@@ -108,10 +110,6 @@ class OpenYaml(Change):
             rig_objects.add(scene, name, settings)
         scene[_OPENED] = list(rigs)
         _show(context)
-
-
-# Custom property of a scene: the names of the rigs that were read from the scene YAML.
-_OPENED = "plenoforge_opened"
 
 
 class WriteYaml(Button):

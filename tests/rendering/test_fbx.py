@@ -8,28 +8,11 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from model_imports import imported, refusal
 
-from lightfield.core.errors import UserError
 from lightfield.imaging.images import write_png
-from lightfield.stages.scene import ImportSettings
 
 pytestmark = pytest.mark.slow
-
-
-def imported(path, **settings):
-    """Import a model into the open scene, and return its record."""
-    # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
-
-    return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
-
-
-def refusal(path, **settings):
-    with pytest.raises(UserError) as caught:
-        imported(path, **settings)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ") and message.isprintable()
-    return message
 
 
 # ---- the same pixels as the original --------------------------------------------------------

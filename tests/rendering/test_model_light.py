@@ -9,11 +9,11 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from checkouts import checkout, jobs_on, snakemake
+from model_imports import imported
 
 from lightfield.configuration.family import Family
 from lightfield.core.errors import UserError
 from lightfield.imaging import environment
-from lightfield.stages.scene import ImportSettings
 from lightfield.workflow import presence
 
 CUBE = """v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
@@ -41,14 +41,6 @@ def cube(folder):
     path = folder / "cube.obj"
     path.write_text(CUBE)
     return path
-
-
-def imported(path, **settings):
-    """Import a model into the open scene, and return its record."""
-    # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
-
-    return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
 
 
 def picture(folder, place, turn, **camera_keys):
@@ -159,15 +151,22 @@ REFUSED_BY_THE_IMPORT = {
 }
 
 
+def write_scene(folder, text):
+    (folder / "configs/scenes").mkdir(parents=True)
+    (folder / "configs/scenes/chair.yaml").write_text(text)
+
+
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_plan_says_what_is_wrong_with_a_light(tmp_path, name):
+def test_a_plan_says_what_is_wrong_with_a_light(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
     write, said = REFUSED[name]
     path = tmp_path / "sky.exr"
+    write_scene(tmp_path, f"scene:\n  model: cube.obj\n  light: {path}\n")
     write(path)
     with pytest.raises(UserError) as caught:
         presence.check_light("chair", str(path))
     message = str(caught.value)
-    assert message.startswith(f"configs/scenes/chair.yaml: scene.light: {path}: ")
+    assert message.startswith(f"configs/scenes/chair.yaml:3: scene.light: {path}: ")
     assert said in message and "\n" not in message
 
 
@@ -185,14 +184,18 @@ def test_a_light_that_cannot_be_read_to_its_end_passes_the_plan(tmp_path):
     environment.check_header(write_picture(tmp_path / "sky.hdr", sky()))
 
 
-def test_every_listed_light_of_a_family_is_checked(tmp_path):
+def test_every_listed_light_of_a_family_is_checked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     write_picture(tmp_path / "sky.hdr", sky())
     choice = ["city", str(tmp_path / "sky.hdr"), str(tmp_path / "missing.hdr")]
-    family = Family(models="*.obj", values={"scene.light": {"choice": choice}})
+    values = {"scene.light": {"choice": choice}}
+    # The light is drawn, so its line is not that of the block scene.
+    write_scene(tmp_path, f"scene: {{}}\nfamily:\n  values:\n    {json.dumps(values)[1:-1]}\n")
+    family = Family(models="*.obj", values=values)
     with pytest.raises(
-        UserError, match=r"chairs\.yaml: scene\.light: \S*missing\.hdr: cannot be read"
+        UserError, match=r"chair\.yaml:4: scene\.light: \S*missing\.hdr: cannot be read"
     ):
-        presence.check_lights("chairs", family)
+        presence.check_lights("chair", family)
 
 
 SCENE = """
@@ -218,7 +221,7 @@ def test_a_changed_light_builds_its_dataset_again(tmp_path):
     result = snakemake(folder, *choice)
     assert result.returncode != 0
     assert (
-        "error: configs/scenes/chair.yaml: scene.light: lights/sky.hdr: cannot be read: No such"
+        "error: configs/scenes/chair.yaml:2: scene.light: lights/sky.hdr: cannot be read: No such"
         in result.stderr
     )
     light = write_picture(folder / "lights/sky.hdr", sky())

@@ -9,15 +9,16 @@ import struct
 import subprocess
 import zipfile
 import zlib
+from functools import partial
 from pathlib import Path
 
 import forks
+import model_imports
 import numpy as np
 import pytest
 from conftest import SCRIPTS
 
 from lightfield.configuration.scene_source import SceneSource
-from lightfield.core.errors import UserError
 from lightfield.stages.scene import ImportSettings
 
 
@@ -42,22 +43,8 @@ def written(path, content):
     return path
 
 
-def imported(path, **settings):
-    """Import a model into the open scene. Return its record."""
-    # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
-
-    options = ImportSettings(model=str(path), unit="metres", **settings)
-    return model.make_scene(options, path.parent)
-
-
-def refusal(path, **settings):
-    """Return the message with which the import of a model is refused."""
-    with pytest.raises(UserError) as caught:
-        imported(path, **settings)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ") and message.isprintable()
-    return message
+imported = partial(model_imports.imported, unit="metres")
+refusal = partial(model_imports.refusal, unit="metres")
 
 
 def as_address(kind, content):

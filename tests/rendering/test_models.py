@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from checkouts import checkout, jobs_on, snakemake
 from conftest import BLENDER, SCRIPTS
+from model_imports import imported
 
 from lightfield.configuration import keys
 from lightfield.core.errors import UserError
@@ -161,15 +162,6 @@ def test_an_animated_model_is_measured_at_its_frame(renders, name):
     shape = silhouette(renders.pictures[name])
     assert (shape != silhouette(renders.pictures["last frame"])).sum() <= 2
     assert shape[:, :8].any() and shape[:, 24:].any()
-
-
-def imported(path, **settings):
-    """Import a model into the open scene, and return its record."""
-    # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
-    from lightfield.stages.scene import ImportSettings
-
-    return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
 
 
 # A tetrahedron of 1 m, and two ways to place it at x = 0 and x = 10.

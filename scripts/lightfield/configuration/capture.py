@@ -9,9 +9,10 @@ from pydantic import Field, PlainSerializer
 
 from lightfield.configuration import blend_lock, scene_source
 from lightfield.configuration.keys import VERSIONS, scene_fingerprint
-from lightfield.configuration.scene_source import FILE, SceneSource
+from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
+from lightfield.core.names import FILE
 from lightfield.core.setting_types import AtLeastOne
 from lightfield.core.settings import Settings
 from lightfield.core.stage import cause

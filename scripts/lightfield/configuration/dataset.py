@@ -14,12 +14,11 @@ from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.core.names import PARTS, scene_folder
+from lightfield.core.names import FILE, PARTS, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
-from lightfield.imaging import blender_looks
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class Dataset(Capture):
     def uses_file_look(self) -> bool | None:
         """Whether something is developed with the look of the user's .blend. Otherwise None."""
         made = [*self.reprojections.values(), *self.exports.selected.values()]
-        return any(getattr(each, "look", None) == blender_looks.FILE for each in made) or None
+        return any(getattr(each, "look", None) == FILE for each in made) or None
 
     # Files that a dataset may lack.
 

@@ -79,12 +79,12 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     if source.dataset:
         return _digest(published.fingerprint(source.dataset))
     assert source.builder
-    files = []
-    folders = ["library", source.builder]
-    parameters = source.parameters
-    if isinstance(parameters, Parameters):
-        parameters = parameters.model_dump(exclude_none=True)
-    if own_builder.is_own(source.builder):
+    if isinstance(source.parameters, Parameters):
+        parameters = source.parameters.model_dump(exclude_none=True)
+        files = []
+        folders = ["library", source.builder]
+    else:
+        parameters = source.parameters
         builder = Path(source.builder)
         own_files = own_builder.files(builder)
         files = [[file.relative_to(builder.parent).as_posix(), sha256(file)] for file in own_files]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, ValidationInfo, WrapValidator, model_validator
 
 from lightfield.configuration import own_builder
-from lightfield.core.names import LIGHTS, MODELS, SOFTBOXES, UP, builders
+from lightfield.core.names import FILE, LIGHTS, MODELS, SOFTBOXES, UP, builders
 from lightfield.core.setting_types import QUOTED
 from lightfield.core.settings import AS_WRITTEN, Address, Settings, pattern
 from lightfield.geometry.rigs.rig import Frame
@@ -98,8 +98,6 @@ SharedFolder = Annotated[
         pattern=pattern(rf"^{QUOTED}$", "a path of a folder, without { } * ? [ ] and line breaks")
     ),
 ]
-# The word in a scene YAML that stands for the .blend's own value.
-FILE = "file"
 # Keys of `SceneSource` that only a .blend takes.
 _BLEND_KEYS = (
     *("scene_name", "view_layers", "followed_camera", "allow_missing", "sha256", "url", "page"),

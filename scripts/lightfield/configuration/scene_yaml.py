@@ -28,9 +28,9 @@ from lightfield.configuration.reprojections import (
     bracketed,
     face_problem,
 )
-from lightfield.configuration.scene_source import FILE, SceneSource
+from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
-from lightfield.core.names import MESH, PARTS, ROOT, VIEWS
+from lightfield.core.names import FILE, MESH, PARTS, ROOT, VIEWS
 from lightfield.core.setting_types import Auto, unique_names
 from lightfield.core.settings import Name, Settings, checked, checked_yaml, suggestion
 from lightfield.core.yaml_files import (
@@ -307,9 +307,7 @@ class Scene(Credits):
             **{f"exports.{name}": export for name, export in self.exports.selected.items()},
             "sensor": self.sensor,
         }
-        return [
-            f"{key}.look" for key, block in blocks.items() if _look_of(block) == blender_looks.FILE
-        ]
+        return [f"{key}.look" for key, block in blocks.items() if _look_of(block) == FILE]
 
     @property
     def developments(self) -> dict[str, Reprojection]:
@@ -701,7 +699,8 @@ def check_scene(text: str, file: str) -> Scene:
 def mistake(scene: str, problem: str) -> UserError:
     """Return the error for a mistake in a scene YAML, with the line of the problem's key."""
     path = scene_path(scene)
-    return UserError(located(problem, read_settings_text(path, _shown(path)), _shown(path)))
+    file = _shown(path)
+    return UserError(_located_in_family(problem, read_settings_text(path, file), file))
 
 
 def _shown(path: Path) -> str:
@@ -720,10 +719,11 @@ def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
         with suppress(ValidationError, TypeError):
             content = stand_in(content)
             is_family = True
+    locate = _located_in_family if is_family else located
+    return checked_yaml(_SCENE, content, lambda problem: locate(problem, text, file))
 
-    def located_here(problem: str) -> str:
-        # The line of a value that a family draws is in family.values.
-        depth, line = find_key(f"family.values.{problem}", text) if is_family else (0, 0)
-        return f"{file}:{line}: {problem}" if depth > 2 else located(problem, text, file)
 
-    return checked_yaml(_SCENE, content, located_here)
+def _located_in_family(problem: str, text: str, file: str) -> str:
+    """Return `located`. The line of a value that a family draws is in family.values."""
+    depth, line = find_key(f"family.values.{problem}", text)
+    return f"{file}:{line}: {problem}" if depth > 2 else located(problem, text, file)

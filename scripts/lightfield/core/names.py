@@ -20,6 +20,9 @@ READER = "read.py"
 # The file that lists the members of a family.
 CORPUS = "corpus.json"
 
+# The word in a scene YAML that stands for the .blend's own value.
+FILE = "file"
+
 # The help of all flags --inventory.
 INVENTORY = "JSON that scripts/inventory.py wrote for the scene"
 

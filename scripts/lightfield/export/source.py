@@ -162,8 +162,7 @@ class SourceDataset:
         if self.suffix == ".png" and not self.lightfield.transparent:
             return image.encoded
         if self.suffix == ".png":
-            alpha = image.channels["A"] / np.iinfo(image.channels["A"].dtype).max
-            developed = decode_srgb(image.encoded) * alpha[..., np.newaxis]
+            developed = decode_srgb(image.encoded) * image.alpha[..., np.newaxis]
         elif self.look:
             return np.asarray(self.look.developed(image.colour), np.float64)
         else:

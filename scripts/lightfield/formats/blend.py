@@ -11,6 +11,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.units import count
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.lenses.rectilinear import RectilinearSettings
+from lightfield.imaging.blender_looks import DISPLAY, NO_LOOK
 
 Settings = Mapping[str, Any]
 
@@ -22,8 +23,6 @@ _ENGINES = {
 
 # The clipping planes of a new camera in Blender, in metres.
 _BLENDERS_CLIP = (0.1, 1000)
-# Blender's name for the display of all PNGs.
-_DISPLAY = "sRGB"
 # Blender's name for the colour space of all datasets.
 REC_709 = "Linear Rec.709"
 
@@ -207,7 +206,7 @@ def _display(blend: Settings, uses_look: bool) -> Iterator[str]:
     ``uses_look`` says whether something is developed with them. Views are light in any case.
     """
     parts = [f"view transform {blend['view_transform']}"]
-    if blend["look"] != "None":
+    if blend["look"] != NO_LOOK:
         parts.append(f"look {blend['look']}")
     if blend["exposure"]:
         parts.append(f"view exposure {blend['exposure']:+g}")
@@ -227,10 +226,10 @@ def look_of(blend: Settings) -> dict[str, Any]:
 
     Raises `UserError` for what would not give Blender's own pictures.
     """
-    if blend["display"] != _DISPLAY:
+    if blend["display"] != DISPLAY:
         raise UserError(
-            f"look: file: the .blend's display is {blend['display']}, and PNGs are {_DISPLAY}; "
-            f"choose {_DISPLAY} in Blender's Color Management, or give look a name"
+            f"look: file: the .blend's display is {blend['display']}, and PNGs are {DISPLAY}; "
+            f"choose {DISPLAY} in Blender's Color Management, or give look a name"
         )
     if blend["curves"] and blend["curve_tone"] != "STANDARD":
         raise UserError(

@@ -64,8 +64,7 @@ def flow(
     offset = rays * np.where(far, 1, distance)[..., None] + baseline
     pixels = lens.pixels(offset @ world_from_other[:3, :3])
     x, y = np.moveaxis(pixels, -1, 0)
-    with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
+    inside = lens.in_frame(pixels)
     # Take the farthest of the four pixels around: at an edge, the surface behind is visible, too.
     farthest = np.full(distance.shape, -np.inf)
     for dx in (-0.5, 0.5):

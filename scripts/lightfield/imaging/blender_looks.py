@@ -15,10 +15,9 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import AfterValidator, Field
 
 from lightfield.core.errors import UserError
+from lightfield.core.names import FILE
 from lightfield.core.settings import suggestion
 
-FILE = "file"
-"""Instead of a look's name: the look of the .blend."""
 FILE_LOOK = "file_look"
 """The key of lightfield.json with the look of the .blend, if something is developed with it."""
 

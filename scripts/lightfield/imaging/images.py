@@ -85,10 +85,10 @@ class Image:
 
     @property
     def alpha(self) -> np.ndarray[Any, Any]:
-        """Channel A as (height, width) float32, 0 to 1."""
+        """Channel A as (height, width) float64, 0 to 1."""
         alpha = self.channels["A"]
-        scale = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
-        return np.asarray(alpha.astype(np.float32) / scale)
+        largest = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
+        return np.asarray(alpha.astype(np.float64) / largest)
 
     @property
     def encoded(self) -> np.ndarray[Any, Any]:

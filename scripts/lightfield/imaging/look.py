@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.core.names import FILE
 from lightfield.imaging.blender_looks import (
     DISPLAY,
-    FILE,
     NO_LOOK,
     blender,
     is_data,

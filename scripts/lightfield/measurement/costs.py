@@ -10,10 +10,10 @@ from statistics import mean
 from typing import Any
 
 from lightfield.configuration.config_file import Energy
-from lightfield.configuration.scene_source import FILE
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.names import FILE
 from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField

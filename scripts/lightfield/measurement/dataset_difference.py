@@ -280,14 +280,14 @@ def _names(folder: Path) -> dict[str, None]:
 
 def _is_of_views(name: str) -> bool:
     """Return whether a file is a view, or a pass of a view."""
-    folder, _, file = re.sub(r"^f\d{5,7}/", "", name).partition("/")
+    folder, _, file = dataset_facts.in_frame(name).partition("/")
     is_group = folder.startswith(GROUP_PREFIX)
     return "/" not in file and (is_group or folder in (IMAGES, FLOW.name, *PASSES))
 
 
 def _is_of_reprojection(name: str, reprojection: str) -> bool:
     """Return whether a file lies in the folder of a reprojection."""
-    parts = re.sub(r"^f\d{5,7}/", "", name).split("/")
+    parts = dataset_facts.in_frame(name).split("/")
     return len(parts) == 2 and parts[0] == reprojection and parts[1] != NAME
 
 

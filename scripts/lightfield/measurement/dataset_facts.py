@@ -86,6 +86,12 @@ def reprojection_of(place: str) -> str:
     return "" if _FRAME.fullmatch(name) else name
 
 
+def in_frame(name: str) -> str:
+    """Return the path of a dataset's file in the folder of its frame. Without one, the path."""
+    folder, _, inner_path = name.partition("/")
+    return inner_path if _FRAME.fullmatch(folder) else name
+
+
 def _settings(reprojection: str, lightfield: LightField) -> dict[str, Any]:
     """Return the settings in a lightfield.json."""
     content = lightfield.content

@@ -173,11 +173,7 @@ def _covered(alpha: Floats | None) -> Floats | None:
 
 def _alpha(image: images.Image) -> Floats | None:
     """Return a picture's alpha (h, w), 0 to 1. None if it has none."""
-    alpha = image.channels.get("A")
-    if alpha is None:
-        return None
-    largest = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
-    return alpha.astype(np.float64) / largest
+    return image.alpha if "A" in image.channels else None
 
 
 def _developed(

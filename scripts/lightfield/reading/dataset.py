@@ -87,7 +87,7 @@ class View:
     @property
     def alpha(self) -> Floats:
         """The part of each pixel (height, width) that the scene covers, from 0 to 1."""
-        return self._image(["A"]).alpha
+        return self._image(["A"]).alpha.astype(np.float32)
 
     @property
     def depth(self) -> Floats:

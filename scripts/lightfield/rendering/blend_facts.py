@@ -85,9 +85,7 @@ def _curve_tables(mapping: Any) -> dict[str, Any]:
     starts = []
     ends = []
     for curve in list(mapping.curves)[:3]:
-        places = [point.location.x for point in curve.points]
-        start = min(mapping.clip_min_x, *places)
-        end = max(mapping.clip_max_x, *places)
+        start, end = _range(mapping, curve)
         table = [
             mapping.evaluate(together, mapping.evaluate(curve, float(place)))
             for place in np.linspace(start, end, _CURVE_STEPS + 1)
@@ -107,11 +105,15 @@ def _curve_tables(mapping: Any) -> dict[str, Any]:
     }
 
 
+def _range(mapping: Any, curve: Any) -> tuple[float, float]:
+    """Return the values between which a curve is not a line."""
+    places = [point.location.x for point in curve.points]
+    return min(mapping.clip_min_x, *places), max(mapping.clip_max_x, *places)
+
+
 def _slopes(mapping: Any, curve: Any) -> tuple[float, float]:
     """Return the slopes with which a curve goes on before its start and after its end."""
-    places = [point.location.x for point in curve.points]
-    start = min(mapping.clip_min_x, *places)
-    end = max(mapping.clip_max_x, *places)
+    start, end = _range(mapping, curve)
     before = mapping.evaluate(curve, start) - mapping.evaluate(curve, start - 1)
     after = mapping.evaluate(curve, end + 1) - mapping.evaluate(curve, end)
     return before, after

@@ -6,10 +6,10 @@ from typing import Any
 
 import bpy
 
-from lightfield.configuration.scene_source import FILE
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.machine import describe
+from lightfield.core.names import FILE
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.formats.render_block import RenderBlock

@@ -11,9 +11,9 @@ from typing import Any
 
 import bpy
 
-from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
-from lightfield.rendering import animation
+from lightfield.core.names import FILE
+from lightfield.rendering import animation, viewport
 from lightfield.rendering.ids import has_no_surface
 
 _ACTIVE_CAMERA = "GeometryNodeInputActiveCamera"
@@ -92,20 +92,12 @@ def follow_views(file_camera: Any, view_camera: Any) -> None:
 
 def _show_in_viewport() -> None:
     """Let the viewport evaluate all that a render may. Blender tells changes of the viewport."""
-    layer = bpy.context.view_layer
     for obj in bpy.context.scene.objects:
         animation.mute(obj, ("hide_viewport", "modifiers["))
         obj.hide_viewport = obj.hide_render
         for modifier in obj.modifiers:
             modifier.show_viewport = modifier.show_render
-    for obj in layer.objects:
-        obj.hide_set(False)
-    for collection in bpy.data.collections:
-        collection.hide_viewport = collection.hide_render
-    parts = [layer.layer_collection]
-    for part in parts:
-        part.hide_viewport = False
-        parts += part.children
+    viewport.show_collections()
 
 
 def _changed_with(camera: Any) -> list[str]:

@@ -8,10 +8,10 @@ from typing import Any
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.scene_source import FILE
 from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.names import FILE
 from lightfield.core.paths import case_hint
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved

@@ -7,12 +7,13 @@ from typing import Any
 from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
+from lightfield.core.names import FILE
 from lightfield.formats import blend, light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
-from lightfield.imaging.blender_looks import FILE, FILE_LOOK
+from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.planning.sampling import calibrated
 from lightfield.stages.rig import MakeLightfield

@@ -12,12 +12,17 @@ from lightfield.rendering.volumes import alone
 def show_what_is_rendered() -> None:
     """Make the viewport show what a render of the current frame shows, without its volumes."""
     shown = in_render(_shown) - alone()
-    layer = bpy.context.view_layer
     for obj in bpy.data.objects:
         animation.mute(obj, ("hide_viewport",))
         obj.hide_viewport = obj.name_full not in shown
     for settings in bpy.data.particles:
         settings.display_percentage = 100
+    show_collections()
+
+
+def show_collections() -> None:
+    """Show in the viewport what only the viewport hides, and the collections that renders show."""
+    layer = bpy.context.view_layer
     for obj in layer.objects:
         obj.hide_set(False)
     for collection in bpy.data.collections:

@@ -10,7 +10,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from lightfield.report.page import TEMPLATES
+from lightfield.report.page import of_templates
 
 # An opening angle bracket, unless an address in angle brackets follows: a link in Markdown.
 _OPENING = re.compile(r"""<(?!https?://[^\s"'<>]*>)""")
@@ -23,12 +23,7 @@ def markdown(template: str, **values: Any) -> str:
 
 @cache
 def _environment() -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_without_html,
-    )
+    return of_templates(finalize=_without_html)
 
 
 def _without_html(value: Any) -> Any:

@@ -35,16 +35,17 @@ def write(output: Path, template: str, **content: Any) -> None:
     write_text(output, environment().get_template(template).render(**content))
 
 
+def of_templates(**options: Any) -> jinja2.Environment:
+    """Return an environment that fills in `TEMPLATES`, with Jinja's ``options``."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True, **options
+    )
+
+
 @cache
 def environment() -> jinja2.Environment:
     """Return the environment that fills in `TEMPLATES`. Each process compiles a template once."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = of_templates(autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files: they need no escaping.
     page_modules = script_modules(TEMPLATES / "page/main.js")

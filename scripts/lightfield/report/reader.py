@@ -11,7 +11,7 @@ from lightfield.imaging import images
 from lightfield.imaging.primaries import REC_709, are_rec_709, conversion
 from lightfield.report import snippet
 from lightfield.report.lens_source import LensSource
-from lightfield.report.page import TEMPLATES
+from lightfield.report.page import of_templates
 
 
 def source(
@@ -34,13 +34,7 @@ def source(
         "constants": lens_source.constants,
         "lenses": lens_source.text(lenses, "LENSES = "),
     }
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = of_templates(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     return environment.get_template("read.py.j2").render(
         **definitions,
         arrays=arrays,

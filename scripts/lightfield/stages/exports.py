@@ -13,9 +13,8 @@ from lightfield.configuration.exports import (
     InstantNgp,
     export_settings_of,
 )
-from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
-from lightfield.core.names import INVENTORY, VIEWS
+from lightfield.core.names import FILE, INVENTORY, VIEWS
 from lightfield.core.settings import Settings, checked
 from lightfield.core.stage import ByHand, Stage, option, reads, writes
 from lightfield.geometry.rigs.rig import Frame

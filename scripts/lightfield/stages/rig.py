@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.capture import LightfieldSettings
-from lightfield.configuration.scene_source import FILE
-from lightfield.core.names import INVENTORY
+from lightfield.core.names import FILE, INVENTORY
 from lightfield.core.settings import Settings
 from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.geometry.rigs import Random, as_written

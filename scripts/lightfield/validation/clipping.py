@@ -117,7 +117,7 @@ def _developments(
             lightfield = image_set.lightfield
             # A look brings bright light below white.
             is_known = not (image_set.sensor or lightfield.is_relit or lightfield.has_look)
-            settings = image_set.lightfield.content.get("reprojection", {})
+            settings = lightfield.content.get("reprojection", {})
             if is_known and 0 in lights and not sets[0].name:
                 yield _Development(
                     "",

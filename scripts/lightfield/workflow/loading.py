@@ -11,9 +11,8 @@ from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_source import FILE
 from lightfield.core.errors import UserError
-from lightfield.core.names import VIEWS, scene_folder
+from lightfield.core.names import FILE, VIEWS, scene_folder
 from lightfield.formats import published
 from lightfield.formats.render_block import RenderBlock, TargetError
 from lightfield.geometry.lenses import CameraSettings

@@ -69,7 +69,7 @@ def check_light(scene: str, light_file: str) -> None:
     try:
         environment.check_header(Path(light_file))
     except UserError as error:
-        raise UserError(f"{scene_yaml.OWN_SCENES}/{scene}.yaml: scene.light: {error}") from None
+        raise scene_yaml.mistake(scene, f"scene.light: {error}") from None
 
 
 def check_external_files(dataset: Dataset) -> None:
