@@ -1,0 +1,209 @@
+"""Render views as scripts/render_shard.py does, and measure the seconds of each step of a view.
+
+It takes the flags of scripts/render_shard.py, and writes --times besides. With --osl, an OSL shader
+of the equidistant lens takes the place of Cycles' own camera. Of the GPUs, only OptiX can do that.
+benchmarks/gpu.py starts it.
+"""
+
+import os
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield.core import files, processors
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.core.flags import program
+from lightfield.core.stage import option, writes
+from lightfield.formats.lightfield import LightField
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.imaging import images
+from lightfield.rendering import shard
+from lightfield.stages.views import RenderShard
+from lightfield.workflow import shard_log
+
+# The camera of the shader looks along +Z, and +Y is up. The corners of the raster are 0 and 1.
+# Pixels without throughput see nothing.
+SHADER = """
+shader equidistant(
+    output point position = 0, output vector direction = 0, output color throughput = 0)
+{{
+    point raster = camera_shader_raster_position();
+    float x = 2 * raster[0] - 1;
+    float y = 2 * raster[1] - 1;
+    float r = hypot(x, y);
+    if (r <= 1) {{
+        float theta = r * {half_fov!r};
+        float scale = r > 0 ? sin(theta) / r : 0;
+        direction = vector(scale * x, scale * y, cos(theta));
+        throughput = 1;
+    }}
+}}
+"""
+
+# The functions whose seconds are steps of their own. A step inside another one counts once.
+STEPS = {
+    "read": (images, "read_image"),
+    "compress": (images, "write_exr"),
+    "flush": (os, "fsync"),
+    "hash": (files.Stamp, "of"),
+}
+
+
+class TimedShard(RenderShard):
+    """Renders views as `RenderShard` does, and measures their steps."""
+
+    name = "timed_shard"
+    function = "timed_shard:render"
+
+    times: Path = writes("JSON to write: the seconds of each view by step")
+    denoise_on_gpu: bool = option("denoise on the GPU", False)
+    osl: bool = option("render through an OSL shader of the same lens", False)
+
+
+class Clock:
+    """Adds up the seconds of steps. The seconds of a step inside another one are not the other's.
+
+    ``seconds`` are those of the current view.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+        self.began: list[float] = []
+        self.inner = [0.0]
+
+    def begin(self, *_: Any) -> None:
+        """Begin a step."""
+        self.began.append(time.perf_counter())
+        self.inner.append(0.0)
+
+    def end(self, step: str) -> None:
+        """End the step that began last, and count its seconds."""
+        whole = time.perf_counter() - self.began.pop()
+        self.seconds[step] += whole - self.inner.pop()
+        self.inner[-1] += whole
+
+    def wrap(self, owner: Any, name: str, step: str) -> None:
+        """Count the seconds of a function as a step."""
+        function = getattr(owner, name)
+
+        @wraps(function)
+        def timed(*arguments: Any, **options: Any) -> Any:
+            self.begin()
+            try:
+                return function(*arguments, **options)
+            finally:
+                self.end(step)
+
+        setattr(owner, name, timed)
+
+
+def render(job: TimedShard) -> None:
+    """Render the views, and write the seconds of their steps."""
+    # Blender's libraries start their threads when they are imported.
+    with processors.only(job.threads or processors.available()):
+        from lightfield.rendering import colour_pass, cycles, geometry_pass
+
+    clock = Clock()
+    for step, (owner, name) in STEPS.items():
+        clock.wrap(owner, name, step)
+    watch_cycles(clock, colour_pass, "render_colour", "colour")
+    watch_cycles(clock, geometry_pass, "render_geometry", "geometry")
+    change_set_up(cycles, job, clock)
+    lines = watch_history(clock)
+    shard.render(job)
+    write_json(job.times, lines)
+
+
+def watch_blender(clock: Clock) -> None:
+    """Count the seconds of Blender's renders, from the first to the last of its own."""
+    import bpy
+
+    bpy.app.handlers.render_init.append(clock.begin)
+    bpy.app.handlers.render_complete.append(lambda *_: clock.end("blender"))
+
+
+def watch_cycles(clock: Clock, module: Any, name: str, step: str) -> None:
+    """Count Cycles' own seconds of a render as a step, and not as Blender's."""
+    function = getattr(module, name)
+
+    @wraps(function)
+    def timed(*arguments: Any, **options: Any) -> Any:
+        rendered = function(*arguments, **options)
+        clock.seconds[step] += rendered.render_seconds
+        clock.seconds["synchronization"] += rendered.synchronization_seconds
+        clock.seconds["blender"] -= rendered.render_seconds + rendered.synchronization_seconds
+        return rendered
+
+    setattr(module, name, timed)
+
+
+def change_set_up(cycles: Any, job: TimedShard, clock: Clock) -> None:
+    """Make the set-up of Cycles also set what a dataset cannot have, and watch Blender."""
+    function = cycles.set_up
+    lens = LightField.read(job.lightfield).lens
+
+    def set_up(*arguments: Any) -> Any:
+        import bpy
+
+        device = function(*arguments)
+        # Opening a scene has removed earlier handlers.
+        watch_blender(clock)
+        bpy.context.scene.cycles.denoising_use_gpu = job.denoise_on_gpu
+        if job.osl:
+            see_through_shader(bpy.context.scene.camera.data, lens)
+        return device
+
+    cycles.set_up = set_up
+
+
+def see_through_shader(camera: Any, lens: Lens) -> None:
+    """Make a camera of Blender see through the shader of an equidistant ``lens``."""
+    import bpy
+
+    if not isinstance(lens, Equidistant) or lens.principal_point:
+        raise UserError(f"--osl: is for a centred equidistant lens, not for a {lens.title}")
+    # Blender compiles shaders with a module of its own Python. It stands last: other packages there
+    # have other versions.
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    sys.path.append(f"{bpy.utils.resource_path('LOCAL')}/python/lib/{version}/site-packages")
+    text = bpy.data.texts.new("equidistant")
+    text.write(SHADER.format(half_fov=lens.fov / 2))
+    camera.type = "CUSTOM"
+    camera.custom_mode = "INTERNAL"
+    camera.custom_shader = text
+    if not camera.custom_bytecode:
+        raise UserError("--osl: Blender cannot compile the shader")
+
+
+def watch_history(clock: Clock) -> list[Mapping[str, Any]]:
+    """Return the list of the lines of history. Those of views will have the seconds of steps.
+
+    ``whole`` is the time since the line before: of the view and of its line.
+    """
+    log: Callable[[Mapping[str, Any]], None] = shard_log.log
+    lines: list[Mapping[str, Any]] = []
+    last = [time.perf_counter()]
+
+    def timed(entry: Mapping[str, Any]) -> None:
+        log(entry)
+        now = time.perf_counter()
+        if "view" in entry:
+            entry = {**entry, "steps": {**clock.seconds, "whole": now - last[0]}}
+        lines.append(entry)
+        clock.seconds.clear()
+        last[0] = now
+
+    shard_log.log = timed
+    return lines
+
+
+if __name__ == "__main__":
+    program(TimedShard, __doc__)
