@@ -336,6 +336,11 @@ REFUSED = [
     *(("render.motion_blur", value) for value in ("half", -1)),
     ("render.target_error", {"value": 0}, "render.target_error.value"),
     ("render.target_error", {"denoise": "never"}, "render.target_error"),
+    ("render.target_error", {"value": 0.1, "of_samples": 4}, "render.target_error"),
+    *(
+        ("render.target_error", {"of_samples": value}, "render.target_error.of_samples")
+        for value in (0, -1, 1.5, "256", "file")
+    ),
     ("render.target_error", {"value": 0.1, "denoise": "always"}, "render.target_error.denoise"),
     ("render.depth_of_field", True),
     *(("render", value) for value in (None, "fast")),
@@ -573,6 +578,11 @@ EXPLAINED = [
         "render",
         {"samples": 4, "light_groups": "each", "denoise": True},
         "render.denoise: does not go with light_groups",
+    ),
+    (
+        "render.target_error",
+        {"value": 0.1, "of_samples": 4},
+        "must be a number or have either value or of_samples",
     ),
     (
         "render",

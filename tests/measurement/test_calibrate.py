@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from lightfield.configuration import config_file, scene_yaml
 from lightfield.configuration.config_file import Preset
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
+from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
 from lightfield.planning.sampling import PLAIN
@@ -132,6 +134,39 @@ def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
         assert dataset.render.denoise is False
 
 
+def test_the_error_of_so_many_samples_is_measured_and_reached(once, calibrated):
+    cache = once[0] / "cache"
+    folder, result = calibrated({"of_samples": 32}, cache=cache)
+    record = json.loads((folder / "record.json").read_text())
+    target = record["target_error"]
+    plain = {c["samples"]: c["error"] for c in record["candidates"] if c["way"] == "plain"}
+    assert target == plain[32] and plain[64] < target < plain[16]
+    assert record["of_samples"] == 32
+    assert record["reached"] and record["probe_error"] <= 1.05 * target
+    assert record["cost_samples"] < 32
+    assert max(record["references"]["own_error"]) < target / 3
+    assert f"wanted {target:.3g}, the error of 32 samples" in result.stdout
+
+
+def test_a_choice_has_its_bias_which_neighbouring_views_may_share(once):
+    folder, result = once
+    record = json.loads((folder / "record.json").read_text())
+    assert record["choice"]["denoise"]
+    bias = record["bias"]
+    assert bias["squared_bias"] + bias["variance"] == pytest.approx(bias["error"])
+    # The same renders, compared in another way.
+    assert bias["error"] == pytest.approx(record["probe_error_of_all_pixels"], rel=0.3)
+    assert bias["squared_bias"] > 2 * bias["standard_error"]
+    assert "bias² is" in result.stdout
+
+
+def test_plain_path_tracing_has_no_bias_to_measure(once, calibrated):
+    folder, result = calibrated(0.5, cache=once[0] / "cache", denoise=False)
+    record = json.loads((folder / "record.json").read_text())
+    assert record["way"] == "plain" and record["bias"] is None
+    assert "all of it is noise" in result.stdout
+
+
 @pytest.mark.slow
 def test_a_dry_run_forecasts_the_cost_of_a_calibration(tmp_path):
     result = snakemake(
@@ -176,6 +211,33 @@ def test_a_method_with_too_much_bias_is_given_up(bias):
     search = Search(simulated(0.0, bias), TARGET, denoise=True)
     assert search.choose().error > TARGET
     assert max(entry.settings["samples"] for entry in search.measured) <= 4096
+
+
+@pytest.mark.parametrize("samples", [1, 16, 50, 1000])
+def test_the_target_is_the_error_of_the_plain_samples(samples):
+    search = Search(simulated(0.0), MeasuredTargetError(of_samples=samples))
+    assert search.target == 1 / samples
+    assert search.choose().cost == pytest.approx(max(1, samples / 2), rel=0.06)
+    # Without the denoiser, these samples themselves are the choice, and not one more.
+    plain = Search(only_plain, MeasuredTargetError(of_samples=samples), denoise=False).choose()
+    assert (plain.way, plain.samples) == ("plain", samples)
+
+
+def only_plain(method):
+    """Simulate renders in which adaptive sampling is useless."""
+    candidate = simulated(0.0)(method)
+    return candidate if method.name == "plain" else replace(candidate, error=1.0)
+
+
+def test_a_scene_without_noise_has_a_target_that_one_sample_reaches():
+    def measure(method):
+        settings = {**PLAIN, **method.settings}
+        samples = settings["samples"]
+        return Candidate(method.name, settings, samples, samples, 0.0, 0.0, 1.0)
+
+    search = Search(measure, MeasuredTargetError(of_samples=256))
+    assert 0 < search.target < 1e-6
+    assert search.choose().cost == 1
 
 
 def test_effort_is_interpolated_between_the_nearest_points():
@@ -239,6 +301,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
         return scene_yaml.read_scene(path)
 
     assert read("target_error: 0.01").render.target_error == 0.01
+    assert read("target_error: {of_samples: 9}").render.target_error.of_samples == 9
     for render, message in {
         "seed: 1": "render: is missing the key samples (or target_error)",
         "samples: 4, target_error: 0.1": "render.samples: does not go with target_error",
@@ -258,3 +321,9 @@ def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):
     assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & full.to_json().keys()
     preview = scene_datasets("aimed", "preview", LIMITS)[0].render
     assert (preview.most_samples, preview.denoise) == (12, True)
+    # A preset that limits samples also limits those whose error is the target.
+    Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: {of_samples: 256}"))
+    full = scene_datasets("aimed")[0].render
+    assert full.target_error == MeasuredTargetError(of_samples=256)
+    preview = scene_datasets("aimed", "preview", LIMITS)[0].render
+    assert preview.target_error == MeasuredTargetError(of_samples=12)

@@ -29,17 +29,36 @@ _PassNames = Annotated[
 _Emitters = Annotated[list[str], AfterValidator(unique_names)]
 
 
+_Error = Annotated[float, Field(gt=0, le=1), AS_WRITTEN]
+
+
 class TargetError(Settings):
     """The error that the views must reach, and the methods that may reach it."""
 
-    value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(
-        description="Relative mean squared error to reach."
+    value: _Error | None = Field(None, description="Relative mean squared error to reach.")
+    of_samples: AtLeastOne | None = Field(
+        None,
+        description="In place of value: reach the error that plain path tracing has with so many "
+        "samples. The calibration measures this error.",
+        json_schema_extra={"unit": "paths"},
     )
     denoise: Literal["auto", "never"] = Field(
         "auto",
         description="Whether the denoiser may be chosen. auto: if it is cheaper. never: only plain "
         "and adaptive sampling are compared.",
     )
+
+    @model_validator(mode="after")
+    def _value_or_samples(self) -> Self:
+        if (self.value is None) == (self.of_samples is None):
+            raise ValueError("must have either value or of_samples")
+        return self
+
+
+class MeasuredTargetError(TargetError):
+    """A target error whose value only the calibration will know."""
+
+    of_samples: AtLeastOne
 
 
 class CameraMotion(Settings):
@@ -84,7 +103,7 @@ class RenderOptions(Settings):
         ".blend.",
         json_schema_extra={"unit": "paths"},
     )
-    target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
+    target_error: _Error | TargetError | None = Field(
         None,
         description="Error to reach, instead of samples: samples, adaptive_threshold and denoise "
         "are then chosen on probe views. It is the relative mean squared error, (x - r)^2 / (r^2 + "
@@ -191,7 +210,7 @@ class RenderBlock(RenderOptions):
     calibration has yet to choose it, or the views are imported. Its value here is the default.
     """
 
-    target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = None
+    target_error: _Error | MeasuredTargetError | None = None
     # In any order: another program may have written them.
     passes: list[str] | None = None
     most_samples: AtLeastOne | None = Field(

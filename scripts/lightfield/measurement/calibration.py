@@ -15,18 +15,22 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_json
 from lightfield.formats.lightfield import LightField
-from lightfield.formats.render_block import RenderBlock
-from lightfield.measurement import metrics, strata
+from lightfield.formats.render_block import MeasuredTargetError, RenderBlock
+from lightfield.measurement import bias, metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.trials import Trials, ViewWindow, nearest_view
 from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples
 from lightfield.planning.sampling import (
+    BIAS_PART,
+    FEWEST_BIAS_SEEDS,
     FEWEST_SEEDS,
+    MOST_BIAS_SEEDS,
     MOST_SEEDS,
     PLAIN,
     PLAIN_SAMPLES,
     REFERENCE_PART,
     REFERENCE_SAMPLES,
+    reference_of_samples,
     standard_error,
 )
 from lightfield.stages.measurement import Calibrate
@@ -44,6 +48,9 @@ _LEAST_THRESHOLD = 1e-4
 # The target leaves out the worst thousandth of pixels. A method that reaches it may have at most
 # this many times the error of all pixels of plain path tracing at the target. More hides fireflies.
 _MOST_OF_PLAIN = 2
+
+# The least error that is worth a target: about that of rounding light to the views' half floats.
+_LEAST_TARGET = 1e-8
 
 # An error within this part of the target counts as on the target.
 _CLOSE = 0.05
@@ -82,8 +89,9 @@ class Candidate:
 class Bench:
     """An experiment with one seed. Its references are good enough for a target error.
 
-    The references take more seeds until their own error is a small part of the ``target``.
-    ``exposure`` is the references' exposure. Without it, their own light decides.
+    The references take more seeds until their own error is a small part of the ``target``. For the
+    error of so many samples, `reference_of_samples` says how many they need. ``exposure`` is the
+    references' exposure. Without it, their own light decides.
     """
 
     def __init__(
@@ -91,27 +99,37 @@ class Bench:
         renderer: Trials,
         windows: Sequence[ViewWindow],
         seed: int,
-        target: float,
+        target: float | MeasuredTargetError,
         exposure: float | None = None,
     ) -> None:
         self.seed = seed
-        self.reference_seeds = FEWEST_SEEDS
+        self.reference_seeds, self.samples_of_seed = FEWEST_SEEDS, REFERENCE_SAMPLES
+        if isinstance(target, MeasuredTargetError):
+            self.reference_seeds, self.samples_of_seed = reference_of_samples(target.of_samples)
         while True:
             references = metrics.exposed_alike(self._references(renderer, windows), exposure)
             self.experiment = Experiment(renderer, windows, references)
             self.own_error = self.experiment.reference_error
-            if self.own_error <= REFERENCE_PART * target or self.reference_seeds >= MOST_SEEDS:
+            if isinstance(target, MeasuredTargetError) or self.own_error <= REFERENCE_PART * target:
+                break
+            if self.reference_seeds >= MOST_SEEDS:
                 break
             self.reference_seeds *= 2
+
+    @property
+    def reference_samples(self) -> int:
+        """The samples of a pixel of the references, with all seeds."""
+        return self.reference_seeds * self.samples_of_seed
 
     def _references(
         self, renderer: Trials, windows: Sequence[ViewWindow]
     ) -> list[metrics.Reference]:
         references = []
-        samples = self.reference_seeds * REFERENCE_SAMPLES
         for number, window in enumerate(windows, 1):
-            references.append(renderer.reference(window, self.reference_seeds, REFERENCE_SAMPLES))
-            _print_progress(f"reference {number} of {len(windows)}, {samples} spp")
+            references.append(
+                renderer.reference(window, self.reference_seeds, self.samples_of_seed)
+            )
+            _print_progress(f"reference {number} of {len(windows)}, {self.reference_samples} spp")
         return references
 
     def measure(self, method: Method) -> Candidate:
@@ -142,23 +160,27 @@ class Bench:
 class Search:
     """Measures every method at rising effort. ``measured`` holds the candidates to choose from.
 
-    ``measure`` renders a method and returns its figures, as `Bench.measure` does. ``most`` limits a
-    pixel's samples. ``denoise`` True or False leaves out the methods without or with the denoiser.
+    ``measure`` renders a method and returns its figures, as `Bench.measure` does. The ``target``
+    may be the error of so many samples, which is then measured first. ``most`` limits a pixel's
+    samples. ``denoise`` True or False leaves out the methods without or with the denoiser.
     """
 
     def __init__(
         self,
         measure: Callable[[Method], Candidate],
-        target: float,
+        target: float | MeasuredTargetError,
         most: int | None = None,
         denoise: bool | None = None,
     ) -> None:
         self.measure = measure
-        self.target = target
         self.denoise = denoise
         self.limit = math.inf if most is None else most
-        self.measured = [measure(Method("plain", {"samples": n})) for n in PLAIN_SAMPLES]
-        self._plain_samples_needed = self.plain_samples(target)
+        counts = {*PLAIN_SAMPLES}
+        if isinstance(target, MeasuredTargetError):
+            counts.add(target.of_samples)
+        self.measured = [measure(Method("plain", {"samples": n})) for n in sorted(counts)]
+        self.target = self._error_of(target)
+        self._plain_samples_needed = self.plain_samples(self.target)
         _print_progress(f"plain path tracing needs {self._plain_samples_needed:.3g} samples")
         # The error of all pixels of plain path tracing is inversely proportional to its samples.
         error_of_one_sample = fmean(e.whole_error * e.samples for e in self.measured)
@@ -170,7 +192,15 @@ class Search:
             self._climb_thresholds("adaptive", {"denoise": False})
         if not denoise and self._plain_samples_needed <= self._affordable():
             plain = _with_samples(min(self._plain_samples_needed, self.limit))
-            self.measured.append(measure(Method("plain", plain)))
+            if plain["samples"] not in counts:
+                self.measured.append(measure(Method("plain", plain)))
+
+    def _error_of(self, target: float | MeasuredTargetError) -> float:
+        """Return the target error as a number. A scene without noise has a very small one."""
+        if not isinstance(target, MeasuredTargetError):
+            return target
+        errors = [entry.error for entry in self.measured if entry.samples == target.of_samples]
+        return max(*errors, _LEAST_TARGET)
 
     def plain_samples(self, error: float) -> float:
         """Return how many samples plain path tracing needs for an error."""
@@ -304,15 +334,33 @@ def write(job: Calibrate) -> None:
 
 def _summary(name: str, record: Mapping[str, Any]) -> str:
     """Return the choice and its errors in one line."""
+    wanted = f"{record['target_error']:.3g}"
+    if "of_samples" in record:
+        wanted += f", the error of {record['of_samples']} samples of plain path tracing"
     reached = (f"{stratum} {part['error']:.2g}" for stratum, part in record["strata"].items())
     return (
         f"note: {name}: {record['way']}, {record['choice']}: "
         f"error {record['probe_error']:.3g} on the probe views and "
         f"{record['held_out_error']:.3g} ± {record['held_out_standard_error']:.1g} on others, "
-        f"wanted {record['target_error']:g}; {record['times_fewer_samples']:.1f} times cheaper "
+        f"wanted {wanted}; {record['times_fewer_samples']:.1f} times cheaper "
         "than plain path tracing at equal error; the worst thousandth of pixels left out, with "
-        f"which it is {record['probe_error_of_all_pixels']:.3g}; by the light that pixels show "
+        f"which it is {record['probe_error_of_all_pixels']:.3g}; {_bias_text(record['bias'])}; "
+        "by the light that pixels show "
         f"most of: {', '.join(reached)}"
+    )
+
+
+def _bias_text(figures: Mapping[str, Any] | None) -> str:
+    """Return a choice's bias, and how much of it neighbouring views share, as a clause."""
+    if figures is None:
+        return "all of it is noise"
+    part = figures["squared_bias"] / figures["error"]
+    text = f"bias² is {max(part, 0):.0%} of the error of all pixels, and the rest is noise"
+    if figures["correlation"] is None:
+        return text
+    return (
+        f"{text}; where neighbouring views see the same surface, their biases have the correlation "
+        f"{figures['correlation']:.2f}"
     )
 
 
@@ -344,24 +392,25 @@ def calibrate(
     Returns the choice with its evidence, which is the same each time. Also returns the seconds that
     each method took on one core, or on the GPU, for a megapixel. They vary.
     """
-    target = render.target_error
-    assert target is not None
+    wanted = render.target_error
+    assert wanted is not None
     windows = renderer.windows(size, count)
     unseen_windows = _held_out_windows(renderer, windows)
     # The pilot renders first, because it sets up Cycles for the parts of light.
     classes = strata.classes_of(renderer, [*windows, *unseen_windows])
-    bench = Bench(renderer, windows, _PROBE_SEED, target)
-    search = Search(bench.measure, target, render.most_samples, render.given_denoise)
+    bench = Bench(renderer, windows, _PROBE_SEED, wanted)
+    search = Search(bench.measure, wanted, render.most_samples, render.given_denoise)
+    target = search.target
     choice = search.choose()
     held_out = Bench(
-        renderer, unseen_windows, _HELD_OUT_SEED, target, bench.experiment.references[0].exposure
+        renderer, unseen_windows, _HELD_OUT_SEED, wanted, bench.experiment.references[0].exposure
     )
     for each in (bench, held_out):
         each.measure(choice.method)
     # An error far below the references' own may be measured as 0 or less by chance.
     least_error = min(bench.own_error, target)
     plain_samples = search.plain_samples(max(choice.error, least_error))
-    record = {
+    record: dict[str, Any] = {
         **_choice_evidence(search, choice, bench),
         **confirmation(held_out.errors(choice.method), target),
         "plain_samples_at_equal_error": plain_samples,
@@ -373,14 +422,35 @@ def calibrate(
             {"probe": window.name, "error": error}
             for window, error in zip(unseen_windows, held_out.errors(choice.method), strict=True)
         ],
+        "bias": _bias_of(choice, bench, held_out),
         "strata": _errors_by_stratum([bench, held_out], classes, choice.method),
         "references": {
-            "samples": [each.reference_seeds * REFERENCE_SAMPLES for each in (bench, held_out)],
+            "samples": [each.reference_samples for each in (bench, held_out)],
             "own_error": [each.own_error for each in (bench, held_out)],
         },
         "candidates": [entry.evidence() for entry in search.measured],
     }
+    if isinstance(wanted, MeasuredTargetError):
+        record["of_samples"] = wanted.of_samples
     return record, _seconds_taken(search, choice, plain_samples)
+
+
+def _bias_of(choice: Candidate, bench: Bench, held_out: Bench) -> dict[str, Any] | None:
+    """Return the bias of the choice. None for plain path tracing, which has none.
+
+    A window and its held-out window are neighbours.
+    """
+    if choice.way == "plain":
+        return None
+    affordable = int(BIAS_PART * bench.reference_samples / choice.samples)
+    pair = bench.experiment, held_out.experiment
+    return bias.measure(
+        bench.experiment.renderer,
+        list(zip(*(each.windows for each in pair), strict=True)),
+        list(zip(*(each.references for each in pair), strict=True)),
+        choice.method,
+        min(MOST_BIAS_SEEDS, max(FEWEST_BIAS_SEEDS, affordable)),
+    ).figures()
 
 
 def _held_out_windows(renderer: Trials, windows: Sequence[ViewWindow]) -> list[ViewWindow]:
@@ -475,7 +545,8 @@ def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
 
 
 def _with_samples(effort: float) -> dict[str, Any]:
-    return {"samples": math.ceil(effort)}
+    # A rounding error must not add a sample.
+    return {"samples": math.ceil(round(effort, 6))}
 
 
 def _print_progress(text: str) -> None:

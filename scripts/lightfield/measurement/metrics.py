@@ -319,10 +319,19 @@ def bias_correlation(
     references: tuple[Reference, Reference],
     common_pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> float | None:
-    """Return the correlation of two views' biases at ``common_pixels`` (see `disagreement`).
+    """Return the correlation of two views' biases at ``common_pixels`` (see `disagreement`)."""
+    return correlation_of_biases(bias_products(renders, references, common_pixels))
 
-    1 if both views have the same bias, as a blurred texture has. 0 if their biases have nothing in
-    common. None if the square of a bias is not above 0 by two standard errors over the pixels.
+
+def bias_products(
+    renders: tuple[Sequence[NDArray[np.float32]], Sequence[NDArray[np.float32]]],
+    references: tuple[Reference, Reference],
+    common_pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> Array:
+    """Return the products (n, 3) of two views' biases at n ``common_pixels``.
+
+    They are the square of the first view's bias, the square of the second's, and the product of
+    both. The first view's reference gives the weights.
     """
     means = []
     squares = []
@@ -333,11 +342,22 @@ def bias_correlation(
         squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
     truth = references[0].colour.reshape(-1, 3)[common_pixels[0]]
     weights = _weights(truth, references[0].exposure)
-    biases = [(square * weights).mean(axis=-1) for square in squares]
-    if any(bias.mean() <= 2 * bias.std() / math.sqrt(bias.size) for bias in biases):
+    products = np.stack([*squares, means[0] * means[1]])
+    means_of_channels: Array = (products * weights).mean(axis=-1).T
+    return means_of_channels
+
+
+def correlation_of_biases(products: Array) -> float | None:
+    """Return the correlation of biases with these `bias_products`, of one pair of views or more.
+
+    1 if both views have the same bias, as a blurred texture has. 0 if their biases have nothing in
+    common. None if the square of a bias is not above 0 by two standard errors over the pixels.
+    """
+    first, second, product = (float(value) for value in products.mean(axis=0))
+    standard_errors = products.std(axis=0) / math.sqrt(len(products))
+    if first <= 2 * standard_errors[0] or second <= 2 * standard_errors[1]:
         return None
-    first, second = (float(bias.mean()) for bias in biases)
-    return float((means[0] * means[1] * weights).mean()) / math.sqrt(first * second)
+    return product / math.sqrt(first * second)
 
 
 def _squares(colour: NDArray[np.float32], reference: Reference) -> Array:

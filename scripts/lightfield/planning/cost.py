@@ -21,6 +21,7 @@ from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, read_bytes, read_keys, reading
 from lightfield.formats import light_groups, passes
+from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.planning import sampling
 
 if TYPE_CHECKING:
@@ -456,18 +457,37 @@ def _calibration(dataset: Dataset) -> Cost:
     target = dataset.render.target_error
     if target is None:
         return Cost()
+    resolution, most = dataset.rig.camera.resolution, dataset.render.most_samples
+    if isinstance(target, MeasuredTargetError):
+        return calibration_of_samples(target.of_samples, resolution, most)
     needed = 1 / target
     seeds = sampling.FEWEST_SEEDS
-    reference_samples = sampling.REFERENCE_SAMPLES
-    while (
-        seeds < sampling.MOST_SEEDS and seeds * reference_samples * sampling.REFERENCE_PART < needed
-    ):
+    samples = sampling.REFERENCE_SAMPLES
+    while seeds < sampling.MOST_SEEDS and seeds * samples * sampling.REFERENCE_PART < needed:
         seeds *= 2
+    return _calibration_of(needed, (seeds, samples), resolution, most)
+
+
+def calibration_of_samples(
+    count: int, resolution: tuple[int, int], most: int | None = None
+) -> Cost:
+    """Return the cost of a calibration for the error of ``count`` samples, of at most ``most``."""
+    return _calibration_of(count, sampling.reference_of_samples(count), resolution, most)
+
+
+def _calibration_of(
+    needed: float, reference: tuple[int, int], resolution: tuple[int, int], most: int | None
+) -> Cost:
+    """Return the cost of a calibration for an error that needs so many plain samples.
+
+    A ``reference`` has so many seeds, of so many samples each.
+    """
+    seeds, samples_of_seed = reference
     # Windows and held-out windows have references. Plain path tracing and the search add samples.
-    searched = min(needed, dataset.render.most_samples or needed)
-    samples = 2 * seeds * reference_samples + sum(sampling.PLAIN_SAMPLES) + _SEARCH_PART * searched
+    searched = min(needed, most or needed)
+    samples = 2 * seeds * samples_of_seed + sum(sampling.PLAIN_SAMPLES) + _SEARCH_PART * searched
     renders = 2 * seeds + _SEARCH_RENDERS
-    pixels = min(*dataset.rig.camera.resolution, sampling.WINDOW_SIZE) ** 2
+    pixels = min(*resolution, sampling.WINDOW_SIZE) ** 2
     window = renders * _WINDOW_SECONDS + pixels * samples * SAMPLE_SECONDS
     return _BLENDER + sampling.PROBES * Cost(window)
 

@@ -19,6 +19,9 @@ REFERENCE_SAMPLES = 16
 REFERENCE_PART = 0.2
 FEWEST_SEEDS = 4
 MOST_SEEDS = 256
+# For the error of so many samples, it takes these seeds instead. Together they have as many samples
+# as are needed, because the error of plain path tracing is inversely proportional to them.
+SEEDS_OF_SAMPLES = 8
 
 # Plain path tracing is measured at these samples. Beyond, its error is inversely proportional.
 PLAIN_SAMPLES = (1, 4, 16, 64)
@@ -26,6 +29,12 @@ PLAIN_SAMPLES = (1, 4, 16, 64)
 # The names of renders without and with the denoiser in reports.
 TRACED = "path tracing"
 DENOISED = "denoised"
+
+# A calibration measures the bias of its choice with these seeds: with more than the fewest only
+# while they take less than this part of the reference's samples.
+FEWEST_BIAS_SEEDS = 2
+MOST_BIAS_SEEDS = 4
+BIAS_PART = 0.1
 
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
@@ -38,6 +47,15 @@ def calibrated(render: RenderBlock, path: Path) -> RenderBlock:
     record = read_keys(path, "calibrate.py", "target_error", "choice")
     with reading(path, "calibration"):
         return render.uncalibrated.changed(target_error=record["target_error"], **record["choice"])
+
+
+def reference_of_samples(count: int) -> tuple[int, int]:
+    """Return the seeds of a reference for the error of ``count`` samples, and each seed's samples.
+
+    With all of them, the reference's own error is about `REFERENCE_PART` of that error.
+    """
+    samples = max(count / REFERENCE_PART, FEWEST_SEEDS * REFERENCE_SAMPLES)
+    return SEEDS_OF_SAMPLES, math.ceil(samples / SEEDS_OF_SAMPLES)
 
 
 def standard_error(values: Sequence[float]) -> float:

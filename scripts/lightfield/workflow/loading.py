@@ -14,7 +14,7 @@ from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, VIEWS, scene_folder
 from lightfield.formats import published
-from lightfield.formats.render_block import RenderBlock, TargetError
+from lightfield.formats.render_block import MeasuredTargetError, RenderBlock, TargetError
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
@@ -315,9 +315,15 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> RenderBl
         content["denoise"] = limits.denoise
     if limits.denoise_prefilter and content.get("denoise"):
         content.setdefault("denoise_prefilter", limits.denoise_prefilter)
-    if isinstance(render.target_error, TargetError):
-        content["target_error"] = render.target_error.value
-        if render.target_error.denoise == "never":
+    target = render.target_error
+    if isinstance(target, TargetError):
+        content["target_error"] = target.value
+        if target.of_samples is not None:
+            samples = min(target.of_samples, limits.samples or target.of_samples)
+            content["target_error"] = MeasuredTargetError(
+                of_samples=samples, denoise=target.denoise
+            )
+        if target.denoise == "never":
             content["denoise"] = False
     return RenderBlock(**content)
 
