@@ -45,6 +45,7 @@ rule plan:
         ),
         families=shlex.join(f"--family={folder}" for folder in BUILD.family_names),
         advice=advice_arguments(),
+        calibrations=calibration_arguments(),
         watts=SETTINGS.energy.watts,
         cores=SETTINGS.energy.core_count,
         table=f"{RESULTS}/tables/plan.md",
@@ -52,5 +53,5 @@ rule plan:
         "Adding up the time and size of the chosen datasets"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} {params.families} {params.advice}"
+        " {params.datasets} {params.families} {params.advice} {params.calibrations}"
         " --watts {params.watts} --cores {params.cores} --output {params.table} 2>&1 | tee {log}"

@@ -71,6 +71,16 @@ def advice_arguments():
     return shlex.join(arguments)
 
 
+def calibration_arguments():
+    """Return the arguments that name the calibrations of the chosen datasets to scripts/plan.py."""
+    arguments = []
+    for name, dataset in {d.sequence_name: d for d in CHOSEN_DATASETS}.items():
+        if dataset.calibration:
+            seconds = dataset.paths.calibration_seconds
+            arguments += ["--calibration", name, dataset.calibration, seconds]
+    return shlex.join(arguments)
+
+
 def verify_command(wildcards):
     """Return the command that verifies all folders. Without any, it does nothing.
 

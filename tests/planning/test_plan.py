@@ -16,10 +16,11 @@ from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
+from lightfield.measurement.equal_error import of_measurement
 from lightfield.planning.cost import ProbedViews, cost, read_probe
 from lightfield.planning.forecast import Request, requests_table
 from lightfield.rendering import shard
-from lightfield.stages.measurement import Probe, ProbeSettings
+from lightfield.stages.measurement import Plan, Probe, ProbeSettings
 from lightfield.workflow import shard_log
 from lightfield.workflow.history import History
 from lightfield.workflow.loading import scene_datasets
@@ -201,20 +202,20 @@ ENERGY = Energy(watts=100, cores=4)
 
 
 def test_the_table_adds_up_the_probes_measurements():
-    fisheye = ProbedViews(100, (2048, 2048), 256, "CPU", (30.0, 36.0, 42.0), (1e7, 1.2e7))
+    fisheye = ProbedViews(100, (2048, 2048), 256, "CPU", (30.0, 36.0, 42.0), (1e7, 1.2e7), False)
     panoramas = ProbedViews(8, (4096, 2048), 256, "CPU", (90.0,), (1e7, 1.2e7))
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
     text = plan.table(datasets, {}, ENERGY)
     # 300 views of 36 ± 12/√12 s take 3 h, and of 11 MB 3.3 GB.
     assert (
-        "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h 00 min | — | — | 3.3 GB |"
-        in text
+        "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h 00 min | 3 h 00 min "
+        "| — | — | — | 3.3 GB |" in text
     )
     assert (
-        "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 12 min | — | — | 88 MB |"
-        in text
+        "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 12 min | — | — | — | — "
+        "| 88 MB |" in text
     )
-    assert "| all | 308 | | | | 3 h 12 min ± 17 min | — | — | 3.39 GB |" in text
+    assert "| all | 308 | | | | 3 h 12 min ± 17 min | — | — | | | 3.39 GB |" in text
     assert "Times of one processor core" in text
     assert "time = views × s a view" in text.split("| all |")[1]
     # A quarter of 100 W for 300 × 36 s and 8 × 90 s.
@@ -230,36 +231,99 @@ def test_times_of_a_core_and_of_a_graphics_card_have_no_sum():
     on_card = replace(on_core, device="GPU", seconds=(0.5,))
     text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {}, ENERGY)
     assert "| 60 ± 0 | 10 min |" in text and "| 0.5 ± 0 | 5 s |" in text
-    assert "| all | 20 | | | | — | — | — | 20 MB |" in text
+    assert "| all | 20 | | | | — | — | — | | | 20 MB |" in text
     assert "graphics card for a/c, and of one processor core for the others" in text
 
 
-def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
-    """Path tracing has the error 1 / N. Denoised renders have half, and cost three samples more."""
-    unchanged = {
-        method: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
-        for method, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
+def error_vs_time(denoised_error=lambda n: 0.5 / n, seconds=lambda n: float(n)):
+    """Return a measurement: path tracing has the error 1 / N, and denoising costs three samples."""
+    counts = (4, 8, 16)
+    return {
+        "changes": {
+            "own": {"samples": 256, "denoise": False},
+            "unchanged": {
+                "path tracing": [
+                    {"samples": n, "seconds": seconds(n), "error": 1 / n} for n in counts
+                ],
+                "denoised": [
+                    {"samples": n, "seconds": seconds(n + 3), "error": denoised_error(n)}
+                    for n in counts
+                ],
+            },
+        },
+        "points": [
+            {
+                "method": "denoised",
+                "settings": {"samples": n},
+                "samples": n,
+                "bias": 0.3 / n,
+                "relative_mse_whole": 0.5 / n if n == 128 else 9,
+            }
+            for n in (1, 128, 256)
+        ],
+        "neighbouring_views": [
+            {"method": "denoised", "settings": {"samples": 128}, "bias_correlation": 0.75}
+        ],
     }
-    advice = {"own": {"samples": 256, "denoise": False}, "unchanged": unchanged}
-    denoised, calibrated = plan.cheaper_parts(256, advice)
-    assert denoised == pytest.approx((128 + 3) / 256)
-    assert calibrated == pytest.approx((50 + 3) / 256)
-    # A denoiser's error that hardly falls never reaches that of plain path tracing.
-    biased = [
-        {**point, "error": 0.1 * point["samples"] ** -0.001} for point in unchanged["denoised"]
-    ]
-    biased_advice = advice | {"unchanged": unchanged | {"denoised": biased}}
-    assert plan.cheaper_parts(256, biased_advice) == (None, pytest.approx(100 / 256))
-    # Without noise, or without a time, no estimate is possible.
-    for figures in ({"error": 0.0}, {"seconds": 0.0}):
-        still = {
-            method: [point | figures for point in points] for method, points in unchanged.items()
-        }
-        assert plan.cheaper_parts(256, advice | {"unchanged": still}) == (None, None)
-    assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
-    probe = ProbedViews(100, (64, 64), 256, "CPU", (3600.0,), (1e9,))
-    text = plan.table([("a/b", 1, probe)], {"a/b": advice}, ENERGY)
-    assert "| 100 h | 51 h | 21 h | 100 GB |" in text
+
+
+HUNDRED_HOURS = ProbedViews(100, (64, 64), 256, "CPU", (3600.0,), (1e9,), False)
+
+
+def test_the_time_at_equal_error_is_beside_the_plain_one():
+    choices = of_measurement(HUNDRED_HOURS, error_vs_time())
+    assert choices.cheapest == pytest.approx((128 + 3) / 256)
+    # The nearest point of those that were measured has 128 samples.
+    assert (choices.bias, choices.correlation) == (pytest.approx(0.6), 0.75)
+    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY)
+    assert "| 100 h | 100 h | 51 h | 60% | 0.75 | 100 GB |" in text
+    assert "target_error: {of_samples: 256}" in text and "error_vs_time" not in text
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        None,
+        # A denoiser's error that hardly falls never reaches that of plain path tracing.
+        error_vs_time(denoised_error=lambda n: 0.1 * n**-0.001),
+        # Without noise, or without a time, no estimate is possible.
+        error_vs_time(denoised_error=lambda n: 0.0),
+        error_vs_time(seconds=lambda n: 0.0),
+        error_vs_time() | {"changes": {"own": {"samples": 6, "denoise": False}}},
+    ],
+)
+def test_a_plan_says_how_to_learn_the_time_at_equal_error(content):
+    choices = of_measurement(HUNDRED_HOURS, content)
+    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY)
+    assert "| 100 h | 100 h | — | — | — | 100 GB |" in text
+    assert "`snakemake --cores 2 error_vs_time`" in text
+    assert "target_error: {of_samples: 256}" in text
+
+
+def test_the_times_of_a_calibrated_scene_are_those_of_its_calibration(tmp_path):
+    """Its own settings are the choice."""
+    record, seconds = tmp_path / "calibration.json", tmp_path / "calibration_seconds.json"
+    bias = {"squared_bias": 0.002, "error": 0.008, "correlation": None}
+    record.write_text(json.dumps({"choice": {}, "bias": bias}))
+    seconds.write_text(json.dumps({"times_faster": 4.0}))
+    probe = replace(HUNDRED_HOURS, denoise=True)
+    files = tmp_path / "probe.json", tmp_path / "plan.md"
+    content = {"views": 100, "resolution": [64, 64], "samples": 256, "device": "CPU"}
+    content |= {"view_seconds": [3600.0], "view_bytes": [1e9], "denoise": True}
+    files[0].write_text(json.dumps(content))
+    assert read_probe(files[0]) == probe
+
+    def table():
+        calibration = [("a/b", record, seconds)]
+        Plan(dataset=[("a/b", 1, files[0])], calibration=calibration, output=files[1]).run()
+        return files[1].read_text()
+
+    assert "| 100 h | 400 h | 100 h | 25% | — | 100 GB |" in table()
+    assert "target_error" not in table()
+    # An older calibration has no bias, and its seconds may be lost.
+    record.write_text(json.dumps({"choice": {}}))
+    seconds.unlink()
+    assert "| 100 h | — | 100 h | — | — | 100 GB |" in table()
 
 
 def test_a_probe_estimates_the_size_of_the_views(run_program, room, tmp_path):

@@ -3,17 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from lightfield.configuration.config_file import Energy
 from lightfield.core import processors, units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
-from lightfield.measurement import metrics
+from lightfield.measurement.equal_error import EqualError, of_calibration, of_measurement
+from lightfield.planning import cost
 from lightfield.planning.cost import Cost, ProbedViews, kwh, read_probe
-from lightfield.planning.sampling import DENOISED, TRACED
 from lightfield.stages.measurement import Plan
 
 COLUMNS = (
@@ -23,25 +20,22 @@ COLUMNS = (
     "samples",
     "s a view",
     "time",
-    "denoised",
-    "calibrated",
+    "plain",
+    "equal error",
+    "bias",
+    "shared",
     "size",
 )
 
-# The calibrated time is the time to this error.
-_TARGET_ERROR = 0.01
-# A method that takes this many times as long as plain path tracing does not reach its error.
-_OUT_OF_REACH = 1e4
-
 # The formulas of the columns, printed below the table.
-FORMULAS = f"""\
+FORMULAS = """\
 - time = views × s a view
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
 probe, ± its standard error
-- denoised = time × (seconds of denoised views) / (seconds of views without denoising), both with \
-the same error
-- calibrated = time × (seconds to the error {_TARGET_ERROR:g}, denoised or not, whichever is \
-cheaper) / (seconds of the samples in the YAML)
+- plain = time of views without denoising
+- equal error = time of the cheapest setting with the same error, which is usually denoised
+- bias = bias² / error of all pixels, both at equal error
+- shared = correlation of that bias between neighbouring views, where both see the same surface
 - size = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the \
 probe
 """
@@ -51,13 +45,13 @@ probe
 class Expected:
     """The estimate of one dataset of so many frames. Seconds count for one core or for the GPU.
 
-    ``parts`` is the result of `cheaper_parts`.
+    ``choices`` compares plain path tracing with the cheapest setting of the same error.
     """
 
     name: str
     frames: int
     probe: ProbedViews
-    parts: tuple[float | None, float | None]
+    choices: EqualError
 
     @property
     def views(self) -> int:
@@ -70,9 +64,10 @@ class Expected:
         return self.views * self.probe.view_cost
 
     @property
-    def cheaper_seconds(self) -> list[float | None]:
-        """The seconds of all views denoised and calibrated. None if unknown."""
-        return [None if part is None else part * self.cost.seconds for part in self.parts]
+    def seconds_of_choices(self) -> list[float | None]:
+        """The seconds of all views, plain and with the cheapest setting. None if unknown."""
+        parts = (self.choices.plain, self.choices.cheapest)
+        return [None if part is None else part * self.cost.seconds for part in parts]
 
     @property
     def row(self) -> str:
@@ -82,7 +77,8 @@ class Expected:
         return (
             f"| {self.name} | {self.views} | {width} × {height} | {probe.samples} "
             f"| {probe.view_cost.seconds:.3g} ± {probe.view_error:.1g} "
-            f"| {units.duration(self.cost.seconds)} | {_times(self.cheaper_seconds)} "
+            f"| {units.duration(self.cost.seconds)} | {_times(self.seconds_of_choices)} "
+            f"| {_figure(self.choices.bias, '.0%')} | {_figure(self.choices.correlation, '.2f')} "
             f"| {units.size(self.cost.disk_bytes)} |"
         )
 
@@ -96,24 +92,34 @@ def write(job: Plan) -> None:
     if not job.dataset:
         raise UserError("the views of all chosen datasets exist already: nothing is rendered")
     probes = [(name, frames, read_probe(probe)) for name, frames, probe in job.dataset]
-    advice = {
-        name: read_keys(path, "error_vs_time.py", "changes")["changes"] for name, path in job.advice
-    }
+    choices = {}
+    advice = dict(job.advice)
+    calibrations = {name: files for name, *files in job.calibration}
+    for name, _, probe in probes:
+        if name in calibrations:
+            choices[name] = of_calibration(*calibrations[name])
+        elif name in advice:
+            keys = ("changes", "points", "neighbouring_views")
+            choices[name] = of_measurement(
+                probe, read_keys(advice[name], "error_vs_time.py", *keys)
+            )
     energy = Energy(watts=job.watts, cores=job.cores or "auto")
-    text = table(probes, advice, energy)
+    text = table(probes, choices, energy)
     write_text(job.output, text)
     print(text, end="")
 
 
 def table(
-    datasets: Sequence[tuple[str, int, ProbedViews]], advice: Mapping[str, Any], energy: Energy
+    datasets: Sequence[tuple[str, int, ProbedViews]],
+    choices: Mapping[str, EqualError],
+    energy: Energy,
 ) -> str:
     """Return the table of (name, frames, probe), with the sums and the formulas below.
 
-    ``advice`` has the results of `lightfield.measurement.advice`, by the datasets' names.
+    ``choices`` has what was measured of a dataset's scene, by the datasets' names.
     """
     expected = [
-        Expected(name, frames, probe, cheaper_parts(probe.samples, advice.get(name)))
+        Expected(name, frames, probe, choices.get(name) or of_measurement(probe, None))
         for name, frames, probe in datasets
     ]
     lines = [
@@ -127,13 +133,31 @@ def table(
         _device_of(expected, energy),
         "",
         FORMULAS,
-        "Probes are a few small views with all their samples. The seconds to an error follow from",
-        "what the target `error_vs_time` measured. The error is a power of the samples, and the",
-        "seconds are a line over them. — means that it has not run, or that no number of samples",
-        "is enough.",
+        "Probes are a few small views with all their samples. — is not known.",
+        *_how_to_learn(expected),
         "",
     ]
     return "\n".join(lines)
+
+
+def _how_to_learn(expected: Sequence[Expected]) -> list[str]:
+    """Return how to learn the time at equal error, and how to ask for it. Empty if that is done."""
+    plain = [dataset for dataset in expected if dataset.choices.is_plain]
+    lines = []
+    if any(dataset.choices.cheapest is None for dataset in plain):
+        lines.append(
+            "`snakemake --cores 2 error_vs_time` with the same --config measures the time at equal "
+            "error. It takes about twenty minutes a scene on an idle core."
+        )
+    if plain:
+        probe = plain[0].probe
+        calibration = cost.calibration_of_samples(probe.samples, probe.resolution)
+        lines.append(
+            f"To ask for it, write `target_error: {{of_samples: {probe.samples}}}` in place of "
+            f"`samples: {probe.samples}`. A scene's calibration takes about "
+            f"{units.duration(calibration.seconds)} of a core."
+        )
+    return lines
 
 
 def _sums_row(expected: Sequence[Expected]) -> str:
@@ -145,13 +169,13 @@ def _sums_row(expected: Sequence[Expected]) -> str:
     total = sum((dataset.cost for dataset in expected), Cost())
     size = units.size(total.disk_bytes)
     if 0 < len(on_card(expected)) < len(expected):
-        return f"| all | {views} | | | | — | {_times([None, None])} | {size} |"
+        return f"| all | {views} | | | | — | {_times([None, None])} | | | {size} |"
     error = math.hypot(*(dataset.views * dataset.probe.view_error for dataset in expected))
-    columns = zip(*(dataset.cheaper_seconds for dataset in expected), strict=True)
-    cheaper = [None if None in column else sum(column) for column in columns]
+    columns = zip(*(dataset.seconds_of_choices for dataset in expected), strict=True)
+    of_choices = [None if None in column else sum(column) for column in columns]
     return (
         f"| all | {views} | | | | {units.duration(total.seconds)} ± {units.duration(error)} "
-        f"| {_times(cheaper)} | {size} |"
+        f"| {_times(of_choices)} | | | {size} |"
     )
 
 
@@ -178,44 +202,9 @@ def _device_of(expected: Sequence[Expected], energy: Energy) -> str:
     return f"Times of one processor core; this machine's {cores} take {run_time} and {used}."
 
 
-def cheaper_parts(
-    samples: int, advice: Mapping[str, Any] | None
-) -> tuple[float | None, float | None]:
-    """Return the times of denoised and of calibrated views, over the time of plain path tracing.
-
-    Plain path tracing takes ``samples`` a pixel. According to ``advice``, the error is a power of
-    the samples, and the seconds are a line over them, from one sample on. A part is None if the
-    advice does not fit, as for a scene without noise. It is also None if no number of samples is
-    enough, as for a denoiser whose error is all bias.
-    """
-    if not advice or advice["own"] != {"samples": samples, "denoise": False}:
-        return None, None
-    laws = {}
-    for method, points in advice["unchanged"].items():
-        counts = [point["samples"] for point in points]
-        errors = metrics.fit(counts, [point["error"] for point in points])
-        if errors is None:
-            return None, None
-        slope, intercept = np.polyfit(counts, [point["seconds"] for point in points], 1)
-        if slope <= 0:
-            return None, None
-        laws[method] = errors, max(0.0, float(intercept)), float(slope)
-
-    def seconds_to(error: float, method: str) -> float:
-        errors, overhead, sample_seconds = laws[method]
-        # A rounding error must not add a sample.
-        needed = math.ceil(round(errors.inverse(error), 6))
-        return overhead + sample_seconds * max(1.0, needed)
-
-    errors, overhead, sample_seconds = laws[TRACED]
-    plain = overhead + sample_seconds * samples
-    denoised = seconds_to(errors.at(samples), DENOISED) / plain
-    calibrated = min(seconds_to(_TARGET_ERROR, method) for method in laws) / plain
-    return (
-        denoised if denoised < _OUT_OF_REACH else None,
-        calibrated if calibrated < _OUT_OF_REACH else None,
-    )
-
-
 def _times(values: Sequence[float | None]) -> str:
     return " | ".join("—" if value is None else units.duration(value) for value in values)
+
+
+def _figure(value: float | None, form: str) -> str:
+    return "—" if value is None else format(value, form)

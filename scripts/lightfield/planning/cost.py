@@ -246,7 +246,8 @@ def _planned_view_seconds(dataset: Dataset) -> float:
 class ProbedViews:
     """The figures of scripts/probe.py: seconds of one core or of the GPU, and bytes, of some views.
 
-    ``views``, ``resolution`` and ``samples`` are the dataset's.
+    ``views``, ``resolution``, ``samples`` and ``denoise`` are the dataset's. Older probes do not
+    say whether views are denoised.
     """
 
     views: int
@@ -255,6 +256,7 @@ class ProbedViews:
     device: str
     seconds: tuple[float, ...]
     sizes: tuple[float, ...]
+    denoise: bool | None = None
 
     @property
     def view_cost(self) -> Cost:
@@ -279,7 +281,15 @@ def read_probe(path: Path | str) -> ProbedViews:
             raise ValueError("a count is not a whole number")
         if not (seconds and sizes):
             raise ValueError("no view was measured")
-        return ProbedViews(views, (width, height), samples, device, tuple(seconds), tuple(sizes))
+        return ProbedViews(
+            views,
+            (width, height),
+            samples,
+            device,
+            tuple(seconds),
+            tuple(sizes),
+            content.get("denoise"),
+        )
 
 
 def _probe_of(dataset: Dataset) -> ProbedViews | None:

@@ -24,7 +24,8 @@ def write(job: Probe) -> None:
 def _measured(job: Probe) -> dict[str, Any]:
     """Render the probes on one core, or on the device.
 
-    Returns the dataset's ``views``, ``resolution`` and ``samples``, and the ``device``, CPU or GPU.
+    Returns the dataset's ``views``, ``resolution``, ``samples`` and ``denoise``, and the
+    ``device``, CPU or GPU.
     ``view_seconds`` and ``view_bytes`` are what each probe's view would take at full size.
     """
     lightfield = LightField.read(job.lightfield)
@@ -48,6 +49,7 @@ def _measured(job: Probe) -> dict[str, Any]:
         "views": len(views),
         "resolution": [lens.width, lens.height],
         "samples": lightfield.render.samples,
+        "denoise": lightfield.render.denoise,
         "device": run.start["device"],
         "view_seconds": [view[time_key] * factor for view in run.later_views],
         "view_bytes": [size * factor for size in sizes],

@@ -106,6 +106,12 @@ class Plan(PlainStage):
         [],
         metavar=("NAME", "JSON"),
     )
+    calibration: list[tuple[str, Path, Path]] = reads(
+        "calibration of a dataset with a target error: scene/rig, and the two JSON that "
+        "scripts/calibrate.py wrote for its scene",
+        [],
+        metavar=("NAME", "JSON", "SECONDS"),
+    )
     family: list[str] = option("name of a family of scenes", [], metavar="NAME")
     watts: float = option("power of the machine when all its cores work", 65.0)
     cores: AtLeastOne | None = option("number of cores of that machine", None)
