@@ -15,6 +15,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
+from lightfield.planning.cost import cost
 from lightfield.planning.sampling import PLAIN
 from lightfield.workflow.loading import scene_datasets
 
@@ -177,6 +178,15 @@ def test_a_dry_run_forecasts_the_cost_of_a_calibration(tmp_path):
     # path tracing, and 125 of the search. Add 70 ms for each of 41 renders, and two starts, one of
     # which chooses the views.
     assert re.search(r"^calibration +2 +92 s$", table, re.M), table
+
+
+def test_the_calibration_of_many_samples_costs_what_its_references_take(tmp_path, monkeypatch):
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: {of_samples: 256}"))
+    (dataset,) = scene_datasets("aimed")
+    # 16 windows of 24² pixels, 6 µs a sample: two references of 1280 samples, 85 samples of plain
+    # path tracing, and 640 of the search. Add 70 ms for each of 25 renders, and a start.
+    assert cost("calibrate", dataset).seconds == pytest.approx(3 + 16 * (11.35 + 1.75), rel=1e-3)
 
 
 def simulated(whole_error, bias=0.0):
