@@ -8,8 +8,8 @@ from operator import attrgetter
 from lightfield.configuration.config_file import load_config, with_lines
 from lightfield.configuration.dataset import Cluster
 from lightfield.configuration.dataset_paths import Paths
+from lightfield.core import gpus
 from lightfield.core.errors import UserError
-from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.workflow import presence
 from lightfield.workflow.build import Build
@@ -72,7 +72,7 @@ PATHS = Paths(RESULTS, WORK)
 REMOVED = f"{WORK}/removed"
 MEMORY = available()
 # Each render takes a GPU, and waits until one is free. Nodes count their own.
-LOCAL_GPUS = visible() if RUNS_HERE and SETTINGS.device != "cpu" else []
+LOCAL_GPUS = gpus.visible(SETTINGS.device) if RUNS_HERE else []
 GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else 0
 # Without GPUS the resource is left out, so that a profile's default counts.
 GPU = {"gpu": GPUS} if GPUS else {}

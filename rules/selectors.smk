@@ -4,6 +4,7 @@ import shlex
 import sys
 from pathlib import Path
 
+from lightfield.core.gpus import CUDA
 from lightfield.planning.cost import cost, shard_threads
 
 
@@ -18,10 +19,18 @@ def memory_of(stage):
 
 
 def threads_of_shard(wildcards):
-    """Return the cores of each shard, so that the shards at work fit this machine's memory."""
+    """Return the cores of each shard, so that the shards at work fit this machine."""
     shards = sum(len(dataset.shards) for dataset in CHOSEN_DATASETS)
     need = cost_at("render", wildcards).memory_bytes
-    return shard_threads(ALL_CORES, shards, need, MEMORY)
+    threads = shard_threads(ALL_CORES, shards, need, MEMORY)
+    # Cycles may be unable to use an AMD GPU, unless the user names its kind.
+    used_gpus = [
+        each for each in LOCAL_GPUS if each.variable == CUDA or SETTINGS.device == "hip"
+    ]
+    if used_gpus:
+        # On each GPU one shard renders, and another one starts. More would only wait.
+        threads = max(threads, ALL_CORES // (2 * len(used_gpus)))
+    return threads
 
 
 def stall_seconds(wildcards):

@@ -13,6 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.planning.cost import light_group_count, temporary_bytes, view_cost
 from lightfield.planning.phases import KINDS
+from lightfield.stages.measurement import RENDERS_ON
 from lightfield.workflow import presence, run_lock
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
@@ -37,7 +38,7 @@ def is_import(job, names):
 
 
 def check_device():
-    """Raise `UserError` for a missing device, if this machine renders."""
+    """Print on which GPU this machine renders. Raise `UserError` if the device is missing."""
     jobs = [job for job, names in planned_jobs() if not is_import(job, names)]
     device = SETTINGS.device
     if device == "auto" and "{scene}/gpu_check" in jobs:
@@ -51,6 +52,10 @@ def check_device():
         if checked.returncode:
             lines = checked.stderr.strip().splitlines() or ["it said nothing"]
             raise UserError(lines[-1].removeprefix("error: "))
+        if device == SETTINGS.device:
+            for line in checked.stdout.splitlines():
+                if line.startswith(RENDERS_ON):
+                    print(line, file=sys.stderr)
 
 
 def check_slurm():

@@ -7,8 +7,10 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import pytest
+import simulated_gpus
 from conftest import BLENDER, SCRIPTS
 
 from lightfield.core import gpus
@@ -46,7 +48,7 @@ def test_no_two_processes_take_the_same_gpu(tmp_path):
     assert [first, second] == FAKE
     with waiter(tmp_path, "GPU-a", "GPU-b") as third, waiter(tmp_path, "GPU-a", "GPU-b") as fourth:
         for process in (third, fourth):
-            assert process.stderr.readline() == "waiting for one of 2 GPUs to be free\n"
+            assert process.stderr.readline() == "waiting for one of 2 GPUs: others render\n"
         other.close()
         lock.close()
         assert {third.stdout.readline(), fourth.stdout.readline()} == {"GPU-a\n", "GPU-b\n"}
@@ -90,46 +92,122 @@ def test_every_user_may_lock_an_existing_lock_file(tmp_path):
     assert next(tmp_path.iterdir()).stat().st_mode & 0o777 == 0o666
 
 
+class Machine:
+    """A machine's GPUs: their lines of nvidia-smi, and the KFD's ids of AMD's."""
+
+    def __init__(self, folder, monkeypatch):
+        self.folder = folder
+        monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
+        monkeypatch.setattr(gpus, "_KFD", folder / "kfd")
+
+    def has(self, *nvidia, amd=()):
+        rows = [
+            {"index": number, "uuid": uuid, "name": name}
+            for number, (uuid, name) in enumerate(nvidia)
+        ]
+        simulated_gpus.write_nvidia_smi(self.folder, rows)
+        for number, name in enumerate(amd):
+            (self.folder / "kfd" / str(number)).mkdir(parents=True)
+            (self.folder / "kfd" / str(number) / "gpu_id").write_text(f"{name}\n")
+
+
+@pytest.fixture
+def machine(tmp_path, monkeypatch):
+    return Machine(tmp_path, monkeypatch)
+
+
+H200 = [("GPU-1", "NVIDIA H200"), ("GPU-2", "NVIDIA H200")]
+MIXED = [("GPU-1", "NVIDIA T1000"), ("GPU-2", "NVIDIA RTX A6000")]
+AMD = ("0", "4711", "4712")
+
+
 @pytest.mark.parametrize(
-    ("environment", "expected"),
+    ("nvidia", "amd", "device", "environment", "expected"),
     [
-        ({CUDA: "0,1", HIP: ""}, [Gpu(CUDA, "0"), Gpu(CUDA, "1")]),
-        ({CUDA: "-1", HIP: "3"}, [Gpu(HIP, "3")]),
-        ({CUDA: "", HIP: ""}, []),
-        ({}, [Gpu(CUDA, "GPU-1"), Gpu(CUDA, "GPU-2"), Gpu(HIP, "0"), Gpu(HIP, "1")]),
+        # Numbers mean another GPU in each job of a batch system, so they become UUIDs.
+        (H200[1:], (), "auto", {CUDA: "0"}, [Gpu(CUDA, "GPU-2")]),
+        (H200, (), "auto", {CUDA: "1,0"}, [Gpu(CUDA, "GPU-2"), Gpu(CUDA, "GPU-1")]),
+        (H200, (), "auto", {CUDA: "GPU-2"}, [Gpu(CUDA, "GPU-2")]),
+        # CUDA numbers different models by their speed, which nvidia-smi does not tell.
+        (MIXED, (), "auto", {CUDA: "0"}, [Gpu(CUDA, "0")]),
+        (
+            MIXED,
+            (),
+            "auto",
+            {CUDA: "0", "CUDA_DEVICE_ORDER": "PCI_BUS_ID"},
+            [Gpu(CUDA, "GPU-1")],
+        ),
+        # A processor's own AMD GPU beside NVIDIA's.
+        (H200[:1], AMD, "auto", {}, [Gpu(CUDA, "GPU-1")]),
+        (H200[:1], AMD, "optix", {}, [Gpu(CUDA, "GPU-1")]),
+        (H200[:1], AMD, "hip", {}, [Gpu(HIP, "0"), Gpu(HIP, "1")]),
+        (H200[:1], AMD, "cpu", {}, []),
+        (H200[:1], AMD, "auto", {CUDA: "-1", HIP: "3"}, [Gpu(HIP, "3")]),
+        (H200[:1], AMD, "auto", {CUDA: "", HIP: ""}, []),
+        ((), AMD, "gpu", {}, [Gpu(HIP, "0"), Gpu(HIP, "1")]),
     ],
 )
-def test_only_gpus_that_the_process_may_use_count(environment, expected, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    (tmp_path / "nvidia-smi").write_text("#!/bin/sh\necho GPU-1\necho GPU-2\n")
-    (tmp_path / "nvidia-smi").chmod(0o755)
-    monkeypatch.setattr(gpus, "_KFD", tmp_path)
-    for number, name in enumerate(("0", "4711", "4712")):
-        (tmp_path / str(number)).mkdir()
-        (tmp_path / str(number) / "gpu_id").write_text(f"{name}\n")
-    assert gpus.visible(environment) == expected
+def test_only_gpus_that_the_process_may_use_count(
+    machine, nvidia, amd, device, environment, expected
+):
+    machine.has(*nvidia, amd=amd)
+    assert gpus.visible(device, environment) == expected
 
 
 USER = """
-import os
-from lightfield.core.gpus import CUDA, HIP, use_one
-use_one()
-print(os.environ[CUDA], os.environ[HIP])
+import os, sys
+from lightfield.core.gpus import CUDA, use_one, visible
+use_one(visible(sys.argv[1]))
+print(os.environ.get(CUDA, "all"), flush=True)
+input()
 """
 
 
-def test_a_process_sees_only_the_gpu_that_it_took(tmp_path):
-    _, lock = gpus.take(FAKE[:1], tmp_path)
-    environment = {CUDA: "GPU-a,GPU-b", HIP: "0", "TMPDIR": str(tmp_path)}
-    process = subprocess.run(
-        [sys.executable, "-c", USER],
-        env=os.environ | environment | {"PYTHONPATH": str(SCRIPTS)},
-        capture_output=True,
+@contextmanager
+def user(folder, device="auto", **environment):
+    """Start a process that takes one of its GPUs, and holds it."""
+    environment = os.environ | {"TMPDIR": str(folder), "PYTHONPATH": str(SCRIPTS)} | environment
+    with subprocess.Popen(
+        [sys.executable, "-c", USER, device],
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=True,
-    )
-    lock.close()
-    assert process.stdout == "GPU-b -1\n"
+    ) as process:
+        yield process
+        process.kill()
+
+
+def test_a_process_sees_only_the_gpu_that_it_took(machine, tmp_path):
+    machine.has(*H200)
+    with user(tmp_path) as first, user(tmp_path) as second:
+        assert {first.stdout.readline(), second.stdout.readline()} == {"GPU-1\n", "GPU-2\n"}
+
+
+def test_two_processes_do_not_share_the_only_gpu_of_a_machine(machine, tmp_path):
+    machine.has(*H200[:1])
+    with user(tmp_path) as first:
+        assert first.stdout.readline() == "GPU-1\n"
+        # The second process, whose environment names the same GPU, waits for the first to end.
+        with user(tmp_path, **{CUDA: "0"}) as second:
+            assert second.stderr.readline() == "waiting for the GPU: others render\n"
+            first.kill()
+            assert second.stdout.readline() == "GPU-1\n"
+
+
+def test_jobs_to_which_a_batch_system_gave_different_gpus_do_not_wait(machine, tmp_path):
+    machine.has(*H200[:1])
+    with user(tmp_path, **{CUDA: "0"}) as first:
+        assert first.stdout.readline() == "GPU-1\n"
+        machine.has(*H200[1:])
+        with user(tmp_path, **{CUDA: "0"}) as second:
+            assert second.stdout.readline() == "GPU-2\n"
+
+
+def test_a_number_that_no_driver_explains_makes_no_job_wait(machine, tmp_path):
+    with user(tmp_path, **{CUDA: "0"}) as first, user(tmp_path, **{CUDA: "0"}) as second:
+        assert first.stdout.readline() == second.stdout.readline() == "0\n"
 
 
 @pytest.mark.parametrize(

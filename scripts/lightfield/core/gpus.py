@@ -18,41 +18,77 @@ from lightfield.core.errors import UserError
 # These environment variables tell CUDA, OptiX and HIP which GPUs a process sees.
 CUDA = "CUDA_VISIBLE_DEVICES"
 HIP = "HIP_VISIBLE_DEVICES"
+_ANY = (CUDA, HIP)
+_VARIABLES = {"cuda": (CUDA,), "optix": (CUDA,), "hip": (HIP,), "auto": _ANY, "gpu": _ANY}
 _KFD = Path("/sys/class/kfd/kfd/topology/nodes")
 
 
 @dataclass(frozen=True)
 class Gpu:
-    """A GPU by its id. A process whose environment ``variable`` is that id sees only this GPU."""
+    """A GPU by its id. A process whose environment ``variable`` is that id sees only this GPU.
+
+    The id of an NVIDIA GPU is its UUID. A number is only unique in one environment.
+    """
 
     variable: str
     id: str
 
 
-def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
-    """Return the GPUs that this process sees: all, or only the GPUs that its environment allows."""
-    gpus = []
-    for variable, all_ids in ((CUDA, _nvidia), (HIP, _amd)):
-        allowed = environment.get(variable)
-        ids = all_ids() if allowed is None else [name.strip() for name in allowed.split(",")]
-        gpus += [Gpu(variable, name) for name in ids if name and name != "-1"]
-    return gpus
+def visible(device: str, environment: Mapping[str, str] = os.environ) -> list[Gpu]:
+    """Return the GPUs on which a process renders that uses a ``device``, all of one maker.
+
+    "auto" and "gpu" mean NVIDIA's GPUs, or AMD's if there are none. The ``environment`` may allow
+    only some of them.
+    """
+    ids_of = {CUDA: _nvidia_ids, HIP: _amd_ids}
+    for variable in _VARIABLES.get(device, ()):
+        ids = ids_of[variable](environment)
+        if gpus := [Gpu(variable, name) for name in ids if name and name != "-1"]:
+            return gpus
+    return []
 
 
-def _nvidia() -> list[str]:
-    """Return the UUIDs of NVIDIA's GPUs, as their driver lists them."""
+def nvidia(*fields: str) -> list[list[str]]:
+    """Return these ``fields`` of each NVIDIA GPU, as the driver's nvidia-smi lists them.
+
+    Empty if the driver is missing, or does not know a field.
+    """
+    command = ["nvidia-smi", f"--query-gpu={','.join(fields)}", "--format=csv,noheader"]
     try:
-        command = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
         output = subprocess.run(
             command, capture_output=True, encoding="utf-8", check=True, timeout=30
         )
     except (OSError, subprocess.SubprocessError):
         return []
-    return [line for line in output.stdout.split() if line.startswith("GPU-")]
+    rows = [line.split(", ") for line in output.stdout.splitlines()]
+    return [row for row in rows if len(row) == len(fields)]
 
 
-def _amd() -> list[str]:
-    """Return the numbers of AMD's GPUs. The driver also lists processors, whose id is 0."""
+def _nvidia_ids(environment: Mapping[str, str]) -> list[str]:
+    """Return the UUIDs of the NVIDIA GPUs that the environment allows.
+
+    A batch system may give each job the number 0 for another GPU, so locks need UUIDs.
+    """
+    gpus = nvidia("index", "uuid", "name")
+    allowed = environment.get(CUDA)
+    if allowed is None:
+        return [uuid for _, uuid, _ in gpus]
+    # CUDA numbers GPUs of several models by their speed, and nvidia-smi by their slots.
+    models = {name for *_, name in gpus}
+    has_slot_order = environment.get("CUDA_DEVICE_ORDER") == "PCI_BUS_ID"
+    uuids = {}
+    if len(models) == 1 or has_slot_order:
+        uuids = {index: uuid for index, uuid, _ in gpus}
+    names = [name.strip() for name in allowed.split(",")]
+    return [uuids.get(name, name) for name in names]
+
+
+def _amd_ids(environment: Mapping[str, str]) -> list[str]:
+    """Return the numbers of the AMD GPUs that the environment allows."""
+    allowed = environment.get(HIP)
+    if allowed is not None:
+        return [name.strip() for name in allowed.split(",")]
+    # The driver also lists processors, whose id is 0.
     ids = [path.read_text(encoding="utf-8").strip() for path in _KFD.glob("*/gpu_id")]
     gpu_count = len([name for name in ids if name != "0"])
     return [str(number) for number in range(gpu_count)]
@@ -77,7 +113,8 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
             except BlockingIOError:
                 lock.close()
         if not waited:
-            print(f"waiting for one of {len(gpus)} GPUs to be free", file=sys.stderr, flush=True)
+            awaited = "the GPU" if len(gpus) == 1 else f"one of {len(gpus)} GPUs"
+            print(f"waiting for {awaited}: others render", file=sys.stderr, flush=True)
         waited = True
         time.sleep(0.5)
 
@@ -106,20 +143,31 @@ def _open_lock(path: Path) -> int:
             raise UserError(f"{path}: cannot be locked: {error.strerror}; remove it") from None
 
 
-# The lock of this process's GPU. It stays open until the process ends.
+# The lock of this process's GPU, which stays open until the process ends, and the seconds for which
+# this process waited for it.
 _locks: list[BinaryIO] = []
+_waits: list[float] = []
 
 
-def use_one() -> None:
-    """Let this process see only one GPU, which no other process takes before this one ends.
+def use_one(gpus: Sequence[Gpu]) -> None:
+    """Take one of the ``gpus`` that no other process uses, until this process ends. May wait.
 
-    Does nothing if the process sees a single GPU, for example one from a batch system.
+    CUDA and HIP see only this GPU from now on, if they have not looked for GPUs before. Does
+    nothing if this process has taken one, or if its environment gave it a single GPU by a number,
+    which may mean another GPU in another job.
     """
-    gpus = visible()
-    if len(gpus) < 2 or _locks:
+    if not gpus or _locks:
         return
+    is_given = gpus[0].variable in os.environ
+    if len(gpus) == 1 and is_given and gpus[0].id.isdecimal():
+        return
+    began = time.monotonic()
     gpu, lock = take(gpus)
+    _waits.append(time.monotonic() - began)
     _locks.append(lock)
-    variables = {visible_gpu.variable for visible_gpu in gpus}
-    for variable in variables:
-        os.environ[variable] = gpu.id if variable == gpu.variable else "-1"
+    os.environ[gpu.variable] = gpu.id
+
+
+def waited_seconds() -> float:
+    """Return for how long this process has waited for its GPU."""
+    return sum(_waits)

@@ -145,7 +145,7 @@ def _gpu_of(job: GpuCheck) -> str:
         from lightfield.rendering import cycles
 
     device = "gpu" if job.device == "auto" else job.device
-    if not cycles.gpu(device):
+    if cycles.device_name(device) == "cpu":
         raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
     return device
 

@@ -30,7 +30,7 @@ from lightfield.rendering import (
     surfaces,
     volumes,
 )
-from lightfield.stages.measurement import CheckDevice
+from lightfield.stages.measurement import RENDERS_ON, CheckDevice
 
 # `auto` tries the kinds of GPU in this order.
 _GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -249,8 +249,14 @@ def set_window(x: int, y: int, width: int, height: int) -> None:
 
 
 def check_device(job: CheckDevice) -> None:
-    """Raise `UserError` if this machine has no such device."""
-    gpu(job.device)
+    """Print the GPUs that a device means. Raise `UserError` if this machine has no such device."""
+    if kind := gpu(job.device):
+        models = _models(kind)
+        used = "the GPU" if len(models) == 1 else f"{len(models)} GPUs:"
+        print(
+            f"{RENDERS_ON}{used} {' + '.join(models)} "
+            f"(device={job.device}; device=cpu for the processor)"
+        )
 
 
 def gpu(device: str) -> str | None:
@@ -287,19 +293,28 @@ def device_name(device: str) -> str:
     kind = _gpu_of_this_process(device)
     if not kind:
         return "cpu"
+    return " ".join([kind, *_models(kind)])
+
+
+def _models(kind: str) -> list[str]:
+    """Return the model of each GPU of a kind that Cycles sees."""
     entries = bpy.context.preferences.addons["cycles"].preferences.get_devices_for_type(kind)
-    return " ".join([kind, *sorted(entry.name for entry in entries if entry.type == kind)])
+    return sorted(entry.name for entry in entries if entry.type == kind)
 
 
 def _gpu_of_this_process(device: str) -> str | None:
     """Return the kind of GPU that a ``device`` means, as `gpu` does.
 
-    If the machine has several GPUs, this process takes one that no other process renders on.
+    This process takes a GPU that no other process renders on.
     """
-    if device != "cpu":
+    candidates = gpus.visible(device)
+    if len(candidates) > 1:
         # Take the GPU before Cycles looks for GPUs for the first time.
-        gpus.use_one()
-    return gpu(device)
+        gpus.use_one(candidates)
+    kind = gpu(device)
+    if kind:
+        gpus.use_one(candidates)
+    return kind
 
 
 def _use_device(scene: Any, device: str) -> None:
@@ -316,11 +331,20 @@ def _use_device(scene: Any, device: str) -> None:
 def machine(denoise: bool) -> str:
     """Describe the processor, and the GPU if Cycles uses one, which affect the pixels' bytes."""
     processor = describe(denoise)
-    if bpy.context.scene.cycles.device == "CPU":
+    models = used_gpus()
+    if not models:
         return processor
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    gpus_in_use = sorted({entry.name for entry in preferences.devices if entry.use})
-    return f"{preferences.compute_device_type} {' + '.join(gpus_in_use)}, {processor}"
+    return f"{preferences.compute_device_type} {' + '.join(models)}, {processor}"
+
+
+def used_gpus(*kinds: str) -> list[str]:
+    """Return the models of the GPUs on which Cycles renders. ``kinds`` limits them to these."""
+    if bpy.context.scene.cycles.device == "CPU":
+        return []
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    used = [entry for entry in preferences.devices if entry.use]
+    return sorted({entry.name for entry in used if not kinds or entry.type in kinds})
 
 
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:

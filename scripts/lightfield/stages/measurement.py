@@ -118,6 +118,10 @@ class Plan(PlainStage):
     output: Path = writes("Markdown file to write")
 
 
+# The beginning of the line with the GPU that a run uses.
+RENDERS_ON = "renders on "
+
+
 class CheckDevice(PlainStage):
     """Checks that Cycles can render on a device of this machine."""
 

@@ -1,0 +1,62 @@
+"""A run on a machine with GPUs, which nvidia-smi's answers simulate. The processor renders."""
+
+import os
+from itertools import pairwise
+
+import simulated_gpus
+from checkouts import checkout, snakemake
+from conftest import BLENDER
+
+from lightfield.workflow import history
+
+H200 = {"index": 0, "uuid": "GPU-1", "name": "NVIDIA H200"}
+RENDERS_ON = "renders on the GPU NVIDIA H200 (device=auto; device=cpu for the processor)"
+# Where Blender's list of GPUs has none, Cycles itself renders on the processor.
+WITH_GPU = """
+from importlib import import_module
+
+import bpy
+
+GPU = ("NVIDIA H200", "CUDA", "CUDA_0", *[True] * 6)
+import_module("_cycles").available_devices = lambda kind: [GPU] if kind == "CUDA" else []
+"""
+
+
+def on_one_gpu(folder, *arguments, device="auto"):
+    """Run Snakemake in a checkout on a machine whose driver lists one GPU. Return its messages."""
+    (folder / "bin").mkdir(exist_ok=True)
+    simulated_gpus.write_nvidia_smi(folder / "bin", [H200])
+    variables = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "TMPDIR": str(folder)}
+    result = snakemake(
+        folder, "--config", "scenes=[smoke]", f"device={device}", *arguments, env=variables
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stderr
+
+
+def test_a_run_says_its_gpu_and_renders_on_it_one_view_at_a_time(tmp_path):
+    folder = checkout(tmp_path / "plenoforge")
+    for name in ("check_device.py", "render_shard.py"):
+        program = folder / "scripts" / name
+        program.write_text(program.read_text().replace("if __name__", f"{WITH_GPU}\nif __name__"))
+    options = ("--cores", "4", "--until", "render")
+    assert RENDERS_ON in on_one_gpu(folder, *options).splitlines()
+    runs = [
+        run
+        for receipt in (folder / "work").rglob("receipts/**/render/*.jsonl")
+        for run in history.read(receipt)
+    ]
+    assert {run.start["device"] for run in runs} == {"GPU"}
+    # On each GPU one shard renders, and another one starts.
+    assert {run.start["threads"] for run in runs} == {2}
+    times = sorted(
+        (view["finished"] - view["wall_seconds"], view["finished"])
+        for run in runs
+        for view in run.views
+    )
+    assert all(end < begin for (_, end), (begin, _) in pairwise(times))
+
+
+def test_the_check_of_the_device_names_the_gpu(run_program):
+    result = run_program(BLENDER / "simulated_gpu.py", 0, "check_device.py", "auto")
+    assert RENDERS_ON in result.stdout.splitlines()
