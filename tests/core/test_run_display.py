@@ -167,6 +167,43 @@ def test_a_measurement_takes_the_time_that_its_log_tells(run):
     assert phase in run.shown(120, finished=["error"])
 
 
+def test_the_compilation_of_kernels_is_shown_once_and_not_counted(run):
+    started = "compiling Cycles' kernels for NVIDIA H200: once, about 7 minutes"
+    finished = "compiled Cycles' kernels for NVIDIA H200 in 6 min 38 s"
+    run.shown(running=["a", "b"])
+    run.log("a", "render a: 10 views to do", started)
+    run.log("b", "render b: 10 views to do")
+    assert started in run.shown(1)
+    left = run.display.seconds_left(run.now)
+    # Another job compiles, too, on another GPU.
+    run.log("b", started)
+    assert started not in run.shown(199)
+    assert run.display.seconds_left(run.now) == pytest.approx(left, abs=2)
+    run.log("a", finished)
+    assert finished in run.shown(1)
+    run.log("b", finished)
+    run.shown(198)
+    assert run.display.seconds_left(run.now) == pytest.approx(left, abs=2)
+    for name in ("a", "b"):
+        run.log(name, f"render {name}: 5 of 10 views, 10 s each, 50 s left")
+    run.shown(50)
+    assert "10 of 20 views, 11.8 a minute" in run.display.line(run.now)
+    # Half of the views took 51 s. The job without a log is half as long as one of theirs.
+    assert run.display.seconds_left(run.now) == pytest.approx(51 * 1.5, rel=0.05)
+
+
+def test_a_job_that_fails_does_not_compile_any_more(run):
+    run.shown(running=["a"])
+    run.log("a", "render a: 10 views to do", "compiling Cycles' kernels for NVIDIA H200: once")
+    run.shown(10)
+    left = run.display.seconds_left(run.now)
+    run.shown(failed=["a"])
+    run.shown(100, running=["b"])
+    run.log("b", "render b: 10 views to do", "render b: 1 of 10 views, 10 s each, 90 s left")
+    run.shown(100)
+    assert run.display.seconds_left(run.now) > 1.5 * left
+
+
 def test_warnings_are_shown_once_and_other_lines_not(run):
     run.log("a", "warning: coarse", "a detail", "note: so and so")
     run.log("b", "warning: coarse")

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 from lightfield.core.units import duration
 
+# The beginnings of the lines before and after a job compiles, which is no part of its pieces.
+COMPILING = "compiling "
+COMPILED = "compiled "
+
 # Seconds between two lines.
 _INTERVAL = 5.0
 

@@ -283,7 +283,7 @@ class Trials:
         return channels
 
     def _start(self, settings: RenderBlock) -> None:
-        from lightfield.rendering import colour_pass, cycles
+        from lightfield.rendering import colour_pass, cycles, gpu_kernels
 
         self._on = cycles.set_up(
             self._blend,
@@ -292,6 +292,7 @@ class Trials:
             self._device,
             self._threads,
         )
+        gpu_kernels.compile_first(self.lightfield.views[0].world_from_camera)
         colour_pass.watch_samples()
         # The first render also loads shared data, so it does not count.
         cycles.set_sampling(settings.changed(samples=1, denoise=True))

@@ -21,7 +21,7 @@ import numpy as np
 import psutil
 
 from lightfield.configuration import keys
-from lightfield.core import leftovers, processors, units
+from lightfield.core import gpus, leftovers, processors, units
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -118,16 +118,21 @@ def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> N
     threads = job.threads or processors.available()
     # A finished shard does not import Blender, which takes a second.
     with processors.only(threads):
-        from lightfield.rendering import cycles
+        from lightfield.rendering import cycles, gpu_kernels
+    waited = -gpus.waited_seconds()
     used_device = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
-    shard_log.log(
-        {
-            "start_up_seconds": round(time.time() - history.started, 4),
-            "start_up_cpu_seconds": round(time.process_time(), 4),
-            "device": used_device,
-            "threads": threads,
-        }
-    )
+    waited += gpus.waited_seconds()
+    waited += gpu_kernels.compile_first(lightfield.views[0].world_from_camera)
+    start = {
+        "start_up_seconds": round(time.time() - history.started - waited, 4),
+        "start_up_cpu_seconds": round(time.process_time(), 4),
+        "device": used_device,
+        "threads": threads,
+    }
+    if used_device != "CPU":
+        # For its GPU, and for Cycles' kernels.
+        start["waited_seconds"] = round(waited, 4)
+    shard_log.log(start)
 
 
 def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightField) -> None:

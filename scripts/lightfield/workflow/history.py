@@ -5,7 +5,8 @@ time that was spent, even by killed processes. Times of day are seconds since 19
 process are in this order:
 
 - ``started``, ``host``, ``pid``: when and where it began;
-- ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open;
+- ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open.
+  On a GPU also ``waited_seconds`` for it and for its kernels, which are in no other time;
 - for each image ``view``, ``finished``, ``wall_seconds`` and ``cpu_seconds``. A rendered view also
   has Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``memory_bytes``, and
   ``geometry_seconds``, which is the part of ``wall_seconds`` for depth;
@@ -89,12 +90,18 @@ class Run:
             return float(self.end["ended"])
         if self.views:
             return float(self.views[-1]["finished"])
-        return float(self.start["started"]) + float(self.start.get("start_up_seconds", 0))
+        start_up = float(self.start.get("start_up_seconds", 0))
+        return float(self.start["started"]) + self.waited_seconds + start_up
+
+    @property
+    def waited_seconds(self) -> float:
+        """The time for which it waited for a GPU, or for the compilation of Cycles' kernels."""
+        return float(self.start.get("waited_seconds", 0))
 
     @property
     def wall_seconds(self) -> float:
         """Its working time until its last line. A killed process may have worked longer."""
-        return round(self.last_heard - float(self.start["started"]), 3)
+        return round(self.last_heard - float(self.start["started"]) - self.waited_seconds, 3)
 
     @property
     def cpu_seconds(self) -> float:

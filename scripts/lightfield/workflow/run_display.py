@@ -6,6 +6,7 @@ and fail. The jobs' logs tell how far each is.
 """
 
 import contextlib
+import math
 import sys
 import threading
 import time
@@ -30,7 +31,7 @@ _FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
 _NEXT_LINE = 0.1
 # The lines of a program's log that the user sees.
-_FOR_THE_USER = ("warning: ", "note: ", "waiting for ")
+_FOR_THE_USER = ("warning: ", "note: ", "waiting for ", progress.COMPILING, progress.COMPILED)
 
 
 @dataclass
@@ -64,15 +65,15 @@ class Task:
             return 1.0
         return (self.already + self.done) / self.total if self.total else 0.0
 
-    def part_at(self, now: float, seconds: float) -> float:
-        """Return the part of its work that is done at ``now``, if all of it takes ``seconds``.
+    def part_after(self, worked: float, seconds: float) -> float:
+        """Return the part that is done after it ``worked`` so long, if all of it takes ``seconds``.
 
         Its log tells of whole pieces. The piece at work counts by its time, and at most as done.
         """
         if self.began is None or self.ended is not None or not seconds:
             return self.part
         pieces = self.total or self.views or 1
-        untold = (now - self.began) / seconds * pieces - self.done
+        untold = worked / seconds * pieces - self.done
         return min(1.0, self.part + min(max(untold, 0.0), 1.0) / pieces)
 
     @property
@@ -147,6 +148,9 @@ class RunDisplay:
         self._failed: set[int] = set()
         self._new_failures: set[int] = set()
         self._shown_warnings: set[str] = set()
+        # The jobs that compile, and the times from which and until which any job did.
+        self._compiling: set[Path] = set()
+        self._compilations: list[list[float]] = []
         self._end = threading.Event()
         self._lock = threading.RLock()
         self._set_tasks({}, 1)
@@ -225,6 +229,7 @@ class RunDisplay:
             self._running.discard(number)
             if task := self._started.get(number):
                 self._follow(task)
+                self._end_compilation(task)
                 task.ended = time.time()
                 self._open.pop(task.log, None)
 
@@ -232,6 +237,8 @@ class RunDisplay:
         """Take notice of a job that failed, and of the executor's message. This may come twice."""
         with self._lock:
             self._running.discard(number)
+            if task := self._started.get(number):
+                self._end_compilation(task)
             if number in self._jobs and number not in self._failed:
                 self._jobs[number].message = first_sentence(message or "")
                 self._failed.add(number)
@@ -314,11 +321,32 @@ class RunDisplay:
                 task.done = report.done
                 task.total = report.total + task.already
                 task.each = report.each
-            elif line.startswith(_FOR_THE_USER) and line not in self._shown_warnings:
+                continue
+            if line.startswith(progress.COMPILING):
+                if not self._compiling:
+                    self._compilations.append([time.time(), math.inf])
+                self._compiling.add(task.log)
+            elif line.startswith(progress.COMPILED):
+                self._end_compilation(task)
+            if line.startswith(_FOR_THE_USER) and line not in self._shown_warnings:
                 self._shown_warnings.add(line)
                 # A note names its subject. A warning does not, so add the task.
                 text = line.removeprefix("warning: ")
                 self.say(line if text == line else f"warning: {task.name}: {text}")
+
+    def _end_compilation(self, task: Task) -> None:
+        """Take notice that a job does not compile any more, if it did."""
+        if task.log in self._compiling:
+            self._compiling.remove(task.log)
+            if not self._compiling:
+                self._compilations[-1][1] = time.time()
+
+    def _worked(self, began: float, now: float) -> float:
+        """Return the seconds of work from ``began`` to ``now``, without those of compilations."""
+        compiled = sum(
+            max(0.0, min(end, now) - max(start, began)) for start, end in self._compilations
+        )
+        return now - began - compiled
 
     def _report_failed(self) -> None:
         """Say at once why a job failed, if others go on. The end of the run repeats it."""
@@ -385,8 +413,9 @@ class RunDisplay:
             parts.append(f"{sum(task.views_done for task in tasks)} of {views} views")
             views_made = sum(task.views_made for task in tasks)
             since = min((task.began for task in tasks if task.views and task.began), default=now)
-            if views_made and now > since and any(task.views for task in self._open.values()):
-                parts[-1] += f", {60 * views_made / (now - since):.3g} a minute"
+            worked = self._worked(since, now)
+            if views_made and worked > 0 and any(task.views for task in self._open.values()):
+                parts[-1] += f", {60 * views_made / worked:.3g} a minute"
         parts.append(f"{duration(self.seconds_left(now))} left")
         return " · ".join(parts)
 
@@ -401,10 +430,10 @@ class RunDisplay:
         remaining = 0.0
         for task in self._tasks.values():
             seconds = slowness * (task.seconds or 0.0)
-            part = task.part_at(now, seconds)
+            part = task.part_after(self._worked(task.began or now, now), seconds)
             done += seconds * part * (1 - task.already / (task.total or 1))
             remaining += seconds * (1 - part)
-        elapsed = now - self._began
+        elapsed = self._worked(self._began, now)
         # Before much is done, assume that all cores work.
         rate = done / elapsed if done > _SURE_AFTER else float(self._cores)
         seconds_by_logs = [
