@@ -15,6 +15,7 @@ On a machine without a GPU: --devices cpu --size 256 --samples 16
 import argparse
 import datetime
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -245,8 +246,8 @@ class Measurement:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.communicate()
         if process.returncode:
-            lines = [line for line in output.splitlines() if "error: " in line]
-            raise UserError("; ".join(lines[-1:]) or f"exit status {process.returncode}")
+            errors = re.findall("error: (.*)", output)
+            raise UserError(errors[-1] if errors else f"exit status {process.returncode}")
 
     def python(self, program: Path, *arguments: object) -> None:
         self.start(sys.executable, program, *arguments)
