@@ -60,6 +60,7 @@ Row = dict[str, Any]
 class View:
     """The seconds of a view by step.
 
+    ``waited`` is the time in which the driver compiled kernels. It is not in ``start``.
     ``blender`` is what Blender adds to Cycles, such as writing its EXR. ``convert`` is all that has
     no column. ``not_rendering`` is the part of the view without ``geometry`` and ``colour``.
     """
@@ -69,6 +70,7 @@ class View:
     samples: int
     denoiser: str
     depth: bool
+    waited: float
     start: float
     first_view: float
     view: float
@@ -138,9 +140,9 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Rendered:
-    """The seconds until the scene was open, and each view's seconds by step, and its file."""
+    """The line of history of the start, each view's seconds by step, and each view's file."""
 
-    start: float
+    start: Row
     views: list[dict[str, float]]
     files: list[Path]
 
@@ -354,7 +356,7 @@ class Scene:
         )
         start, *lines = read_json(folder / "times.json")
         return Rendered(
-            start["start_up_seconds"],
+            start,
             [line["steps"] for line in lines],
             [folder / "exr" / f"{line['view']}.exr" for line in lines],
         )
@@ -396,7 +398,8 @@ class Scene:
             samples=views.render.samples,
             denoiser="none",
             depth=views.depth is not None,
-            start=rendered.start,
+            waited=rendered.start.get("waited_seconds", 0.0),
+            start=rendered.start["start_up_seconds"],
             first_view=first["whole"],
             view=view,
             convert=view - sum(steps.values()),
