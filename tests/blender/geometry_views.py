@@ -177,13 +177,13 @@ def main(folder: Path, cases: Path) -> None:
         # The first geometry follows a new session, the second a colour render. Both must be equal.
         cycles.set_up(path, None, lightfield, "cpu", 1)
         for _ in range(2):
-            geometry = render_geometry(pose)
+            geometry = render_geometry(pose, ["normal", "object", "material"])
             colour = render_colour(pose, 1)
         rays = shard.depth_rays(lightfield)
         results[f"{name}.z"] = shard.depth_channel(geometry.depth, lightfield, rays)
-        results[f"{name}.normal"] = geometry.normal
-        results[f"{name}.objects"] = geometry.objects
-        results[f"{name}.materials"] = geometry.materials
+        results[f"{name}.normal"] = geometry.passes["normal"]
+        results[f"{name}.objects"] = geometry.passes["object"]
+        results[f"{name}.materials"] = geometry.passes["material"]
         for kind in ("object", "material"):
             results[f"{name}.{kind}_names"] = np.array(list(ids.names(kind)))
         results[f"{name}.colour"] = colour.pixels

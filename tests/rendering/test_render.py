@@ -153,9 +153,9 @@ def shard(tmp_path, run_program, room):
         first, end = views.split(":")
         return folder / f"{first or 0}-{end or 4}.jsonl"
 
-    def render(*extra, views=":", **options):
+    def render(*extra, views=":", program=("render_shard.py",), **options):
         return run_program(
-            "render_shard.py",
+            *program,
             "--blend",
             room,
             "--lightfield",
@@ -252,6 +252,24 @@ def test_a_view_without_a_logged_checksum_is_rendered_again(shard):
     assert shard.rendered() == [*names, names[-1]]
     shard()
     assert shard.rendered() == [*names, names[-1]]
+
+
+def test_a_view_is_written_while_the_next_is_rendered(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    shard(program=(BLENDER / "held_writing.py", "waits"))
+    assert shard.rendered() == names
+    shard()
+    assert shard.rendered() == names
+
+
+def test_a_view_that_cannot_be_written_ends_the_shard_and_keeps_the_views_before(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    failed = shard(program=(BLENDER / "held_writing.py", "fails"), check=False)
+    assert failed.returncode == 1
+    assert f"error: {shard.views / names[1]}.exr: no space" in failed.stderr
+    assert shard.rendered() == names[:1]
+    shard()
+    assert shard.rendered() == names
 
 
 def test_shards_with_other_bounds_keep_finished_views(shard):

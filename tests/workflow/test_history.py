@@ -56,7 +56,7 @@ import sys, time
 from pathlib import Path
 from lightfield.rendering import colour_pass, geometry_pass
 from lightfield.stages.views import RenderShard
-def hang(*_): time.sleep(60)
+def hang(*_, **__): time.sleep(60)
 colour_pass.render_colour = geometry_pass.render_geometry = hang
 lightfield, blend = map(Path, sys.argv[1:])
 folder = lightfield.with_name("exr")

@@ -256,7 +256,8 @@ class Trials:
         channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
         channels |= {f"{name}.Y": part.mean(axis=-1) for name, part in raw.passes.items()}
         if raw.passes:
-            channels |= self._surfaces(render_geometry(window.view.world_from_camera).materials)
+            geometry = render_geometry(window.view.world_from_camera, ["material"])
+            channels |= self._surfaces(geometry.passes["material"])
         elif self.lightfield.depth:
             channels["Z"] = render_geometry(window.view.world_from_camera).depth
         images.write_exr(

@@ -49,9 +49,6 @@ SAMPLING = {
 # the passes that materials write.
 _ADDED_PASSES = (GROUP_PREFIX, AOV_PREFIX)
 
-# The passes of Cycles that make up a view's geometry, and their channels.
-GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
-
 
 def set_up(
     blend: Path,
@@ -185,7 +182,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
                 setattr(owner, name, False)
     needed = [name for each in passes for name in each.needed]
     built_in = [name for name in needed if not name.startswith(_ADDED_PASSES)]
-    for name in ("Combined", *built_in, *(GEOMETRY_PASSES if needed else ())):
+    for name in ("Combined", *built_in, *(("Depth",) if needed else ())):
         setattr(*pass_property(layer, name), True)
     # A cryptomatte pass holds two objects: 6 gives three passes.
     layer.pass_cryptomatte_depth = 6

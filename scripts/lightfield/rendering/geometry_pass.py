@@ -5,7 +5,7 @@ filter. With the narrowest filter that is the pixel's centre. Glass counts as a 
 transparency cuts out do not count, as in the colour. Neither do fog, smoke and other volumes.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,9 +13,10 @@ from typing import Any
 import bpy
 import numpy as np
 
+from lightfield.formats import passes
 from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering import ids, instances, volumes
-from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
+from lightfield.rendering.cycles import pass_property, view_layer
 from lightfield.rendering.render_graph import changed
 from lightfield.rendering.view import Array, render_view
 
@@ -31,7 +32,8 @@ _SAMPLING = {
     "filter_width": 0.01,
     "max_bounces": 0,
 }
-_MOTION = {"Vector": "XYZW"}
+# The channels of Cycles' passes.
+_CHANNELS = {"Normal": "XYZ", "Object Index": "X", "Material Index": "X", "Vector": "XYZW"}
 # Cycles negates the motion to the next frame, and its y points up.
 _MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
 
@@ -42,26 +44,19 @@ class ViewGeometry:
 
     - ``depth`` (height, width): float32 in metres, inf for a miss. Z-depth for a perspective
       camera, distance for any other.
-    - ``normal`` (height, width, 3): float32, the shading normal in world space, towards the camera.
-    - ``objects``, ``materials`` (height, width): uint16, their numbers of
-      `lightfield.rendering.ids`. Only if Cycles was set up for a pass of numbers.
-    - ``instances`` (height, width): uint32, the numbers of `lightfield.rendering.instances`. None
-      if not requested.
-    - ``motion`` (height, width, 4): float32, the offsets x, y to the surface's places in the
-      previous and in the next frame. In pixels, to the right and down. None if not requested.
+    - ``passes``: the requested passes by name, each 0 for a miss. ``normal`` (height, width, 3):
+      float32, the shading normal in world space, towards the camera. ``object`` and ``material``
+      (height, width): uint16, their numbers of `lightfield.rendering.ids`. ``instance`` (height,
+      width): uint32, the numbers of `lightfield.rendering.instances`. ``motion`` (height, width,
+      4): float32, the offsets x, y to the surface's places in the previous and in the next frame,
+      in pixels to the right and down.
     - ``alpha`` (height, width): float32, how much of the surface the picture shows, by one sample.
       None if not requested.
     - ``render_seconds``, ``synchronization_seconds``: as Cycles measured them.
-
-    All but the depth are 0 for a miss.
     """
 
     depth: Array
-    normal: Array
-    objects: Array
-    materials: Array
-    instances: Array | None
-    motion: Array | None
+    passes: Mapping[str, Array]
     alpha: Array | None
     render_seconds: float
     synchronization_seconds: float
@@ -71,11 +66,7 @@ class ViewGeometry:
         return replace(
             self,
             depth=np.where(where, np.float32(np.inf), self.depth),
-            normal=cleared(self.normal, where),
-            objects=cleared(self.objects, where),
-            materials=cleared(self.materials, where),
-            instances=None if self.instances is None else cleared(self.instances, where),
-            motion=None if self.motion is None else cleared(self.motion, where),
+            passes={name: cleared(pixels, where) for name, pixels in self.passes.items()},
         )
 
 
@@ -87,48 +78,50 @@ def cleared(pixels: Array, where: Array) -> Array:
 
 
 def render_geometry(
-    world_from_camera: Array,
-    motion: bool = False,
-    instance_numbers: bool = False,
-    alpha: bool = False,
+    world_from_camera: Array, names: Collection[str] = (), alpha: bool = False
 ) -> ViewGeometry:
     """Render the geometry that a camera at ``world_from_camera``, (4, 4) camera-to-world, sees.
 
-    ``motion``, ``instance_numbers`` and ``alpha`` add these fields. Cycles must be set up for them.
+    ``names`` are the passes that it has beside its depth. ``alpha`` adds this field. Cycles must be
+    set up for them.
     """
-    geometry_passes = dict(GEOMETRY_PASSES)
-    if motion:
-        geometry_passes |= _MOTION
-    with _geometry_settings(geometry_passes):
-        cycles_passes = geometry_passes | (instances.CYCLES_PASSES if instance_numbers else {})
-        if alpha:
-            cycles_passes = cycles_passes | {"Combined": "RGBA"}
-        rendered = render_view(world_from_camera, 0, cycles_passes)
+    built_in = {"Depth": "Z"} | {
+        cycles_pass: _CHANNELS[cycles_pass]
+        for name in names
+        for cycles_pass in passes.by_name(name).cycles
+    }
+    needed = built_in | (instances.CYCLES_PASSES if "instance" in names else {})
+    if alpha:
+        needed = needed | {"Combined": "RGBA"}
+    with _geometry_settings(built_in):
+        rendered = render_view(world_from_camera, 0, needed)
     depth = rendered.passes["Depth"]
     # Cycles leaves NaN where the lens sees nothing.
     hit = depth < MISS
-    normal, object_indices, material_indices = (
-        np.where(hit, rendered.passes[name], np.float32(0))
-        for name in ("Normal", "Object Index", "Material Index")
-    )
-    objects = ids.numbers("object")[object_indices[..., 0].astype(np.uint16)]
-    materials = ids.numbers("material")[material_indices[..., 0].astype(np.uint16)]
     return ViewGeometry(
         np.where(hit, depth, np.float32(np.inf))[..., 0],
-        normal,
-        objects,
-        materials,
-        instances.decoded(rendered.passes, objects.astype(int)) if instance_numbers else None,
-        np.where(hit, rendered.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
+        {name: _pass(name, rendered.passes, hit) for name in names},
         rendered.passes["Combined"][..., 3] if alpha else None,
         rendered.render_seconds,
         rendered.synchronization_seconds,
     )
 
 
+def _pass(name: str, cycles_passes: Mapping[str, Array], hit: Array) -> Array:
+    """Return a pass as `ViewGeometry` has it. ``hit`` (height, width, 1) is False for a miss."""
+    if name == "instance":
+        return instances.decoded(cycles_passes, _pass("object", cycles_passes, hit).astype(int))
+    (cycles_name,) = passes.by_name(name).cycles
+    signs = _MOTION_SIGNS if name == "motion" else np.float32(1)
+    pixels = np.where(hit, cycles_passes[cycles_name] * signs, np.float32(0))
+    if name in ("object", "material"):
+        return ids.numbers(name)[pixels[..., 0].astype(np.uint16)]
+    return pixels
+
+
 @contextmanager
-def _geometry_settings(passes: Iterable[str]) -> Iterator[None]:
-    """Set Cycles up for geometry with these ``passes``. Restore all settings afterwards."""
+def _geometry_settings(cycles_passes: Iterable[str]) -> Iterator[None]:
+    """Set Cycles up for geometry with these passes. Restore all settings afterwards."""
     scene = bpy.context.scene
     layer = view_layer(scene)
     with ExitStack() as stack:
@@ -138,7 +131,7 @@ def _geometry_settings(passes: Iterable[str]) -> Iterator[None]:
         stack.enter_context(changed(layer, "use_grease_pencil", False))
         stack.enter_context(changed(scene.render, "use_motion_blur", False))
         stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
-        for name in passes:
+        for name in cycles_passes:
             stack.enter_context(changed(*pass_property(layer, name), True))
         # A surface with less opacity than this is cut out by transparency.
         stack.enter_context(changed(layer, "pass_alpha_threshold", LEAST_ALPHA))

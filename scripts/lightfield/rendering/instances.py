@@ -7,6 +7,7 @@ float it has 24 bits: of n instances of an object, about n² / 5e7 pairs share a
 that is not an instance has its number of `lightfield.rendering.ids`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -126,7 +127,7 @@ def name_and_numbers(entry: Any) -> tuple[str, int, int]:
     return name, min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST), object_number
 
 
-def decoded(passes: dict[str, Array], objects: Array) -> Array:
+def decoded(passes: Mapping[str, Array], objects: Array) -> Array:
     """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
 
     ``passes`` holds the `CYCLES_PASSES` by name. ``objects`` (height, width) are the objects'

@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -171,44 +172,31 @@ def _render_views(
     progress: Progress,
     stall: int,
 ) -> None:
-    """Render ``views`` one after the other in the open scene. Write and note each."""
+    """Render ``views`` one after the other in the open scene. Write and note each.
+
+    A thread writes each view while Cycles renders the next, so that a GPU does not wait.
+    """
     from lightfield.rendering import holdouts, shadow_catchers
 
-    files = _ViewFiles(lightfield, folder)
-    process = psutil.Process()
-    earlier_seconds: list[float] = []
     visible = _visible_places(lightfield)
     catches = lightfield.transparent and bool(shadow_catchers.names())
     has_holdouts = holdouts.exist()
     progress.begin()
-    for view in views:
-        # Use a timer of the system, because a process that hangs may run no Python.
-        signal.alarm(stall)
-        began = time.perf_counter()
-        began_cpu = time.process_time()
-        rendered = _render_view(
-            view, lightfield, visible, catches=catches, has_holdouts=has_holdouts
-        )
-        files.write(view, rendered)
-        shard_log.log(
-            {
-                "view": view.name,
-                "finished": round(time.time(), 3),
-                "wall_seconds": round(time.perf_counter() - began, 4),
-                "cpu_seconds": round(time.process_time() - began_cpu, 4),
-                **rendered.seconds,
-                "memory_bytes": process.memory_info().rss,
-            },
-        )
-        seconds = rendered.colour.render_seconds
-        if is_suspect(seconds, earlier_seconds):
-            print(
-                f"warning: {folder}/{view.name}.exr took {duration(seconds)}, but other views "
-                f"about {duration(median(earlier_seconds))}; check this view",
-                file=sys.stderr,
+    files = _ViewFiles(lightfield, folder, progress)
+    with ThreadPoolExecutor(max_workers=1) as writer:
+        written: Future[None] | None = None
+        for view in views:
+            # Use a timer of the system, because a process that hangs may run no Python.
+            signal.alarm(stall)
+            rendered = _render_view(
+                view, lightfield, visible, catches=catches, has_holdouts=has_holdouts
             )
-        earlier_seconds.append(seconds)
-        progress.done()
+            # Hold at most two views in memory. An error in writing ends the shard here.
+            if written:
+                written.result()
+            written = writer.submit(files.finish, view, rendered)
+        if written:
+            written.result()
     signal.alarm(0)
 
 
@@ -266,17 +254,14 @@ def _render_view(
     from lightfield.rendering.geometry_pass import render_geometry
 
     view_passes = lightfield.passes
-    names = {view_pass.name for view_pass in view_passes}
-    has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in view_passes)
+    names = [view_pass.name for view_pass in view_passes if not view_pass.of_colour]
     began = time.perf_counter()
     choose_eye(view.name)
     part = visible_part.choose(visible, view.world_from_camera, lightfield.lens)
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
-    if has_geometry:
-        geometry = render_geometry(
-            view.world_from_camera, "motion" in names, "instance" in names, catches
-        )
+    if lightfield.depth or names:
+        geometry = render_geometry(view.world_from_camera, names, alpha=catches)
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render.seed, view.name)
     colour = render_colour(view.world_from_camera, seed, view_passes, lightfield.transparent)
@@ -292,13 +277,21 @@ def _render_view(
 
 
 class _ViewFiles:
-    """Writes the files of rendered views into ``folder`` and beside it, and notes them."""
+    """Writes the files of rendered views into ``folder`` and beside it, and notes them.
 
-    def __init__(self, lightfield: LightField, folder: Path) -> None:
+    The seconds of a view count from the view before, so that those of all views add up.
+    """
+
+    def __init__(self, lightfield: LightField, folder: Path, progress: Progress) -> None:
         from lightfield.rendering.cycles import machine
 
         self.lightfield = lightfield
         self.folder = folder
+        self.progress = progress
+        self.process = psutil.Process()
+        self.earlier_seconds: list[float] = []
+        self.finished = time.perf_counter()
+        self.finished_cpu = time.process_time()
         self.depth_rays = depth_rays(lightfield)
         if lightfield.transparent:
             self.pixels_without_ray = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0])
@@ -308,7 +301,32 @@ class _ViewFiles:
             images.MACHINE_ATTRIBUTE: machine(lightfield.render.denoise),
         }
 
-    def write(self, view: View, rendered: _Rendered) -> None:
+    def finish(self, view: View, rendered: _Rendered) -> None:
+        """Write and note the view, and its line of the history. Warn if it was too fast."""
+        self._write(view, rendered)
+        before, before_cpu = self.finished, self.finished_cpu
+        self.finished, self.finished_cpu = time.perf_counter(), time.process_time()
+        shard_log.log(
+            {
+                "view": view.name,
+                "finished": round(time.time(), 3),
+                "wall_seconds": round(self.finished - before, 4),
+                "cpu_seconds": round(self.finished_cpu - before_cpu, 4),
+                **rendered.seconds,
+                "memory_bytes": self.process.memory_info().rss,
+            },
+        )
+        seconds = rendered.colour.render_seconds
+        if is_suspect(seconds, self.earlier_seconds):
+            print(
+                f"warning: {self.folder}/{view.name}.exr took {duration(seconds)}, but other views "
+                f"about {duration(median(self.earlier_seconds))}; check this view",
+                file=sys.stderr,
+            )
+        self.earlier_seconds.append(seconds)
+        self.progress.done()
+
+    def _write(self, view: View, rendered: _Rendered) -> None:
         """Write and note the view's own file, and one for each pass."""
         lightfield = self.lightfield
         colour = rendered.colour
@@ -375,21 +393,13 @@ def pass_channels(
         return dict(zip(view_pass.channels, numbers, strict=True)), attributes
     assert geometry
     attributes = {}
-    match view_pass.name:
-        case "normal":
-            pixels = np.nan_to_num(geometry.normal, nan=0)
-            attributes[images.NAN_ATTRIBUTE] = int(np.isnan(geometry.normal).sum())
-        case "object":
-            pixels = geometry.objects[..., None]
-        case "material":
-            pixels = geometry.materials[..., None]
-        case "instance":
-            assert geometry.instances is not None
-            pixels = geometry.instances[..., None]
-        case _:
-            assert geometry.motion is not None
-            pixels = geometry.motion.copy()
-            pixels[..., ::2] = shorter(lens, pixels[..., ::2])
+    pixels = np.atleast_3d(geometry.passes[view_pass.name])
+    if view_pass.kind == "normal":
+        attributes[images.NAN_ATTRIBUTE] = int(np.isnan(pixels).sum())
+        pixels = np.nan_to_num(pixels, nan=0)
+    elif view_pass.kind == "motion":
+        pixels = pixels.copy()
+        pixels[..., ::2] = shorter(lens, pixels[..., ::2])
     planes = np.moveaxis(pixels.astype(view_pass.dtype), -1, 0)
     return dict(zip(view_pass.channels, planes, strict=True)), attributes
 

@@ -7,9 +7,10 @@ process are in this order:
 - ``started``, ``host``, ``pid``: when and where it began;
 - ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open.
   On a GPU also ``waited_seconds`` for it and for its kernels, which are in no other time;
-- for each image ``view``, ``finished``, ``wall_seconds`` and ``cpu_seconds``. A rendered view also
-  has Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``memory_bytes``, and
-  ``geometry_seconds``, which is the part of ``wall_seconds`` for depth;
+- for each image ``view``, ``finished``, ``wall_seconds`` and ``cpu_seconds``, which count from the
+  end of the image before, because a view is written while the next is rendered. A rendered view
+  also has Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``memory_bytes``, and
+  ``geometry_seconds``, which its depth and passes of geometry took;
 - ``ended``, ``wall_seconds``, ``cpu_seconds``, ``peak_memory_bytes``: the totals of the process. A
   killed process lacks this line.
 """
