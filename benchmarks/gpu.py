@@ -53,6 +53,8 @@ CAMERA_SAMPLES = 64
 # The GPU that can render through an OSL camera.
 OSL_DEVICE = "optix"
 SMALL = 64  # pixels
+# The steps of the thread that renders.
+RENDERING_STEPS = ("synchronization", "geometry", "colour", "blender", "read")
 Row = dict[str, Any]
 
 
@@ -61,8 +63,9 @@ class View:
     """The seconds of a view by step.
 
     ``waited`` is the time in which the driver compiled kernels. It is not in ``start``.
-    ``blender`` is what Blender adds to Cycles, such as writing its EXR. ``convert`` is all that has
-    no column. ``not_rendering`` is the part of the view without ``geometry`` and ``colour``.
+    ``blender`` is what Blender adds to Cycles, such as writing its EXR. ``rest`` is all before
+    ``convert`` that has no column. From ``convert`` on, a thread writes the view while the next is
+    rendered. ``not_rendering`` is the part of the view without ``geometry`` and ``colour``.
     """
 
     scene: str
@@ -79,6 +82,7 @@ class View:
     colour: float
     blender: float
     read: float
+    rest: float
     convert: float
     compress: float
     flush: float
@@ -392,6 +396,7 @@ class Scene:
         assert isinstance(views.render.samples, int)
         steps = {"geometry": 0.0, **second}
         view = steps.pop("whole")
+        before_writing = (steps[name] for name in RENDERING_STEPS)
         return View(
             scene=self.name,
             device=device,
@@ -402,7 +407,7 @@ class Scene:
             start=rendered.start["start_up_seconds"],
             first_view=first["whole"],
             view=view,
-            convert=view - sum(steps.values()),
+            rest=view - sum(before_writing),
             not_rendering=1 - (steps["colour"] + steps["geometry"]) / view,
             **steps,
         )

@@ -1,5 +1,8 @@
 """Render views as scripts/render_shard.py does, and measure the seconds of each step of a view.
 
+A thread writes a view while the next is rendered. So the seconds of both add up to more than those
+of the whole.
+
 It takes the flags of scripts/render_shard.py, and writes --times besides. With --osl, an OSL shader
 of the equidistant lens takes the place of Cycles' own camera. Of the GPUs, only OptiX can do that.
 benchmarks/gpu.py starts it.
@@ -7,9 +10,11 @@ benchmarks/gpu.py starts it.
 
 import os
 import sys
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -68,10 +73,10 @@ class TimedShard(RenderShard):
     osl: bool = option("render through an OSL shader of the same lens", False)
 
 
-class Clock:
+class Clock(threading.local):
     """Adds up the seconds of steps. The seconds of a step inside another one are not the other's.
 
-    ``seconds`` are those of the current view.
+    Each thread has its own ``seconds``, of the current view.
     """
 
     def __init__(self) -> None:
@@ -104,6 +109,12 @@ class Clock:
 
         setattr(owner, name, timed)
 
+    def take(self) -> dict[str, float]:
+        """Return the seconds of the current view, and begin the next."""
+        seconds = dict(self.seconds)
+        self.seconds.clear()
+        return seconds
+
 
 def render(job: TimedShard) -> None:
     """Render the views, and write the seconds of their steps."""
@@ -117,7 +128,8 @@ def render(job: TimedShard) -> None:
     watch_cycles(clock, colour_pass, "render_colour", "colour")
     watch_cycles(clock, geometry_pass, "render_geometry", "geometry")
     change_set_up(cycles, job, clock)
-    lines = watch_history(clock)
+    lines = watch_start()
+    watch_views(clock, lines)
     shard.render(job)
     write_json(job.times, lines)
 
@@ -183,26 +195,48 @@ def see_through_shader(camera: Any, lens: Lens) -> None:
         raise UserError("--osl: Blender cannot compile the shader")
 
 
-def watch_history(clock: Clock) -> list[Mapping[str, Any]]:
-    """Return the list of the lines of history. Those of views will have the seconds of steps.
-
-    ``whole`` is the time since the line before: of the view and of its line.
-    """
+def watch_start() -> list[Mapping[str, Any]]:
+    """Return the list that will have the line of history about the start."""
     log: Callable[[Mapping[str, Any]], None] = shard_log.log
     lines: list[Mapping[str, Any]] = []
-    last = [time.perf_counter()]
 
     def timed(entry: Mapping[str, Any]) -> None:
         log(entry)
-        now = time.perf_counter()
-        if "view" in entry:
-            entry = {**entry, "steps": {**clock.seconds, "whole": now - last[0]}}
-        lines.append(entry)
-        clock.seconds.clear()
-        last[0] = now
+        if "start_up_seconds" in entry:
+            lines.append(entry)
 
     shard_log.log = timed
     return lines
+
+
+def watch_views(clock: Clock, lines: list[Mapping[str, Any]]) -> None:
+    """Add the seconds of each view's steps to ``lines``.
+
+    ``whole`` is the time since the view before was given to the thread that writes it.
+    """
+
+    class TimedWriter(ThreadPoolExecutor):
+        """Counts the seconds of the thread that renders, and of the thread that writes."""
+
+        def __init__(self, **options: Any) -> None:
+            super().__init__(**options)
+            self.before = time.perf_counter()
+            clock.take()
+
+        def submit(self, write: Any, /, view: Any, *arguments: Any, **_: Any) -> Future[Any]:
+            now = time.perf_counter()
+            steps = {**clock.take(), "whole": now - self.before}
+            self.before = now
+
+            def timed() -> None:
+                clock.begin()
+                write(view, *arguments)
+                clock.end("convert")
+                lines.append({"view": view.name, "steps": {**steps, **clock.take()}})
+
+            return super().submit(timed)
+
+    shard.ThreadPoolExecutor = TimedWriter
 
 
 if __name__ == "__main__":

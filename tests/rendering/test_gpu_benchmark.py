@@ -69,8 +69,12 @@ def test_the_benchmark_measures_every_step_and_goes_on_where_it_ended(own_folder
         (2, "processor", False),
     ]
     for row in views:
-        steps = list(row)[list(row).index("view") + 1 : -1]
-        assert sum(row[step] for step in steps) == pytest.approx(row["view"])
+        columns = list(row)
+        steps = columns[columns.index("view") + 1 : -1]
+        # A thread does the steps from this one on while the next view is rendered.
+        writing = steps.index("convert")
+        assert sum(row[step] for step in steps[:writing]) == pytest.approx(row["view"])
+        assert sum(row[step] for step in steps[writing:]) > 0
         assert min(row[step] for step in steps) > -ROUNDED
     (camera,) = rows(own_folder, "A camera by OSL beside Cycles' own")
     assert camera["noises"] < 0.1
