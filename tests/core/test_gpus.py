@@ -210,36 +210,48 @@ def test_a_number_that_no_driver_explains_makes_no_job_wait(machine, tmp_path):
         assert first.stdout.readline() == second.stdout.readline() == "0\n"
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        "System is out of GPU memory",
-        "Out of memory in cuMemAlloc_v2(&device_pointer, size) (device_impl.cpp:601)",
-    ],
-)
-def test_a_gpu_without_memory_is_reported_with_advice(message, room, run_program, tmp_path):
+@pytest.fixture
+def error_line(room, run_program, tmp_path):
+    """Return a function that renders on a GPU, where Cycles ends with a message.
+
+    It returns the line of the error.
+    """
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [16, 16]})
     sampling = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     rig = {"type": "plane", "cameras": [1, 1]}
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=1, render=sampling)
     lightfield.write(tmp_path / "lightfield.json")
-    result = run_program(
-        BLENDER / "full_gpu.py",
-        message,
-        "--blend",
-        room,
-        "--device",
-        "cuda",
-        "--lightfield",
-        tmp_path / "lightfield.json",
-        "--output",
-        tmp_path / "exr",
-        check=False,
-    )
-    assert result.returncode == 1
-    assert result.stderr.splitlines()[-1] == (
+
+    def render(message):
+        arguments = ["--blend", room, "--lightfield", tmp_path / "lightfield.json"]
+        arguments += ["--device", "cuda", "--output", tmp_path / "exr"]
+        result = run_program(BLENDER / "full_gpu.py", message, *arguments, check=False)
+        assert result.returncode == 1
+        assert "Traceback" not in result.stderr
+        assert not list(tmp_path.rglob("*.exr"))
+        return result.stderr.splitlines()[-1]
+
+    return render
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "System is out of GPU memory",
+        "System is out of GPU and shared host memory",
+        "Out of memory in cuMemAlloc_v2(&device_pointer, size) (device_impl.cpp:601)",
+        "Out of memory in HIP queue enqueue (integrator_shade_surface)",
+        "OPTIX_ERROR_DEVICE_OUT_OF_MEMORY in optixAccelBuild(context, stream) (bvh.cpp:1)",
+        "Failed to load CUDA kernel from 'lib/kernel_compute_75.ptx.zst' (Out of memory)",
+    ],
+)
+def test_a_gpu_without_memory_is_reported_with_advice(message, error_line):
+    assert error_line(message) == (
         f"error: Cycles cannot render the view: {message}: lower resolution, shrink the scene's "
         "textures, end what else uses the GPU, or take device=cpu"
     )
-    assert "Traceback" not in result.stderr
-    assert not list(tmp_path.rglob("*.exr"))
+
+
+def test_another_error_of_a_gpu_gets_no_advice_about_memory(error_line):
+    message = "Illegal address in cuMemcpyHtoD_v2(pointer, mem.memory_size()) (device_impl.cpp:7)"
+    assert error_line(message) == f"error: Cycles cannot render the view: {message}"

@@ -59,6 +59,9 @@ _NOISY_BYTES = 3  # 8 bits with noise, which a PNG cannot compress
 _WEIGHT_BYTES = 12  # the weights of a bracket
 # Bytes of memory for a pixel of a view that is rendered. They were 255 between 64² and 1024².
 PIXEL_MEMORY = 300
+# The same for each pixel more than a tile has. A view of 8192² took 10.1 GB, and its file 2.7 GB.
+TILED_PIXEL_MEMORY = 200
+TILE_SIDE = 2048  # Cycles renders views with more pixels than a square of this side in tiles
 DENOISED_PIXEL_MEMORY = 1000  # with OpenImageDenoise, which took 910
 _GROUP_PIXEL_MEMORY = 70  # more for each light group: 36 of Cycles and its file, 30 of arrays
 _PASSES_PIXEL_BYTES = 200  # a temporary file with all passes in 32-bit floats, and a reserve
@@ -174,8 +177,10 @@ def rendering_memory(scene: int, pixels: int, denoise: bool, groups: int = 0) ->
     ``scene`` is the inventory's ``memory_bytes``: the memory for a view of very few pixels. The
     views have this many light ``groups``.
     """
+    in_tile = pixels if denoise else min(pixels, TILE_SIDE**2)
     pixel_bytes = DENOISED_PIXEL_MEMORY if denoise else PIXEL_MEMORY
-    return scene + pixels * (pixel_bytes + groups * _GROUP_PIXEL_MEMORY)
+    memory = in_tile * pixel_bytes + (pixels - in_tile) * TILED_PIXEL_MEMORY
+    return scene + memory + pixels * groups * _GROUP_PIXEL_MEMORY
 
 
 def temporary_bytes(pixels: int, groups: int) -> int:

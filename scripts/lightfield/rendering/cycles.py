@@ -14,6 +14,7 @@ from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.rigs.rig import EYES
+from lightfield.planning.cost import TILE_SIDE
 from lightfield.rendering import (
     animation,
     blend_file,
@@ -161,6 +162,9 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     # Blender would burn the file's name, the frame and the like into the pixels.
     render.use_stamp = False
     render.film_transparent = lightfield.transparent
+    # Larger views take less memory in tiles, and show the same.
+    scene.cycles.use_auto_tile = True
+    scene.cycles.tile_size = TILE_SIDE
     render.use_overwrite = True
     output = render.image_settings
     output.media_type = "MULTI_LAYER_IMAGE"
@@ -315,9 +319,10 @@ def _gpu_of_this_process(device: str) -> str | None:
 
 
 def _use_device(scene: Any, device: str) -> None:
-    """Select Cycles' device. Raises `UserError` if a named device is missing."""
+    """Select Cycles' device, also for denoising. Raises `UserError` if a named one is missing."""
     kind = _gpu_of_this_process(device)
     scene.cycles.device = "GPU" if kind else "CPU"
+    scene.cycles.denoising_use_gpu = kind is not None
     if kind:
         preferences = bpy.context.preferences.addons["cycles"].preferences
         preferences.compute_device_type = kind

@@ -1,6 +1,7 @@
 """Renders one view with Cycles. `lightfield.rendering.cycles` sets Cycles up before."""
 
 import math
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from lightfield.rendering.moving_camera import place_camera
 from lightfield.rendering.quiet import quiet
 
 Array = np.ndarray[Any, Any]
+
+# As CUDA, HIP, OptiX, Cycles and Blender say it.
+_OUT_OF_MEMORY = re.compile(r"(out.of|not enough).*memory", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ def render_view(world_from_camera: Array, seed: int, passes: Mapping[str, str]) 
             lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
             text = "; ".join(dict.fromkeys(filter(None, lines)))
             advice = ""
-            if "memory" in text.lower():
+            if _OUT_OF_MEMORY.search(text):
                 on_gpu = scene.cycles.device == "GPU"
                 advice = f": {LESS_GPU_MEMORY if on_gpu else LESS_MEMORY}"
             raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
