@@ -1,9 +1,13 @@
 """The GPU check: when pictures count as the same, and the estimated hours. Needs no GPU."""
 
+import os
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import simulated_gpus
+from conftest import BLENDER
 
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock
@@ -105,7 +109,7 @@ def test_hours_follow_from_views_pixels_and_samples():
     assert "times as fast as on one core" in gpu_check.table("garden", content)
 
 
-def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
+def test_the_processor_agrees_with_itself(tmp_path, run_program, room, monkeypatch):
     """Uses real renders, with the processor in place of the GPU."""
     content = LightField.from_rig(
         RIG | {"center": [0, 0, 1.5]},
@@ -130,3 +134,17 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
         assert refused.stderr.count("error: ") == 1
         assert said in refused.stderr
     assert not (tmp_path / "room.json").exists()
+    # Before it measures a GPU, the driver compiles Cycles' kernels.
+    rows = [{"index": 0, "uuid": "GPU-1", "name": "NVIDIA H200"}]
+    rows[0] |= {"compute_cap": "9.0", "driver_version": "580.159"}
+    simulated_gpus.write_nvidia_smi(tmp_path, rows)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setenv("CUDA_CACHE_PATH", str(tmp_path / "kernels"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    told = []
+    for _ in range(2):
+        program = BLENDER / "simulated_gpu.py"
+        checked = run_program(program, 0, "gpu_check.py", *arguments, "--device", "cuda")
+        told.append("compiling Cycles' kernels for NVIDIA H200" in checked.stderr)
+        shutil.rmtree(tmp_path / "cache")
+    assert told == [True, False]

@@ -9,7 +9,13 @@ from conftest import BLENDER
 
 from lightfield.workflow import history
 
-H200 = {"index": 0, "uuid": "GPU-1", "name": "NVIDIA H200"}
+H200 = {
+    "index": 0,
+    "uuid": "GPU-1",
+    "name": "NVIDIA H200",
+    "compute_cap": "9.0",
+    "driver_version": "580.159",
+}
 RENDERS_ON = "renders on the GPU NVIDIA H200 (device=auto; device=cpu for the processor)"
 # Where Blender's list of GPUs has none, Cycles itself renders on the processor.
 WITH_GPU = """
@@ -27,6 +33,7 @@ def on_one_gpu(folder, *arguments, device="auto"):
     (folder / "bin").mkdir(exist_ok=True)
     simulated_gpus.write_nvidia_smi(folder / "bin", [H200])
     variables = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "TMPDIR": str(folder)}
+    variables["CUDA_CACHE_PATH"] = str(folder / "cache")
     result = snakemake(
         folder, "--config", "scenes=[smoke]", f"device={device}", *arguments, env=variables
     )
@@ -40,7 +47,11 @@ def test_a_run_says_its_gpu_and_renders_on_it_one_view_at_a_time(tmp_path):
         program = folder / "scripts" / name
         program.write_text(program.read_text().replace("if __name__", f"{WITH_GPU}\nif __name__"))
     options = ("--cores", "4", "--until", "render")
-    assert RENDERS_ON in on_one_gpu(folder, *options).splitlines()
+    lines = on_one_gpu(folder, *options).splitlines()
+    assert lines.count(RENDERS_ON) == 1
+    # Three shards need the kernels.
+    assert len([line for line in lines if line.startswith("compiling Cycles' kernels")]) == 1
+    assert len([line for line in lines if line.startswith("compiled Cycles' kernels")]) == 1
     runs = [
         run
         for receipt in (folder / "work").rglob("receipts/**/render/*.jsonl")
