@@ -43,12 +43,10 @@ def images(lightfield):
     from lightfield.rendering.geometry_pass import render_geometry
 
     pose = lightfield.views[0].world_from_camera
-    names = {each.name for each in lightfield.passes}
-    geometry = render_geometry(pose, "motion" in names, "instance" in names)
+    names = [each.name for each in lightfield.passes if not each.of_colour]
+    geometry = render_geometry(pose, names)
     colour = render_colour(pose, 1, lightfield.passes)
-    fields = ("depth", "normal", "objects", "materials", "instances", "motion")
-    found = {name: getattr(geometry, name) for name in fields}
-    return {"colour": colour.pixels, **colour.passes, **found}
+    return {"colour": colour.pixels, "depth": geometry.depth, **colour.passes, **geometry.passes}
 
 
 @pytest.mark.parametrize("camera", ["fisheye", "perspective"])
