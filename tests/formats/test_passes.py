@@ -102,7 +102,8 @@ def test_motion_is_the_walls_movement_through_the_lens(lens, made):
 def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
     lens = lenses.from_camera(LENSES["panorama"])
     motion = np.array([[[60, 1, -61.5, 2]]], np.float32)
-    channels, _ = shard.pass_channels(PASSES["motion"], SimpleNamespace(motion=motion), None, lens)
+    geometry = SimpleNamespace(passes={"motion": motion})
+    channels, _ = shard.pass_channels(PASSES["motion"], geometry, None, lens)
     assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
 
 
@@ -117,8 +118,8 @@ def test_values_that_are_not_numbers_are_counted_and_become_0():
     wrong = np.array([[[np.nan, np.nan, np.nan], [0, 0, 1]]], np.float32)
     lens = lenses.from_camera(LENSES["panorama"])
     for name in ("normal", "diffuse_light"):
-        geometry = SimpleNamespace(normal=wrong, passes={name: wrong})
-        channels, attributes = shard.pass_channels(PASSES[name], geometry, geometry, lens)
+        view = SimpleNamespace(passes={name: wrong})
+        channels, attributes = shard.pass_channels(PASSES[name], view, view, lens)
         assert attributes[images.NAN_ATTRIBUTE] == 3
         assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
 
