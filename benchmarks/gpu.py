@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.configuration.dataset_paths import Paths
 from lightfield.configuration.scene_yaml import load_scene
-from lightfield.core import machine, processors, units
+from lightfield.core import gpus, machine, processors, units
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json, write_text
@@ -294,15 +294,10 @@ def cell(value: Any) -> str:
 
 def describe_machine() -> Row:
     """Return what the figures depend on. A machine without NVIDIA's driver has no such figures."""
-    query = "name,driver_version,compute_cap"
-    command = ["nvidia-smi", f"--query-gpu={query}", "--format=csv,noheader"]
-    try:
-        output = subprocess.run(command, capture_output=True, encoding="utf-8", check=True).stdout
-    except (OSError, subprocess.SubprocessError):
-        output = "–, –, –"
-    facts = zip(query.split(","), output.splitlines()[0].split(", "), strict=True)
+    fields = ("name", "driver_version", "compute_cap")
+    rows = gpus.nvidia(*fields) or [["–"] * len(fields)]
     return {
-        **{f"gpu_{name}": value for name, value in facts},
+        **{f"gpu_{field}": value for field, value in zip(fields, rows[0], strict=True)},
         "processor": machine.describe(denoise=True),
         "cores": processors.available(),
         "bpy": version("bpy"),

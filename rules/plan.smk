@@ -44,8 +44,7 @@ rule plan:
             for name, frames, probe in BUILD.probes
         ),
         families=shlex.join(f"--family={folder}" for folder in BUILD.family_names),
-        advice=advice_arguments(),
-        calibrations=calibration_arguments(),
+        equal_error=equal_error_arguments(),
         watts=SETTINGS.energy.watts,
         cores=SETTINGS.energy.core_count,
         table=f"{RESULTS}/tables/plan.md",
@@ -53,5 +52,5 @@ rule plan:
         "Adding up the time and size of the chosen datasets"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} {params.families} {params.advice} {params.calibrations}"
+        " {params.datasets} {params.families} {params.equal_error}"
         " --watts {params.watts} --cores {params.cores} --output {params.table} 2>&1 | tee {log}"

@@ -70,23 +70,19 @@ def status_arguments(wildcards):
     return shlex.join(arguments)
 
 
-def advice_arguments():
-    """Return the arguments that name the files of `error_vs_time` to scripts/plan.py."""
-    arguments = []
-    for name, scene in {d.sequence_name: d.scene_name for d in CHOSEN_DATASETS}.items():
-        file = f"{RESULTS}/benchmarks/error_vs_time/{scene}.json"
-        if Path(file).exists():
-            arguments += ["--advice", name, file]
-    return shlex.join(arguments)
+def equal_error_arguments():
+    """Return the arguments that tell scripts/plan.py what was measured of each chosen scene.
 
-
-def calibration_arguments():
-    """Return the arguments that name the calibrations of the chosen datasets to scripts/plan.py."""
+    A calibration tells more than `error_vs_time`.
+    """
     arguments = []
     for name, dataset in {d.sequence_name: d for d in CHOSEN_DATASETS}.items():
+        advice = f"{RESULTS}/benchmarks/error_vs_time/{dataset.scene_name}.json"
         if dataset.calibration:
             seconds = dataset.paths.calibration_seconds
             arguments += ["--calibration", name, dataset.calibration, seconds]
+        elif Path(advice).exists():
+            arguments += ["--advice", name, advice]
     return shlex.join(arguments)
 
 

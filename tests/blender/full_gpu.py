@@ -8,11 +8,11 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-import bpy
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import simulated_gpus
 
 MESSAGE = sys.argv.pop(1)
-# Name, type, identifier, and flags of its features.
-GPU = ("Simulated", "CUDA", "CUDA_0", *[True] * 6)
 
 
 def render(render_engine, depsgraph):
@@ -20,9 +20,7 @@ def render(render_engine, depsgraph):
     render_engine.error_set(MESSAGE)
 
 
-assert bpy.app.version
-# bpy brings both modules.
-import_module("_cycles").available_devices = lambda kind: [GPU] if kind == "CUDA" else []
+simulated_gpus.let_cycles_see_one()
 import_module("cycles.engine").render = render
 sys.argv[0] = "render_shard.py"
 runpy.run_path(str(Path(__file__).parents[2] / "scripts" / sys.argv[0]), run_name="__main__")

@@ -1,7 +1,6 @@
 """Runs a program on a simulated GPU whose first render takes long. It renders on the processor.
 
-The arguments are the seconds of the first render, and the program with its arguments. Where
-Blender's list of GPUs has none of the chosen GPU's kind, Cycles itself renders on the processor.
+The arguments are the seconds of the first render, and the program with its arguments.
 """
 
 import runpy
@@ -10,16 +9,14 @@ import time
 from importlib import import_module
 from pathlib import Path
 
-import bpy
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-# Name, type, identifier, and flags of its features.
-GPU = ("NVIDIA H200", "CUDA", "CUDA_0", *[True] * 6)
+import simulated_gpus
+
 seconds = float(sys.argv.pop(1))
 name = sys.argv.pop(1)
 
-assert bpy.app.version
-# bpy brings both modules.
-import_module("_cycles").available_devices = lambda kind: [GPU] if kind == "CUDA" else []
+simulated_gpus.let_cycles_see_one()
 engine = import_module("cycles.engine")
 render_on_processor = engine.render
 

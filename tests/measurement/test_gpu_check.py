@@ -135,9 +135,7 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room, monkeypat
         assert said in refused.stderr
     assert not (tmp_path / "room.json").exists()
     # Before it measures a GPU, the driver compiles Cycles' kernels.
-    rows = [{"index": 0, "uuid": "GPU-1", "name": "NVIDIA H200"}]
-    rows[0] |= {"compute_cap": "9.0", "driver_version": "580.159"}
-    simulated_gpus.write_nvidia_smi(tmp_path, rows)
+    simulated_gpus.write_nvidia_smi(tmp_path, [simulated_gpus.H200])
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     monkeypatch.setenv("CUDA_CACHE_PATH", str(tmp_path / "kernels"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))

@@ -39,8 +39,7 @@ class Machine:
         lightfield.write(folder / "lightfield.json")
 
     def has(self, capability="9.0", driver="580.159"):
-        row = {"index": 0, "uuid": "GPU-1", "name": "NVIDIA H200"}
-        row |= {"compute_cap": capability, "driver_version": driver}
+        row = simulated_gpus.H200 | {"compute_cap": capability, "driver_version": driver}
         simulated_gpus.write_nvidia_smi(self.folder, [row])
 
     def start(self, name, seconds=0, device="cuda", stall=0):

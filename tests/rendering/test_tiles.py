@@ -4,6 +4,7 @@ import importlib
 
 import numpy as np
 import pytest
+import simulated_gpus
 
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PASSES
@@ -95,9 +96,8 @@ def test_the_device_that_renders_also_denoises(set_up, tmp_path, monkeypatch, de
     from lightfield.rendering import blend_file
 
     monkeypatch.setenv("PATH", str(tmp_path))
-    gpu = ("NVIDIA H200", "CUDA", "CUDA_0", *[True] * 6)
     devices = importlib.import_module("_cycles")
-    monkeypatch.setattr(devices, "available_devices", lambda kind: [gpu] if kind == "CUDA" else [])
+    monkeypatch.setattr(devices, "available_devices", simulated_gpus.available_devices)
     set_up("fisheye", denoise=True)
     bpy.context.scene.cycles.denoising_use_gpu = not is_on_gpu
     blend_file.save_scene(tmp_path / "denoised.blend")

@@ -9,29 +9,19 @@ from conftest import BLENDER
 
 from lightfield.workflow import history
 
-H200 = {
-    "index": 0,
-    "uuid": "GPU-1",
-    "name": "NVIDIA H200",
-    "compute_cap": "9.0",
-    "driver_version": "580.159",
-}
 RENDERS_ON = "renders on the GPU NVIDIA H200 (device=auto; device=cpu for the processor)"
-# Where Blender's list of GPUs has none, Cycles itself renders on the processor.
-WITH_GPU = """
-from importlib import import_module
-
-import bpy
-
-GPU = ("NVIDIA H200", "CUDA", "CUDA_0", *[True] * 6)
-import_module("_cycles").available_devices = lambda kind: [GPU] if kind == "CUDA" else []
+WITH_GPU = f"""
+import sys
+sys.path.insert(0, {str(BLENDER.parent)!r})
+import simulated_gpus
+simulated_gpus.let_cycles_see_one()
 """
 
 
 def on_one_gpu(folder, *arguments, device="auto"):
     """Run Snakemake in a checkout on a machine whose driver lists one GPU. Return its messages."""
     (folder / "bin").mkdir(exist_ok=True)
-    simulated_gpus.write_nvidia_smi(folder / "bin", [H200])
+    simulated_gpus.write_nvidia_smi(folder / "bin", [simulated_gpus.H200])
     variables = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "TMPDIR": str(folder)}
     variables["CUDA_CACHE_PATH"] = str(folder / "cache")
     result = snakemake(

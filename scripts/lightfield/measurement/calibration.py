@@ -103,16 +103,17 @@ class Bench:
         exposure: float | None = None,
     ) -> None:
         self.seed = seed
-        self.reference_seeds, self.samples_of_seed = FEWEST_SEEDS, REFERENCE_SAMPLES
         if isinstance(target, MeasuredTargetError):
             self.reference_seeds, self.samples_of_seed = reference_of_samples(target.of_samples)
+            most_error = math.inf
+        else:
+            self.reference_seeds, self.samples_of_seed = FEWEST_SEEDS, REFERENCE_SAMPLES
+            most_error = REFERENCE_PART * target
         while True:
             references = metrics.exposed_alike(self._references(renderer, windows), exposure)
             self.experiment = Experiment(renderer, windows, references)
             self.own_error = self.experiment.reference_error
-            if isinstance(target, MeasuredTargetError) or self.own_error <= REFERENCE_PART * target:
-                break
-            if self.reference_seeds >= MOST_SEEDS:
+            if self.own_error <= most_error or self.reference_seeds >= MOST_SEEDS:
                 break
             self.reference_seeds *= 2
 
@@ -345,8 +346,7 @@ def _summary(name: str, record: Mapping[str, Any]) -> str:
         f"wanted {wanted}; {record['times_fewer_samples']:.1f} times cheaper "
         "than plain path tracing at equal error; the worst thousandth of pixels left out, with "
         f"which it is {record['probe_error_of_all_pixels']:.3g}; {_bias_text(record['bias'])}; "
-        "by the light that pixels show "
-        f"most of: {', '.join(reached)}"
+        f"by the light that pixels show most of: {', '.join(reached)}"
     )
 
 

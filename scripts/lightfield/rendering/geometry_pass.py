@@ -112,8 +112,10 @@ def _pass(name: str, cycles_passes: Mapping[str, Array], hit: Array) -> Array:
     if name == "instance":
         return instances.decoded(cycles_passes, _pass("object", cycles_passes, hit).astype(int))
     (cycles_name,) = passes.by_name(name).cycles
-    signs = _MOTION_SIGNS if name == "motion" else np.float32(1)
-    pixels = np.where(hit, cycles_passes[cycles_name] * signs, np.float32(0))
+    pixels = cycles_passes[cycles_name]
+    if name == "motion":
+        pixels = pixels * _MOTION_SIGNS
+    pixels = np.where(hit, pixels, np.float32(0))
     if name in ("object", "material"):
         return ids.numbers(name)[pixels[..., 0].astype(np.uint16)]
     return pixels

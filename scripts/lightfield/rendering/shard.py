@@ -120,9 +120,10 @@ def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> N
     # A finished shard does not import Blender, which takes a second.
     with processors.only(threads):
         from lightfield.rendering import cycles, gpu_kernels
-    waited = -gpus.waited_seconds()
+    # An earlier shard of this process may have waited for the GPU.
+    waited_before = gpus.waited_seconds()
     used_device = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
-    waited += gpus.waited_seconds()
+    waited = gpus.waited_seconds() - waited_before
     waited += gpu_kernels.compile_first(lightfield.views[0].world_from_camera)
     start = {
         "start_up_seconds": round(time.time() - history.started - waited, 4),
@@ -181,8 +182,8 @@ def _render_views(
     visible = _visible_places(lightfield)
     catches = lightfield.transparent and bool(shadow_catchers.names())
     has_holdouts = holdouts.exist()
-    progress.begin()
     files = _ViewFiles(lightfield, folder, progress)
+    progress.begin()
     with ThreadPoolExecutor(max_workers=1) as writer:
         written: Future[None] | None = None
         for view in views:
@@ -290,8 +291,6 @@ class _ViewFiles:
         self.progress = progress
         self.process = psutil.Process()
         self.earlier_seconds: list[float] = []
-        self.finished = time.perf_counter()
-        self.finished_cpu = time.process_time()
         self.depth_rays = depth_rays(lightfield)
         if lightfield.transparent:
             self.pixels_without_ray = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0])
@@ -300,6 +299,8 @@ class _ViewFiles:
             images.BPY_ATTRIBUTE: version("bpy"),
             images.MACHINE_ATTRIBUTE: machine(lightfield.render.denoise),
         }
+        self.finished = time.perf_counter()
+        self.finished_cpu = time.process_time()
 
     def finish(self, view: View, rendered: _Rendered) -> None:
         """Write and note the view, and its line of the history. Warn if it was too fast."""
