@@ -213,7 +213,8 @@ def _with_other_inputs(receipt, names):
 
 def _write(path, receipt):
     """Write a receipt."""
-    header = {name: getattr(receipt, name) for name in ("stage", "version", "settings", "inputs")}
+    header = {"job": receipts.job_of(path)}
+    header |= {name: getattr(receipt, name) for name in ("stage", "version", "settings", "inputs")}
     outputs = [
         {"file": name, **output.stamp._asdict()} | ({"key": output.key} if output.key else {})
         for name, output in receipt.outputs.items()

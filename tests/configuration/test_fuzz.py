@@ -255,9 +255,10 @@ def receipt_lines(_):
     view = {"view": "a", "finished": 3.0}
     view |= dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 1.0)
     made = {"file": "exr/a.exr", "sha256": "0" * 64, "bytes": 7, "modified_ns": 7, "key": "k"}
+    header = {"job": "own/View/render/0-2", "stage": "render_shard", "version": 1}
     inputs = {"a.json": "0" * 64, "work/receipts/b.jsonl": "0" * 64}
     return [
-        {"stage": "render_shard", "version": 1, "settings": {"a": 1}, "inputs": inputs},
+        header | {"settings": {"a": 1}, "inputs": inputs},
         made,
         {**made, "file": "exr/b.exr"},
         {"started": 1.0, "host": "here", "pid": 7},

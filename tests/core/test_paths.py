@@ -115,7 +115,7 @@ def sums_file(home, name):
 
 def bundle(home, name):
     receipt = home / "receipts/0-1.jsonl"
-    header = '{"stage": "s", "version": 1, "settings": {}, "inputs": {}}'
+    header = '{"job": "0-1", "stage": "s", "version": 1, "settings": {}, "inputs": {}}'
     line = '{"file": %s, "sha256": "%s", "bytes": 1, "modified_ns": 1}' % (quoted(name), DIGEST)  # noqa: UP031
     write(receipt, f"{header}\n{line}\n")
     write(bundles.bundle_of(receipt))

@@ -813,11 +813,14 @@ def test_an_unpacked_dataset_is_valid_with_its_packages_files(small_dataset: Pat
 
 def write_receipt(dataset: Path) -> Path:
     """Write a receipt of the views, which have a key, and of lightfield.json. Return its path."""
-    lines: list[dict[str, Any]] = [{"stage": "", "version": None, "settings": {}, "inputs": {}}]
+    job = "room/sphere/render/0-12"
+    lines: list[dict[str, Any]] = [
+        {"job": job, "stage": "", "version": None, "settings": {}, "inputs": {}}
+    ]
     for path in sorted((dataset / "exr").glob("view_*")):
         lines.append({"file": str(path), **Stamp.of(path)._asdict(), "key": "key"})
     lines.append({"file": str(dataset / NAME), **Stamp.of(dataset / NAME)._asdict()})
-    receipt = dataset.parent / "work/receipts/room/sphere/render/0-12.jsonl"
+    receipt = dataset.parent / f"work/receipts/{job}.jsonl"
     write_text(receipt, "".join(json.dumps(line) + "\n" for line in lines))
     return receipt
 

@@ -14,6 +14,7 @@ from simulated import put
 from lightfield.core.errors import UserError
 from lightfield.core.files import Stamp, sha256
 from lightfield.core.flags import parsed
+from lightfield.core.receipts import job_of
 from lightfield.stages.checks import Verify
 from lightfield.validation import verification
 from lightfield.validation.verification import faults
@@ -40,7 +41,7 @@ def small(request, tmp_path, monkeypatch):
 
 def write_receipt(path, outputs, inputs=()):
     """Write the receipt of a job that read ``inputs``. ``outputs`` are the stamps of files."""
-    header = {"stage": "", "version": None, "settings": {}}
+    header = {"job": job_of(path), "stage": "", "version": None, "settings": {}}
     header["inputs"] = {name: sha256(name) for name in inputs}
     lines = [header, *({"file": str(name), **stamp._asdict()} for name, stamp in outputs.items())]
     put(Path(path), "".join(json.dumps(line) + "\n" for line in lines))

@@ -334,24 +334,29 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
 @pytest.mark.parametrize("within", [True, False])
 def test_views_are_compared_with_their_receipt_for_any_path(refused, lightfield, tmp_path, within):
     view = tmp_path / "dataset/exr/view_0000f.exr"
+    place = view.parent if within else tmp_path
     images.write_exr(view, dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
-    header = {"stage": "render_shard", "version": None, "settings": {}, "inputs": {}}
-    line = {"file": view.name, **Stamp.of(view)._asdict(), "sha256": "0" * 64, "key": "0"}
-    receipt = tmp_path / "0-1.jsonl"
-    receipt.write_text("".join(json.dumps(each) + "\n" for each in (header, line)))
+    header = {"job": "s/r/render/0-1", "stage": "render_shard", "version": None}
+    header |= {"settings": {}, "inputs": {}}
+    stamp = Stamp.of(view)._replace(sha256="0" * 64)
+    line = {"file": str(view.relative_to(place)), **stamp._asdict(), "key": "0"}
+    receipts = tmp_path / "work/receipts/s/r"
+    receipt = receipts / "render/0-1.jsonl"
+    write_text(receipt, "".join(json.dumps(each) + "\n" for each in (header, line)))
     arguments = ["--input-cfg", lightfield, "--source-receipt", receipt, "--exr"]
+    arguments += ["--receipt", receipts / "perspective/0-1.jsonl"]
     arguments += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
-    place = "." if within else view.parent
-    said = refused("reproject.py", "-i", place, *arguments, folder=view.parent)
+    said = refused("reproject.py", "-i", view.parent, *arguments, folder=place)
     assert "view_0000f.exr: is not as its job made it" in said
 
 
 def test_a_receipt_of_another_kind_is_named(refused, lightfield, tmp_path):
-    path = tmp_path / "0-1.jsonl"
+    path = tmp_path / "work/receipts/s/r/render/0-1.jsonl"
     write_json(path, [])
     arguments = ["-i", tmp_path, "--input-cfg", lightfield, "--source-receipt", path]
+    arguments += ["--receipt", path.with_name("0-2.jsonl")]
     said = refused("reproject.py", *arguments, "--no-reproject", "--exr", "-o", tmp_path / "made")
-    assert said == f"{path}: is missing, or is no receipt"
+    assert said == f"{path}: is missing or damaged; the next run makes it again"
 
 
 def test_the_current_folder_has_its_own_name(tmp_path, monkeypatch):

@@ -8,7 +8,8 @@ import pytest
 from faults import FAULTS
 
 from lightfield.core import receipts
-from lightfield.core.files import Stamp, size_and_time
+from lightfield.core.files import Stamp, identity_and_sha256, size_and_time
+from lightfield.workflow import check
 from lightfield.workflow.check import JobCheck
 
 
@@ -65,12 +66,13 @@ def test_a_touched_file_is_read_once_for_all_jobs_and_plans(folder, monkeypatch)
     paths = [make(str(number), "[]", ["scene.blend"]) for number in range(20)]
     os.utime("scene.blend")
     reads = []
-    stamp_of = Stamp.of
-    monkeypatch.setattr(Stamp, "of", lambda path: reads.append(path) or stamp_of(path))
+    monkeypatch.setattr(
+        check, "identity_and_sha256", lambda path: reads.append(path) or identity_and_sha256(path)
+    )
     for _ in range(2):
-        check = JobCheck(Path("work"), lambda _: {}, {"stage": 1})
-        assert all(check.verdict(path, {}).is_fine for path in paths)
-        check.sums.save()
+        jobs = JobCheck(Path("work"), lambda _: {}, {"stage": 1})
+        assert all(jobs.verdict(path, {}).is_fine for path in paths)
+        jobs.sums.save()
     assert reads == ["scene.blend"]
 
 

@@ -55,7 +55,8 @@ def dataset(tmp_path, monkeypatch, capsys):
     def seal(receipt):
         """Make the receipt of a shard a finished one."""
         part = receipts / f"{receipt}.part"
-        header = {"stage": "render_shard", "version": None, "settings": {}, "inputs": {}}
+        header = {"job": f"scene/rig/{receipt}", "stage": "render_shard", "version": None}
+        header |= {"settings": {}, "inputs": {}}
         files.write_text(part.with_suffix(".jsonl"), json.dumps(header) + "\n" + part.read_text())
         part.unlink()
 

@@ -79,13 +79,17 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     if source.dataset:
         return _digest(published.fingerprint(source.dataset))
     assert source.builder
-    if isinstance(source.parameters, Parameters):
-        parameters = source.parameters.model_dump(exclude_none=True)
+    return builder_fingerprint(source.builder, source.parameters)
+
+
+def builder_fingerprint(name: str, parameters: Parameters | Mapping[str, Any] | None) -> str:
+    """Return the identity of a scene of the builder ``name``: see `scene_fingerprint`."""
+    if isinstance(parameters, Parameters):
+        parameters = parameters.model_dump(exclude_none=True)
         files = []
-        folders = ["library", source.builder]
+        folders = ["library", name]
     else:
-        parameters = source.parameters
-        builder = Path(source.builder)
+        builder = Path(name)
         own_files = own_builder.files(builder)
         files = [[file.relative_to(builder.parent).as_posix(), sha256(file)] for file in own_files]
         folders = own_builder.imported_builders(own_files)

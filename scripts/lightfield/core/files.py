@@ -37,8 +37,26 @@ def special_kind(path: Path | str) -> str | None:
     return _SPECIAL_KINDS.get(stat.S_IFMT(mode))
 
 
+# Called with the path of each file before it is read: the last of them. It may raise a `UserError`,
+# and returns the file's SHA-256 if it knows it.
+read_watchers: list[Callable[[Path | str], str | None]] = []
+
+
 def open_file(path: Path | str) -> BufferedReader:
-    """Open a file to read it. Raises OSError if it is missing, or if it is no file."""
+    """Open a file to read it. Raises OSError if it is missing, or if it is no file.
+
+    Every file goes through here before a program or a library reads it, so that a job reads no
+    damaged file: see `lightfield.core.read_files`.
+    """
+    _watch(path)
+    return _opened(path)
+
+
+def _watch(path: Path | str) -> str | None:
+    return read_watchers[-1](path) if read_watchers else None
+
+
+def _opened(path: Path | str) -> BufferedReader:
     if kind := special_kind(path):
         raise OSError(f"it is {kind}, not a file")
     return Path(path).open("rb")
@@ -50,8 +68,44 @@ def read_bytes(path: Path | str) -> bytes:
         return file.read()
 
 
+class Identity(NamedTuple):
+    """What differs after a file was written. Times are in nanoseconds.
+
+    Programs can set the time of modification, but not the time of change.
+    """
+
+    bytes: int
+    modified_ns: int
+    changed_ns: int
+    inode: int
+    links: int
+
+    @classmethod
+    def of(cls, path: str | Path) -> Self | None:
+        """Return the identity of a file. None if there is no file."""
+        try:
+            # A `Path` is slow for many files.
+            status = os.stat(path)  # noqa: PTH116
+        except (OSError, ValueError):
+            # No file has a name with such letters.
+            return None
+        return cls._of(status) if stat.S_ISREG(status.st_mode) else None
+
+    @classmethod
+    def _of(cls, status: os.stat_result) -> Self:
+        times = (status.st_mtime_ns, status.st_ctime_ns)
+        return cls(status.st_size, *times, status.st_ino, status.st_nlink)
+
+
+def identity_and_sha256(path: str | Path) -> tuple[Identity, str]:
+    """Return the identity of a file from before it was read, and its SHA-256. Raises OSError."""
+    with _opened(path) as file:
+        identity = Identity._of(os.fstat(file.fileno()))
+        return identity, hashlib.file_digest(file, "sha256").hexdigest()
+
+
 class Stamp(NamedTuple):
-    """A file's SHA-256, size, and time of change in nanoseconds."""
+    """A file's SHA-256, size, and time of modification in nanoseconds."""
 
     sha256: str
     bytes: int
@@ -60,10 +114,8 @@ class Stamp(NamedTuple):
     @classmethod
     def of(cls, path: str | Path) -> Self:
         """Return the stamp of a file. Reads it. Raises OSError if it is missing, or no file."""
-        with open_file(path) as file:
-            status = os.fstat(file.fileno())
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        return cls(digest, status.st_size, status.st_mtime_ns)
+        identity, digest = identity_and_sha256(path)
+        return cls(digest, identity.bytes, identity.modified_ns)
 
     def matches(self, path: str | Path) -> bool:
         """Return whether a file has this size and time."""
@@ -135,8 +187,9 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
 def link_or_copy(file: Path, target: Path) -> None:
     """Make ``target`` a hard link to ``file``, or a copy if the file system has no hard links.
 
-    A copy has the file's time of change, too.
+    A copy has the file's time of modification, too.
     """
+    check_readable(file)
     with atomic_path(target) as temporary:
         try:
             # Resolve symbolic links, as git-annex has. Linux would link the symbolic link itself.
@@ -149,19 +202,13 @@ def link_or_copy(file: Path, target: Path) -> None:
 
 def sha256(path: Path | str) -> str:
     """Return the SHA-256 of a file as 64 hexadecimal digits."""
-    with open_file(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return _watch(path) or identity_and_sha256(path)[1]
 
 
 def size_and_time(path: Path | str) -> tuple[int, int] | None:
-    """Return a file's bytes and its time of change in nanoseconds. None if there is no file."""
-    try:
-        # A `Path` is slow for many files.
-        status = os.stat(path)  # noqa: PTH116
-    except (OSError, ValueError):
-        # No file has a name with such letters.
-        return None
-    return (status.st_size, status.st_mtime_ns) if stat.S_ISREG(status.st_mode) else None
+    """Return a file's bytes and its time of modification in ns. None if there is no file."""
+    identity = Identity.of(path)
+    return (identity.bytes, identity.modified_ns) if identity else None
 
 
 def listed(path: Path, home: Path) -> dict[str, Any]:

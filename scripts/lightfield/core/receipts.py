@@ -2,8 +2,10 @@
 
 A receipt is a file with one JSON object a line. The job writes it last, in one step:
 
-- the first line has ``stage``, ``version`` and ``settings`` of the job, and ``inputs``: the SHA-256
-  of each file that it read, by path. An input that is itself a receipt has `Receipt.sum`;
+- the first line has ``job``, the path of the receipt in `FOLDER` without its suffix, so that a
+  copy in another place is no receipt. It also has ``stage``, ``version`` and ``settings`` of the
+  job, and ``inputs``: the SHA-256 of each file that it read, by path. An input that is itself a
+  receipt has `Receipt.sum`, and stands for the files that its job made;
 - a line for each file that it made: ``file``, ``sha256``, ``bytes``, ``modified_ns``, and for views
   ``key``, the hash of all that decides their bytes;
 - lines of history: what the processes of the job did, and how fast (`lightfield.workflow.history`).
@@ -39,10 +41,12 @@ from lightfield.core.files import (
     read_bytes,
     read_json_lines,
     read_problem,
+    read_watchers,
     set_aside,
     unreadable,
     writing,
 )
+from lightfield.core.read_files import ReadFiles, changed_since_plan
 
 FOLDER = "receipts"
 """The folder of all receipts, in the workflow's folder of intermediate files."""
@@ -92,11 +96,13 @@ class Receipt:
 
 
 def read(path: str | Path) -> Receipt | None:
-    """Return a receipt. None if there is none, or if it is damaged."""
+    """Return a receipt. None if there is none, if it is damaged, or if it is of another job."""
     try:
         text = read_bytes(path)
         # One text of JSON is read faster than many.
         header, *lines = json.loads(b"[%s]" % b",".join(text.splitlines()))
+        if header["job"] != job_of(path):
+            return None
         outputs, history = _sorted(lines)
         return Receipt(
             _checked(header["stage"], str),
@@ -171,6 +177,12 @@ def _checked(value: Any, kind: type) -> Any:
 def _line(path: str, output: Output) -> dict[str, Any]:
     line: dict[str, Any] = {"file": path, **output.stamp._asdict()}
     return line if output.key is None else line | {"key": output.key}
+
+
+def job_of(path: str | Path) -> str:
+    """Return the name of a receipt's job: its path in `FOLDER`, without its suffix."""
+    parts = Path(path).with_suffix("").parts
+    return "/".join(parts[parts.index(FOLDER) + 1 :])
 
 
 def is_receipt(path: str | Path) -> bool:
@@ -255,28 +267,6 @@ def made_in(folder: Path, inputs: Iterable[str | Path], work: Path | None) -> di
     }
 
 
-def damaged(path: str | Path) -> UserError:
-    """Return the error about a file that is not as its job made it. Gives the file a new time.
-
-    So the next plan compares its bytes, also if its size and its time were those in the receipt.
-    """
-    with suppress(OSError):
-        Path(path).touch()
-    return UserError(f"{path}: is not as its job made it; the next run makes it again")
-
-
-def check_files(paths: Iterable[str | Path]) -> None:
-    """Raise `UserError` for a file that is not as its job made it. Reads all files.
-
-    ``paths`` may be receipts of shards, whose files are meant.
-    """
-    for path in paths:
-        receipt = read(path) if is_receipt(path) else None
-        for name, output in receipt.outputs.items() if receipt else ():
-            if not output.has_bytes(name):
-                raise damaged(name)
-
-
 class OpenReceipt:
     """The receipt of a job that works now.
 
@@ -299,38 +289,51 @@ class OpenReceipt:
         self._part = path.with_suffix(PART_SUFFIX)
         self._threads = threading.Lock()
         self.inputs: dict[str, str | None] = {}
-        self._input_stamps: dict[str, Stamp | None] = {}
         self.outputs: dict[str, Output] = {}
+        self._read = ReadFiles()
+        self._shared: set[str] = set()
+        # The SHA-256 of files that other jobs made, and of files that the makers of inputs read.
+        self._made_files: dict[str, str | None] = {}
+        self._read_before: dict[str, str | None] = {}
         self._lock = _locked(self._part)
         self._earlier = earlier = read(path)
         self._known = {**(earlier.outputs if earlier else {}), **read_part(path)[0]}
 
     def add_input(self, path: str | Path) -> None:
-        """Note a file that the job reads, before it reads it. Its first content counts.
+        """Note a file that the job reads, before it reads it.
 
-        Raises `UserError` for a file of another job that is not as that job made it.
+        Raises `UserError` for a file of another job that is not as that job made it, and for a
+        user's file that has changed since a job read it that made another input.
         """
         name = name_of(path)
         if name in self.inputs:
             return
         if is_receipt(name):
-            if (digest := input_sum(name)) is None:
+            if (receipt := read(name)) is None:
                 raise UserError(f"{name}: is missing or damaged; the next run makes it again")
-            self.inputs[name] = digest
+            self.inputs[name] = receipt.sum
+            for made, output in receipt.outputs.items():
+                self._made_files[made] = output.stamp.sha256
             return
+        if found := find_output(name, self.work):
+            maker = read(found[0])
+            self._read_before |= maker.inputs if maker else {}
+        self.inputs[name] = self._sum_of_input(name)
+        for each in self.inputs.keys() & self._read_before.keys():
+            if not is_receipt(each) and self.inputs[each] != self._read_before[each]:
+                raise changed_since_plan(each)
+
+    def _sum_of_input(self, name: str) -> str | None:
+        """Return the SHA-256 of an input. None if it is missing, because scenes may lack files.
+
+        The job runs again when it appears.
+        """
         if not os.path.isfile(name):  # noqa: PTH113, a `Path` raises for names that are too long
-            # A file that a scene may lack. The job runs again when it appears.
-            self.inputs[name] = self._input_stamps[name] = None
-            return
+            return None
         try:
-            stamp = Stamp.of(name)
+            return self._read.read(name, self._made(name))
         except OSError as error:
             raise UserError(f"{name}: cannot be read: {read_problem(error)}") from None
-        found = find_output(name, self.work)
-        if found and found[1].stamp.sha256 != stamp.sha256:
-            raise damaged(name)
-        self.inputs[name] = stamp.sha256
-        self._input_stamps[name] = stamp
 
     def add_shared_input(self, path: str | Path) -> None:
         """Note a file that the job reads, and that another run may replace meanwhile.
@@ -338,7 +341,34 @@ class OpenReceipt:
         The job need not fail then, because that run does this job again.
         """
         name = name_of(path)
+        self._shared.add(name)
         self.inputs[name] = input_sum(name)
+
+    def watch(self, path: str | Path) -> str | None:
+        """Compare a file that is about to be read with its maker's receipt. Return its SHA-256.
+
+        Returns None for a file that is not compared: without a maker, or of this job itself.
+        Raises `UserError` for a damaged one.
+        """
+        name = name_of(path)
+        digest = self._read.read_made(name, self._made(name))
+        if name in self.outputs:
+            # The job itself may write its file again, or remove it.
+            self._read.forget(name)
+        return digest
+
+    def _made(self, name: str) -> str | None:
+        """Return the SHA-256 with which a job made a file. None for a file without a maker."""
+        if name in self._shared or is_receipt(name):
+            return None
+        if output := self.outputs.get(name):
+            return output.stamp.sha256
+        if name not in self._made_files:
+            found = find_output(name, self.work)
+            # A job may make its own files again.
+            is_of_other = found and found[0] != self.path
+            self._made_files[name] = found[1].stamp.sha256 if found and is_of_other else None
+        return self._made_files[name]
 
     def still_holds(self) -> bool:
         """Return whether the job was finished before, with equal settings and inputs.
@@ -438,10 +468,8 @@ class OpenReceipt:
                 self._set_aside(file)
 
     def check_inputs(self) -> None:
-        """Raise `UserError` if an input has changed since it was noted."""
-        for path, stamp in self._input_stamps.items():
-            if stamp and not stamp.matches(path) and input_sum(path) != stamp.sha256:
-                raise UserError(f"{path}: has changed while this job read it; start the run again")
+        """Raise `UserError` if a file that was read has or had other bytes than it must have."""
+        self._read.check()
 
     def seal(self) -> None:
         """Write the receipt."""
@@ -452,7 +480,7 @@ class OpenReceipt:
         # A file that the job itself has removed again is no output.
         made = {path: output for path, output in self.outputs.items() if os.path.lexists(path)}
         outputs = [_line(path, output) for path, output in sorted(made.items())]
-        header = {**self._header, "inputs": self.inputs}
+        header = {"job": job_of(self.path), **self._header, "inputs": self.inputs}
         lines = [json.dumps(line) + "\n" for line in (header, *outputs, *history)]
         with atomic_path(self.path) as temporary:
             temporary.write_text("".join(lines), encoding="utf-8")
@@ -564,9 +592,11 @@ def opened(path: Path, header: Mapping[str, Any], made: Iterable[Path]) -> Itera
     receipt.set_damaged_aside()
     _open_receipts.append(receipt)
     file_watchers.append(receipt.note_written)
+    read_watchers.append(receipt.watch)
     try:
         yield receipt
     finally:
+        read_watchers.pop()
         file_watchers.pop()
         _open_receipts.pop()
         receipt.close()

@@ -24,7 +24,6 @@ from typing import Any, ClassVar, Generic, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
 from lightfield.core import bundles, receipts
-from lightfield.core.errors import UserError
 from lightfield.core.settings import ReaderSettings, Settings
 
 
@@ -102,11 +101,9 @@ class Stage(BaseModel, Generic[StageSettings]):
             else:
                 try:
                     result = self._do_work()
-                except UserError:
-                    # Damaged views may be the cause. The next run makes them again.
-                    receipts.check_files(self.inputs())
-                    raise
-                receipt.check_inputs()
+                finally:
+                    # A damaged file may be the cause of another error.
+                    receipt.check_inputs()
                 receipt.seal()
         bundles.pack(self.receipt, self.made(), self.shared())
         return result

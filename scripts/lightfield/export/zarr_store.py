@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.core.files import write_bytes, write_json
+from lightfield.core.files import read_bytes, write_bytes, write_json
 
 METADATA = ".zmetadata.cbor.xz"
 
@@ -54,7 +54,7 @@ class ZarrStore:
     def encoded(self, path: str, file: Path, attributes: dict[str, Any]) -> None:
         """Move a ``file``, such as a PNG, into the store as a single value of bytes."""
         target = self.folder / path / "0"
-        write_bytes(target, file.read_bytes())
+        write_bytes(target, read_bytes(file))
         file.unlink()
         self._describe(path, f"|S{target.stat().st_size}", (), None, attributes)
 
@@ -104,7 +104,7 @@ def _hash(folder: Path, digest: Any) -> None:
         if path.is_dir():
             _hash(path, digest)
         else:
-            digest.update(path.read_bytes())
+            digest.update(read_bytes(path))
 
 
 def _cbor(value: Any) -> bytes:

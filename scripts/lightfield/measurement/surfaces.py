@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import keep_apart, reading, write_json
+from lightfield.core.files import check_readable, keep_apart, reading, write_json
 from lightfield.stages.measurement import EvaluateSurface, SurfaceSettings
 
 Points = NDArray[np.float64]
@@ -61,6 +61,7 @@ def read_surface(path: Path) -> MeasuredSurface:
             f"{path}: is not a surface file; its name must end in {', '.join(SUFFIXES)}"
         )
     with reading(path, "surface"):
+        check_readable(path)
         content = trimesh.load_scene(path, process=False)
         geometries = content.dump()
     triangles = [np.asarray(g.triangles) for g in geometries if isinstance(g, trimesh.Trimesh)]

@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.rendering import animation
@@ -64,12 +65,17 @@ def open_scene(
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
     ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
-    choose the scene and its view layers.
+    choose the scene and its view layers. ``inventory`` lists the files that the .blend reads, which
+    become inputs of the job at work.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
     """
     check_readable(path)
+    if inventory:
+        # A texture that changes during a run must not end up in some views only.
+        files = inventory["external_files"]
+        receipts.note_inputs(path.parent / file["path"] for file in files)
     this_version = bpy.app.version_string
     try:
         with reading_quietly(path):

@@ -3,10 +3,11 @@
 from importlib.metadata import version
 
 from lightfield.configuration import blend_lock
-from lightfield.configuration.scene_yaml import load_scene, mistake
+from lightfield.configuration.scene_yaml import load_scene, mistake, scene_path
 from lightfield.core import download, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
+from lightfield.core.read_files import changed_since_plan
 from lightfield.stages.scene import CheckBlend, FetchBlend
 
 
@@ -24,6 +25,9 @@ def check(job: CheckBlend) -> None:
     source = load_scene(job.scene).scene
     if source.blend is None:
         raise UserError(f"--scene {job.scene}: does not use a .blend")
+    # By hand, there was no plan.
+    if job.receipt and source.sha256 != job.settings.sha256:
+        raise changed_since_plan(scene_path(job.scene))
     status = job.blend.stat()
     digest = sha256(job.blend)
     if lock := blend_lock.expected_blend(job.scene, job.blend, digest):

@@ -13,6 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.names import FILE
 from lightfield.core.paths import case_hint
+from lightfield.core.read_files import changed_since_plan
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera
@@ -29,6 +30,7 @@ from lightfield.rendering import (
     simulations,
 )
 from lightfield.rendering.inventory import FEATURES, inventory
+from lightfield.stages import job_settings
 from lightfield.stages.scene import Inventory
 from lightfield.workflow.loading import rendered_frames, scene_datasets
 
@@ -40,6 +42,9 @@ def make(job: Inventory) -> None:
     """
     written = scene_yaml.load_scene(job.scene) if job.scene else None
     datasets = scene_datasets(job.scene) if job.scene else []
+    # By hand, there was no plan.
+    if job.receipt and job_settings.inventory(datasets[0]).as_json() != job.settings.as_json():
+        raise changed_since_plan(scene_yaml.scene_path(str(job.scene)))
     write_of_datasets(job.blend, written, datasets, job.output)
 
 

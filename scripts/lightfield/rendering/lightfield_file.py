@@ -8,6 +8,7 @@ from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE
+from lightfield.core.read_files import changed_since_plan, check_since_plan
 from lightfield.formats import blend, light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField
@@ -22,10 +23,16 @@ from lightfield.stages.rig import MakeLightfield
 def write(job: MakeLightfield) -> None:
     """Write the light field of a job's settings. Raises `UserError` if it lacks a file."""
     settings = job.settings
+    if settings.poses_sha256 and isinstance(settings.rig, rigs.Poses):
+        check_since_plan(settings.rig.file, settings.poses_sha256)
     if job.calibration:
         render = calibrated(settings.render, job.calibration)
         settings = settings.model_copy(update={"render": render})
-    from_settings(settings, job.inventory, job.model, job.places).write(job.output)
+    lightfield = from_settings(settings, job.inventory, job.model, job.places)
+    if settings.fingerprint not in (None, lightfield.scene["fingerprint"]):
+        source = settings.source
+        raise changed_since_plan(source.dataset or f"the builder {source.builder}")
+    lightfield.write(job.output)
 
 
 def from_settings(

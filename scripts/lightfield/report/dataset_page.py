@@ -11,6 +11,7 @@ from lightfield.configuration.exports import Exports
 from lightfield.core import units
 from lightfield.core.files import absolute_path
 from lightfield.core.names import MESH, SPLITS
+from lightfield.core.read_files import check_since_plan
 from lightfield.export import transforms
 from lightfield.formats import blend
 from lightfield.formats.export_lists import FOLDER, MANIFEST
@@ -114,7 +115,11 @@ def _sensor_folder(folder: Path, lightfield: LightField) -> Path | None:
 
 def _measurements(job: ReportHtml, lightfield: LightField) -> dict[str, tables.Measurement]:
     """Return the measurements that exist, by their names in the template."""
-    files = [Path(measurement.file) for measurement in job.settings.measurements]
+    files = []
+    for measurement in job.settings.measurements:
+        if measurement.sha256:
+            check_since_plan(measurement.file, measurement.sha256)
+        files.append(Path(measurement.file))
     dataset = absolute_path(job.dataset)
     name = f"{dataset.parent.name}/{dataset.name}"
     candidates = {

@@ -15,7 +15,7 @@ from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_keys, sha256, write_json
+from lightfield.core.files import atomic_path, open_file, read_keys, sha256, write_json
 from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
@@ -239,5 +239,5 @@ def add_entry(archive: tarfile.TarFile, name: str, content: Path | bytes) -> Non
         archive.addfile(entry, BytesIO(content))
         return
     entry.size = content.stat().st_size
-    with content.open("rb") as file:
+    with open_file(content) as file:
         archive.addfile(entry, file)

@@ -15,7 +15,7 @@ import jinja2
 from markupsafe import Markup
 
 from lightfield.core import units
-from lightfield.core.files import write_text
+from lightfield.core.files import read_bytes, write_text
 from lightfield.core.units import number
 from lightfield.imaging import images, pictures
 from lightfield.report.packing import data_uri, webp
@@ -118,8 +118,8 @@ def plot(stem: Path) -> str | None:
     svg = stem.with_name(f"{stem.name}.svg")
     png = stem.with_name(f"{stem.name}.png")
     if svg.is_file() and (svg.stat().st_size <= _LARGEST_SVG or not png.is_file()):
-        return data_uri(svg.read_bytes(), "image/svg+xml")
-    return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
+        return data_uri(read_bytes(svg), "image/svg+xml")
+    return data_uri(read_bytes(png), "image/png") if png.is_file() else None
 
 
 def cell(value: Any) -> str:

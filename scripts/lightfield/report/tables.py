@@ -5,12 +5,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_problem
+from lightfield.core.files import read_json, read_text
 from lightfield.measurement import summaries
 from lightfield.report import page
 
@@ -308,14 +309,12 @@ def _named(files: Sequence[Path], ending: str) -> Path | None:
 def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
     """Return the rows of a CSV. Raises `UserError` if it has no row, or lacks a column."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with StringIO(read_text(path), newline="") as file:
             rows = [
                 {str(key): value or "" for key, value in row.items() if key}
                 for row in csv.DictReader(file)
             ]
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
+    except csv.Error as error:
         raise UserError(f"{path}: cannot be read as CSV: {error}") from None
     if not rows:
         raise UserError(f"{path}: has no row")

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from lightfield.configuration.reprojections import LIGHT_GROUPS
-from lightfield.core import receipts
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.formats import light_groups, lightfield, passes
@@ -78,14 +77,6 @@ class ReprojectionJob:
         self.lights = self._chosen_lights()
         # For each 16-bit depth map, the number of depths that no step of it can hold.
         self.lost_depths: list[int] = []
-        # The SHA-256 of each image, by its path.
-        self.source_sums: dict[str, str] = {}
-        if stage.source_receipt:
-            receipt = receipts.read(stage.source_receipt)
-            if receipt is None:
-                raise UserError(f"{stage.source_receipt}: is missing, or is no receipt")
-            for path, output in receipt.outputs.items():
-                self.source_sums[path] = output.stamp.sha256
 
     def _chosen_look(self) -> Look | None:
         """Return the look of the images, if they get one.

@@ -18,7 +18,7 @@ import numpy as np
 
 from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, atomic_path, read_problem
+from lightfield.core.files import DAMAGE, atomic_path, check_readable, read_problem
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import FILTERS
@@ -304,6 +304,7 @@ def save(path: Path | str, lens_map: LensMap) -> None:
 def load(path: Path | str) -> LensMap:
     """Map a file of `save` into memory, read-only. Raises `UserError` for any other file."""
     try:
+        check_readable(path)
         record = np.load(path, mmap_mode="r")
         description = json.loads(bytes(record["description"][0]))
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}

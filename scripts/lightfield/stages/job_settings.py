@@ -110,7 +110,7 @@ def _check_blend(dataset: Dataset) -> CheckBlendSettings:
     )
 
 
-def _inventory(dataset: Dataset) -> InventorySettings:
+def inventory(dataset: Dataset) -> InventorySettings:
     """Return what an inventory depends on in the scene YAML."""
     written = load_scene(dataset.scene_name)
     datasets = scene_datasets(dataset.scene_name)
@@ -138,7 +138,7 @@ _OF_SCENE: Mapping[str, Callable[[Dataset], Settings | Content]] = {
     "build_scene": build_scene,
     "import_model": _import_model,
     "check_blend": _check_blend,
-    "inventory": _inventory,
+    "inventory": inventory,
 }
 
 

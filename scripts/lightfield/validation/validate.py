@@ -21,8 +21,9 @@ from typing import Any
 import OpenImageIO as oiio
 
 from lightfield.core.errors import LESS_MEMORY, UserError
-from lightfield.core.files import absolute_path, sha256
+from lightfield.core.files import absolute_path, read_watchers, sha256
 from lightfield.core.progress import Progress
+from lightfield.core.read_files import ReadFiles
 from lightfield.core.receipts import Output
 from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
@@ -69,7 +70,13 @@ def validate(
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
     images = views + passes + extras
-    facts, image_checks = _check_images(dataset, sets, images, presence_checks, volumes, processes)
+    workers = _workers(
+        Examiner(dataset, sets), min(processes, _worthwhile_processes(dataset, images)), made or {}
+    )
+    with workers as parallel_map:
+        facts, image_checks = _check_images(
+            dataset, sets, images, presence_checks, volumes, parallel_map
+        )
     checks += image_checks
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
@@ -137,22 +144,18 @@ def _check_images(
     images: Sequence[File],
     presence_checks: Sequence[Check],
     volumes: Sequence[str],
-    processes: int,
+    parallel_map: _ParallelMap,
 ) -> tuple[dict[File, Facts], list[Check]]:
     """Read all images. Return their facts, and the checks of each set.
 
     A set's check in ``presence_checks`` comes before the set's other checks.
     """
     checks = []
-    processes = min(processes, _worthwhile_processes(dataset, images))
-    with _workers(Examiner(dataset, sets), processes) as parallel_map:
-        facts = _read_images(dataset, images, parallel_map)
-        for number, image_set in enumerate(sets):
-            views = {
-                file: fact for file, fact in facts.items() if file.is_view and file.set == number
-            }
-            checks.append(presence_checks[number])
-            checks += _check_set(image_set, views, volumes, parallel_map)
+    facts = _read_images(dataset, images, parallel_map)
+    for number, image_set in enumerate(sets):
+        views = {file: fact for file, fact in facts.items() if file.is_view and file.set == number}
+        checks.append(presence_checks[number])
+        checks += _check_set(image_set, views, volumes, parallel_map)
     return facts, checks
 
 
@@ -229,10 +232,13 @@ def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:
 
 
 @contextmanager
-def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
+def _workers(
+    examiner: Examiner, processes: int, made: Mapping[str, Output]
+) -> Iterator[_ParallelMap]:
     """Yield a `map` over worker processes that hold the examiner.
 
-    With one process, it is this process.
+    With one process, it is this process. Others compare the files that they read with ``made``, as
+    the receipt of the job does in this process.
     """
     if processes == 1:
         _start_worker(examiner)
@@ -241,7 +247,10 @@ def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
     try:
         # Spawn workers: the threads of OpenImageIO do not survive a fork.
         with ProcessPoolExecutor(
-            processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
+            processes,
+            get_context("spawn"),
+            initializer=_start_worker,
+            initargs=(examiner, {path: output.stamp.sha256 for path, output in made.items()}),
         ) as pool:
             yield pool.map
     except BrokenProcessPool:
@@ -252,18 +261,27 @@ def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
 
 
 _examiner: Examiner
+# Only a worker process has files here.
+_read_files = ReadFiles()
 
 
-def _start_worker(examiner: Examiner) -> None:
+def _start_worker(examiner: Examiner, made: Mapping[str, str] | None = None) -> None:
     global _examiner
     _examiner = examiner
     oiio.attribute("threads", 1)
     oiio.attribute("exr_threads", 1)
+    if made:
+        sums = {str(examiner.dataset / path): digest for path, digest in made.items()}
+        read_watchers.append(lambda path: _read_files.read_made(str(path), sums.get(str(path))))
 
 
 def _examine(file: File) -> tuple[File, Facts]:
-    return file, _examiner.examine(file)
+    facts = _examiner.examine(file)
+    _read_files.check()
+    return file, facts
 
 
 def _answer(question: geometry.Question) -> list[Answer]:
-    return _examiner.answer(*question)
+    answers = _examiner.answer(*question)
+    _read_files.check()
+    return answers

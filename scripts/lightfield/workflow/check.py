@@ -4,8 +4,9 @@ A job is fine if its receipt has the wanted settings, and the sums that its inpu
 now. Otherwise its files are *missing*, *damaged* (their bytes are not what the receipt says) or
 *outdated* (settings or inputs are not what the receipt says). The check changes no result.
 
-A file is read only if its size or time differs from its receipt. The sums of files that were read
-are kept in work/sums.json, so that each is read once.
+A file that a job made is read only if its size or time differs from its receipt. A file that a job
+read, such as a user's texture, is read once: its sum is kept in work/sums.json with all that
+differs after it was written, even if its size and time are the old ones.
 """
 
 import json
@@ -18,7 +19,14 @@ from typing import Any, NamedTuple
 
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, Stamp, read_bytes, size_and_time, write_json
+from lightfield.core.files import (
+    DAMAGE,
+    Identity,
+    identity_and_sha256,
+    read_bytes,
+    size_and_time,
+    write_json,
+)
 from lightfield.core.receipts import Receipt
 
 NAME = "sums.json"
@@ -43,36 +51,38 @@ class Verdict:
 
 
 class Sums:
-    """The sums of files that were read, by their paths, sizes and times."""
+    """The sums of files that were read, each with the file's identity then, by their paths."""
 
     def __init__(self, path: Path) -> None:
         # Snakemake leaves the folder of the run before its process ends.
         self._path = path.absolute()
-        self._stamps: dict[str, list[Any]] = {}
+        self._known: dict[str, list[Any]] = {}
         self._has_new = False
         try:
-            self._stamps = dict(json.loads(read_bytes(path)))
+            known = json.loads(read_bytes(path))
+            self._known = {name: [*each] for name, each in known.items()}
         except (OSError, *DAMAGE):
             pass
 
     def of(self, path: str) -> str | None:
         """Return the SHA-256 of a file. None if there is no file, or if it cannot be read."""
-        found = size_and_time(path)
+        found = Identity.of(path)
         if found is None:
             return None
-        if tuple(self._stamps.get(path, ())[1:]) != found:
+        if self._known.get(path, [])[1:] != [*found]:
             try:
-                self._stamps[path] = [*Stamp.of(path)]
+                identity, digest = identity_and_sha256(path)
             except OSError:
                 return None
+            self._known[path] = [digest, *identity]
             self._has_new = True
-        return str(self._stamps[path][0])
+        return str(self._known[path][0])
 
     def save(self) -> None:
         """Write the sums, if there are new ones. On a full disk, the next plan reads again."""
         if self._has_new:
             with suppress(UserError):
-                write_json(self._path, self._stamps)
+                write_json(self._path, self._known)
             self._has_new = False
 
 

@@ -10,6 +10,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
-from lightfield.core import units
+from lightfield.core import receipts, units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_bytes, read_json, read_problem, read_text
 from lightfield.core.settings import FARTHEST, pattern
@@ -119,6 +120,7 @@ class Poses(Rig):
 
 def _read_poses(path: Path) -> PosesFile:
     """Read and check a file of poses. A file that has not changed is read only once."""
+    receipts.note_inputs([path])
     try:
         status = path.stat()
     except OSError as error:
@@ -199,8 +201,7 @@ def _read_csv(path: Path) -> Listing:
     """Read a CSV with angles or quaternions."""
     frames = []
     try:
-        # Spreadsheets begin a file with a byte order mark.
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with StringIO(read_text(path), newline="") as file:
             reader = csv.reader(file)
             keys = next(reader, [])
             if keys not in (CSV_HEADER, _QUATERNION_HEADER):
@@ -211,9 +212,7 @@ def _read_csv(path: Path) -> Listing:
             for row in reader:
                 if row:
                     frames.append(_csv_frame(path, f"row {reader.line_num}", keys, row))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
-    except (UnicodeDecodeError, csv.Error) as error:
+    except csv.Error as error:
         raise UserError(f"{path}: is not CSV: {error}") from None
     return Listing(Poses.shape, "quaternion", frames)
 
