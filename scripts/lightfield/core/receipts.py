@@ -29,7 +29,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.files import (
     DAMAGE,
     Stamp,
@@ -37,8 +37,8 @@ from lightfield.core.files import (
     atomic_path,
     file_watchers,
     read_bytes,
+    read_error,
     read_json_lines,
-    read_problem,
     set_aside,
     unreadable,
     writing,
@@ -262,7 +262,7 @@ def damaged(path: str | Path) -> UserError:
     """
     with suppress(OSError):
         Path(path).touch()
-    return UserError(f"{path}: is not as its job made it; the next run makes it again")
+    return OutsideError(f"{path}: is not as its job made it; the next run makes it again")
 
 
 def check_files(paths: Iterable[str | Path]) -> None:
@@ -315,7 +315,7 @@ class OpenReceipt:
             return
         if is_receipt(name):
             if (digest := input_sum(name)) is None:
-                raise UserError(f"{name}: is missing or damaged; the next run makes it again")
+                raise OutsideError(f"{name}: is missing or damaged; the next run makes it again")
             self.inputs[name] = digest
             return
         if not os.path.isfile(name):  # noqa: PTH113, a `Path` raises for names that are too long
@@ -325,7 +325,7 @@ class OpenReceipt:
         try:
             stamp = Stamp.of(name)
         except OSError as error:
-            raise UserError(f"{name}: cannot be read: {read_problem(error)}") from None
+            raise read_error(name, error) from None
         found = find_output(name, self.work)
         if found and found[1].stamp.sha256 != stamp.sha256:
             raise damaged(name)
@@ -437,11 +437,32 @@ class OpenReceipt:
             if unreadable(file):
                 self._set_aside(file)
 
+    def set_all_damaged_aside(self) -> list[str]:
+        """Move each damaged file aside that this job or an earlier try made. Reads all of them.
+
+        Returns the paths of these files, and of files that this job has made and that are gone.
+        """
+        damaged_files = []
+        for path, output in {**self._known, **self.outputs}.items():
+            must_be_there = path in self.outputs or os.path.lexists(path)
+            if must_be_there and self._own_name(path) and not output.has_bytes(path):
+                self._set_aside(Path(path))
+                damaged_files.append(path)
+        return damaged_files
+
+    def keep_intact_files(self) -> None:
+        """Note all files that an earlier try made, and that still have their bytes."""
+        for path, output in self._known.items():
+            if path not in self.outputs and self._own_name(path) and output.has_bytes(path):
+                self.outputs[path] = output
+
     def check_inputs(self) -> None:
         """Raise `UserError` if an input has changed since it was noted."""
         for path, stamp in self._input_stamps.items():
             if stamp and not stamp.matches(path) and input_sum(path) != stamp.sha256:
-                raise UserError(f"{path}: has changed while this job read it; start the run again")
+                raise OutsideError(
+                    f"{path}: has changed while this job read it; start the run again"
+                )
 
     def seal(self) -> None:
         """Write the receipt."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_problem
+from lightfield.core.files import read_error, read_json
 from lightfield.measurement import summaries
 from lightfield.report import page
 
@@ -314,7 +314,7 @@ def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
                 for row in csv.DictReader(file)
             ]
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read as CSV: {error}") from None
     if not rows:

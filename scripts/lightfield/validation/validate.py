@@ -20,7 +20,7 @@ from typing import Any
 
 import OpenImageIO as oiio
 
-from lightfield.core.errors import LESS_MEMORY, UserError
+from lightfield.core.errors import LESS_MEMORY, OutsideError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.core.progress import Progress
 from lightfield.core.receipts import Output
@@ -245,7 +245,7 @@ def _workers(examiner: Examiner, processes: int) -> Iterator[_ParallelMap]:
         ) as pool:
             yield pool.map
     except BrokenProcessPool:
-        raise UserError(
+        raise OutsideError(
             f"{examiner.dataset}: a process that reads it was killed; most likely memory ran out: "
             f"{LESS_MEMORY}"
         ) from None
