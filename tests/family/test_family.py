@@ -8,6 +8,7 @@ import re
 import resource
 import shutil
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
 
 import forks
@@ -420,6 +421,25 @@ def test_a_model_that_cannot_be_read_is_no_failure_of_a_member(face, tmp_path, t
         build.build("cpu", 1)
     assert not build.record.exists()
     assert not build.is_finished()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("error", "state"),
+    [("MemoryError()", None), ("OSError(28, 'No space left')", None), ("ValueError()", "failed")],
+)
+def test_only_an_error_of_an_own_builder_itself_is_a_failure(tmp_path, monkeypatch, error, state):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(f"def build(parameters):\n    raise {error}\n")
+    settings = BatchSettings(
+        family="mine",
+        scene={"scene": {"builder": "mine.py"}, "render": {"samples": 1}, "rigs": {"ring": RING}},
+        members=[Member(name="0001", seed=1)],
+    )
+    build = build_of(settings)
+    with nullcontext() if state else pytest.raises(UserError, match=r"^mine\.py:2: "):
+        build.build("cpu", 1)
+    assert build.record.exists() == bool(state)
 
 
 def flip_at_the_old_time(path):
