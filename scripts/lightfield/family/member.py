@@ -250,7 +250,7 @@ def _set_others_aside(folder: Path, kept: Collection[Path], removed: Path) -> No
     for entry in sorted(folder.iterdir()) if folder.is_dir() else ():
         path = Path(receipts.name_of(entry))
         if path not in kept:
-            set_aside(entry, removed)
+            print(f"{path}: was moved to {set_aside(entry, removed)}", flush=True)
         elif not entry.is_symlink():
             _set_others_aside(entry, kept, removed)
 
