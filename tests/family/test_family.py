@@ -3,14 +3,19 @@
 import contextlib
 import itertools
 import json
+import os
+import re
+import resource
 import shutil
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
 
 import forks
 import numpy as np
 import pytest
 from checkouts import checkout, snakemake
+from conftest import largest_file
 
 from lightfield.configuration.family import Family, Member, drawn, member_content, stand_in
 from lightfield.configuration.scene_yaml import check_member
@@ -18,13 +23,13 @@ from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.family import batch as family_batch
-from lightfield.family.batch import deadly_member, member_at_hand
+from lightfield.family.batch import deadly_members, member_at_hand
 from lightfield.family.member import MemberBuild
 from lightfield.imaging.images import write_exr, write_png
-from lightfield.stages.checks import Validate
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import RenderShard
+from lightfield.validation.verification import faults
 from lightfield.workflow.check import JobCheck
 
 ROOT = Path(__file__).parents[2]
@@ -194,13 +199,23 @@ def test_the_history_says_at_which_member_a_run_died():
 
 def test_a_member_has_failed_when_three_runs_died_at_it_and_not_before():
     again = [{"started": 5}, {"member": "0002", "began": 6}]
-    assert deadly_member(DIED) is None
-    assert deadly_member([*DIED, *again]) is None
-    assert deadly_member([*DIED, *again, *again]) == "0002"
+    assert deadly_members(DIED) == set()
+    assert deadly_members([*DIED, *again]) == set()
+    assert deadly_members([*DIED, *again, *again]) == {"0002"}
     elsewhere = [{"started": 5}, {"member": "0003", "began": 6}]
-    assert deadly_member([*DIED, *again, *elsewhere]) is None
+    assert deadly_members([*DIED, *again, *elsewhere]) == set()
     # Another worker of the same run went on.
-    assert deadly_member([*DIED, {"failed": "0002"}, *again, *again]) is None
+    assert deadly_members([*DIED, {"failed": "0002"}, *again, *again]) == set()
+
+
+def test_a_member_that_an_error_stopped_was_not_killed():
+    began = [{"started": 1}, {"member": "0002", "began": 2}]
+    stopped = [*began, {"stopped": "0002"}]
+    assert member_at_hand(stopped) is None
+    assert deadly_members(stopped * 3) == set()
+    killed = [*began, {"killed": "0002"}, {"member": "0003", "began": 3}]
+    assert deadly_members(killed * 2) == set()
+    assert deadly_members([*killed, *began, *killed]) == {"0002"}
 
 
 def count(folder, *states):
@@ -328,17 +343,16 @@ def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, mo
 
 
 @pytest.mark.slow
-def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_path, monkeypatch):
-    validate = Validate.run
-
-    def damage_and_validate(job):
-        (job.dataset / "exr/view_0000f.exr").write_bytes(b"damaged")
-        return validate(job)
-
-    monkeypatch.setattr(Validate, "run", damage_and_validate)
-    failure = build_of(face()).build("cpu", 1)["failure"]
+def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_path):
+    # A closed box around the cameras, which no light enters.
+    corners = [f"v {x} {y} {z}\n" for x in (0, 9) for y in (0, 9) for z in (0, 9)]
+    sides = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
+    box = "".join([*corners, *(f"f {side}\n" for side in sides)])
+    (tmp_path / "face.obj").write_text(box)
+    failure = build_of(face(size=0.1)).build("cpu", 1)["failure"]
     assert failure["stage"] == "validate"
-    assert "exr/view_0000f.exr" in failure["cause"]
+    assert "exr/view_0000f.exr: is black" in failure["cause"]
+    assert (tmp_path / "results/faces/face/ring/exr/view_0000f.exr").is_file()
     validation = tmp_path / "results/faces/face/ring/validation.json"
     assert failure["cause"].endswith(f"see {validation}")
     assert json.loads(validation.read_text())["valid"] is False
@@ -367,6 +381,113 @@ def rendered_views(build):
 
 def files_of(folder):
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+LARGE = {"camera": RING["camera"] | {"resolution": [400, 400]}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("largest", "rig"), [(8192, {}), (200_000, LARGE)], ids=["scene", "view"])
+def test_a_limit_of_file_sizes_is_no_failure_of_a_member(face, largest, rig):
+    build = build_of(face(**rig))
+    with largest_file(largest), pytest.raises(UserError, match=r"limit|free some space"):
+        build.build("cpu", 1)
+    assert not build.record.exists()
+    assert not build.is_finished()
+    assert build.build("cpu", 1)["state"] == "valid"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [None, "/proc/self/mem"], ids=["missing", "an I/O error"])
+def test_a_model_that_cannot_be_read_is_no_failure_of_a_member(face, tmp_path, target):
+    build = build_of(face())
+    model = tmp_path / "face.obj"
+    model.unlink()
+    if target:
+        model.symlink_to(target)
+    with pytest.raises(UserError, match=re.escape(str(model))):
+        build.build("cpu", 1)
+    assert not build.record.exists()
+    assert not build.is_finished()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("error", "state"),
+    [("MemoryError()", None), ("OSError(28, 'No space left')", None), ("ValueError()", "failed")],
+)
+def test_only_an_error_of_an_own_builder_itself_is_a_failure(tmp_path, monkeypatch, error, state):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(f"def build(parameters):\n    raise {error}\n")
+    settings = BatchSettings(
+        family="mine",
+        scene={"scene": {"builder": "mine.py"}, "render": {"samples": 1}, "rigs": {"ring": RING}},
+        members=[Member(name="0001", seed=1)],
+    )
+    build = build_of(settings)
+    with nullcontext() if state else pytest.raises(UserError, match=r"^mine\.py:2: "):
+        build.build("cpu", 1)
+    assert build.record.exists() == bool(state)
+
+
+def flip_at_the_old_time(path):
+    """Change a bit of a file, and keep its size and time."""
+    status = path.stat()
+    content = bytearray(path.read_bytes())
+    content[-40] ^= 1
+    path.write_bytes(content)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [flip_at_the_old_time, Path.unlink], ids=["flipped", "removed"])
+def test_a_view_that_is_damaged_while_its_member_is_built_is_made_again(
+    face, tmp_path, monkeypatch, damage
+):
+    build = build_of(face())
+    build.build("cpu", 1)
+    before = files_of(build.folder)
+    shutil.rmtree(tmp_path / "results")
+    shutil.rmtree(tmp_path / "work")
+    render = RenderShard.run
+    damages = iter([damage])
+
+    def render_and_damage(job):
+        render(job)
+        for damage in itertools.islice(damages, 1):
+            damage(job.output / "view_0001f.exr")
+
+    monkeypatch.setattr(RenderShard, "run", render_and_damage)
+    assert build.build("cpu", 1)["state"] == "valid"
+    assert files_of(build.folder) == before
+    assert rendered_views(build) == ["view_0000f", "view_0001f", "view_0001f"]
+
+
+@pytest.mark.slow
+def test_a_failed_member_keeps_what_is_whole_and_moves_the_rest(face, tmp_path, monkeypatch):
+    build = build_of(face())
+    build.build("cpu", 1)
+    before = files_of(build.folder)
+    dataset = build.folder / "ring"
+    (dataset / "notes.txt").write_text("mine")
+    flip_at_the_old_time(dataset / "lightfield.json")
+
+    def refuse(job):
+        raise UserError("nothing to see")
+
+    changed = build_of(face(split={"test": ["view_0001f"]}))
+    with monkeypatch.context() as patch:
+        patch.setattr(RenderShard, "run", refuse)
+        assert changed.build("cpu", 1)["failure"]["cause"] == "nothing to see"
+    view = dataset / "exr/view_0000f.exr"
+    assert view.read_bytes() == before[view]
+    assert not (dataset / "sha256sums.txt").exists()
+    removed = tmp_path / "work/removed" / dataset.relative_to("/")
+    assert (removed / "notes.txt").read_text() == "mine"
+    assert (removed / "lightfield.json").exists()
+    assert build.build("cpu", 1)["state"] == "valid"
+    assert files_of(build.folder) == before
+    assert rendered_views(build) == ["view_0000f", "view_0001f"]
 
 
 def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
@@ -475,6 +596,50 @@ def test_a_damaged_view_is_mended_when_its_batch_runs(run_batch, batch):
     run_batch(batch)
     assert begun() == ["face", "side", "side"]
     assert view.read_bytes() == content
+
+
+@pytest.mark.slow
+def test_a_flipped_view_costs_no_member_when_its_settings_change(run_batch, batch):
+    def with_points(count):
+        exports = {"colmap": {"sources": ["views"], "points": count}}
+        return batch.model_copy(update={"scene": batch.scene | {"exports": exports}})
+
+    run_batch(with_points(90))
+    before = files_of(Path("results"))
+    run_batch(with_points(100))
+    build = build_of(with_points(90))
+    rendered = rendered_views(build)
+    view = Path("results/faces/face/ring/exr/view_0000f.exr")
+    flip_at_the_old_time(view)
+    damaged = view.read_bytes()
+
+    run_batch(with_points(90))
+    assert read_json(build.record)["state"] == "valid"
+    assert files_of(Path("results")) == before
+    assert Path("work/removed", view).read_bytes() == damaged
+    assert rendered_views(build) == [*rendered, "view_0000f"]
+    assert faults(Path("results/faces"), Path("work")) == {}
+
+
+@pytest.mark.slow
+def test_a_limit_of_file_sizes_ends_a_batch_in_one_line_and_the_next_run_goes_on(
+    run_program, batch
+):
+    settings = batch.model_copy(update={"scene": batch.scene | {"rigs": {"ring": RING | LARGE}}})
+    write_json(Path("settings.json"), settings.as_json())
+    job = ("build_members.py", "--settings", "settings.json", "--receipt", BATCH)
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, resource.RLIM_INFINITY))
+
+    run = run_program(*job, check=False, in_fork=False, preexec_fn=limit)
+    assert run.returncode == 1
+    assert run.stderr.splitlines()[-1].startswith("error: ")
+    assert "Traceback" not in run.stderr
+    assert not [*Path("results").rglob("member.json")]
+    run_program(*job)
+    states = [read_json(path)["state"] for path in Path("results").rglob("member.json")]
+    assert states == ["valid", "valid"]
 
 
 @pytest.mark.slow

@@ -134,3 +134,46 @@ def test_members_fail_alone_and_are_kept_and_mended(tmp_path):
     verified = subprocess.run(verify, cwd=folder, capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stdout
     assert_a_plan_finds_damaged_records(folder, choice)
+
+
+# While the file "trouble" exists, the system ends the process of seed 0, and its disk is full for
+# seed 1.
+TROUBLED = """
+
+built = build
+
+
+def build(parameters):
+    import errno, os, pathlib, signal
+    if pathlib.Path("trouble").exists():
+        if parameters["seed"] == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if parameters["seed"] == 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+    built(parameters)
+"""
+
+
+def test_what_stops_a_member_from_outside_is_no_failure_of_it(tmp_path):
+    folder = checkout(tmp_path / "plenoforge", rooms=ROOMS)
+    builder = folder / "scripts/scenes/room/__init__.py"
+    builder.write_text(builder.read_text() + TROUBLED)
+    choice = ("--config", "scenes=[rooms]", "rigs=all", "preset=full")
+    members = folder / "results/rooms"
+
+    (folder / "trouble").touch()
+    run = snakemake(folder, *choice)
+    assert run.returncode == 1
+    assert "build_members failed: error: " in run.stderr
+    assert "No space left on device" in run.stderr
+    assert "Traceback" not in run.stderr
+    log = (folder / "work/logs/rooms/batches/seeds_0000_0031.log").read_text()
+    assert "member 0001 is not finished: OSError: [Errno 28] No space left on device" in log
+    assert sorted(path.parent.name for path in members.glob("*/member.json")) == ["0002", "0003"]
+
+    (folder / "trouble").unlink()
+    before = bookkeeping.begun_members(folder, "rooms")
+    run = snakemake(folder, *choice)
+    assert run.returncode == 0, run.stderr
+    assert "4 of 4 members of rooms built" in run.stderr
+    assert bookkeeping.begun_members(folder, "rooms") == [*before, "0000", "0001"]

@@ -16,7 +16,7 @@ import pytest
 from conftest import BLENDER, SCRIPTS
 
 from lightfield.core import receipts
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.files import sha256
 from lightfield.core.flags import parsed
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
@@ -246,8 +246,9 @@ def test_an_unreadable_file_is_named_and_the_others_are_done(dataset, run, capsy
     receipt = dataset / "receipts/0-3.jsonl"
     with pytest.raises(
         UserError, match=r"2 of 4 views could not be reprojected, such as .*broken\.exr"
-    ):
+    ) as caught:
         run(*PERSPECTIVE, "--png", "--receipt", str(receipt))
+    assert not isinstance(caught.value, OutsideError)
     message = capsys.readouterr().err
     assert "broken.exr" in message and "view_0001f.exr" in message
     out = dataset / "out"
@@ -283,7 +284,8 @@ def test_a_damaged_source_is_not_used(dataset, run, capsys):
     receipt = dataset / "receipts/0-3.jsonl"
     bookkeeping.note_shard(receipt, {path: f"key {i}" for i, path in enumerate(sources)})
     write_exr(sources[1], view_channels(FISHEYE, 0.5), {"plenoforge:key": "key 1"})
-    with pytest.raises(UserError, match="1 of 3 views could not be reprojected"):
+    # Nobody may take it for a fault of the scene.
+    with pytest.raises(OutsideError, match="1 of 3 views could not be reprojected"):
         run(*PERSPECTIVE, "--png", "--source-receipt", str(receipt))
     assert f"{sources[1]}: is not as its job made it" in capsys.readouterr().err
     assert names(dataset / "out") == ["lightfield.json", "view_0000f.png", "view_0002f.png"]

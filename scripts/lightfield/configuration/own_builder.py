@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import check_readable, open_file, read_problem
+from lightfield.core.files import check_readable, open_file, read_error
 from lightfield.core.paths import inside
 from lightfield.core.settings import problems, suggestion
 
@@ -149,7 +149,7 @@ def _parsed(file: Path) -> ast.Module:
         with open_file(file) as opened:
             text = opened.read(_LARGEST + 1)
     except OSError as error:
-        raise UserError(f"{file}: cannot be read: {read_problem(error)}") from None
+        raise read_error(file, error) from None
     if len(text) > _LARGEST:
         raise UserError(f"{file}: is larger than {_LARGEST // 1000} kB; is it a Python file?")
     try:

@@ -1,4 +1,6 @@
-"""The one exception that the programs show to the user without a traceback."""
+"""The exceptions that the programs show to the user without a traceback."""
+
+import errno
 
 # Longer lines are cut in their middle, because they may quote a damaged file.
 LONGEST = 2000
@@ -12,6 +14,38 @@ class UserError(Exception):
 
     def __init__(self, *lines: str) -> None:
         super().__init__("\n".join(map(_printable, lines)))
+
+
+class OutsideError(UserError):
+    """A `UserError` with a cause outside what a job makes: a full disk, a limit, a damaged file.
+
+    The same job may succeed later. So nobody may note it as a fault of a scene or of a model.
+    """
+
+
+# Errors with these numbers do not depend on the content of a file.
+_OUTSIDE = {
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EFBIG,
+    errno.EROFS,
+    errno.EACCES,
+    errno.EPERM,
+    errno.EMFILE,
+    errno.ENFILE,
+    errno.ENOMEM,
+    errno.EAGAIN,
+    errno.EIO,
+    errno.ESTALE,
+    errno.ETIMEDOUT,
+}
+
+
+def is_outside(error: BaseException) -> bool:
+    """Return whether the cause of an error lies outside what a job makes, as in `OutsideError`."""
+    if isinstance(error, OSError):
+        return error.errno in _OUTSIDE
+    return isinstance(error, OutsideError | MemoryError)
 
 
 def _printable(line: str) -> str:

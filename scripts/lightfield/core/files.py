@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.disk_space import write_problem
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError, is_outside
 
 _SPECIAL_KINDS = {
     stat.S_IFIFO: "a FIFO",
@@ -128,11 +128,11 @@ file_watchers: list[Callable[[Path, Stamp], None]] = []
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError into a `UserError` that names ``path``, the cause, and what to do."""
+    """Turn an OSError into an `OutsideError` that names ``path``, the cause, and what to do."""
     try:
         yield
     except OSError as error:
-        raise UserError(f"{path}: cannot be written: {write_problem(path, error)}") from None
+        raise OutsideError(f"{path}: cannot be written: {write_problem(path, error)}") from None
 
 
 def read_problem(error: OSError) -> str:
@@ -140,6 +140,12 @@ def read_problem(error: OSError) -> str:
     if isinstance(error, PermissionError):
         return "you may not read it: change its permissions (chmod u+r)"
     return error.strerror or str(error)
+
+
+def read_error(place: Path | str, error: OSError) -> UserError:
+    """Return the error about a file, or a ``place`` in it, whose reading raised ``error``."""
+    kind = OutsideError if is_outside(error) else UserError
+    return kind(f"{place}: cannot be read: {read_problem(error)}")
 
 
 def check_readable(path: Path | str) -> None:
@@ -150,7 +156,7 @@ def check_readable(path: Path | str) -> None:
     try:
         open_file(path).close()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
 
 
 @contextmanager
@@ -270,7 +276,7 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
     try:
         content = read_bytes(path)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
     for line in content.splitlines():
         try:
             entry = json.loads(line)
@@ -392,7 +398,7 @@ def read_text(path: Path | str) -> str:
         with TextIOWrapper(open_file(path), encoding="utf-8-sig") as file:
             return file.read()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
     except UnicodeDecodeError:
         raise UserError(f"{path}: is not text in UTF-8") from None
 
@@ -420,7 +426,7 @@ def reading(place: Path | str, kind: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise UserError(f"{place}: cannot be read: {read_problem(error)}") from None
+        raise read_error(place, error) from None
     except KeyError as error:
         raise UserError(f"{place}: {error.args[0]}: is missing") from None
     except DAMAGE as error:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError
 
 # These environment variables tell CUDA, OptiX and HIP which GPUs a process sees.
 CUDA = "CUDA_VISIBLE_DEVICES"
@@ -140,7 +140,7 @@ def _open_lock(path: Path) -> int:
                 os.fchmod(file, 0o666)
                 return file
         except OSError as error:
-            raise UserError(f"{path}: cannot be locked: {error.strerror}; remove it") from None
+            raise OutsideError(f"{path}: cannot be locked: {error.strerror}; remove it") from None
 
 
 # The lock of this process's GPU, which stays open until the process ends, and the seconds for which

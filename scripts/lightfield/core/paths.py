@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, read_problem
+from lightfield.core.files import absolute_path, read_error
 
 
 def files_below(folder: Path, *, strict: bool = True) -> Iterator[Path]:
@@ -32,7 +32,7 @@ def _files_below(folder: Path, real_folders: list[Path], strict: bool) -> Iterat
         return
     except OSError as error:
         if strict:
-            raise UserError(f"{folder}: cannot be read: {read_problem(error)}") from None
+            raise read_error(folder, error) from None
         return
     for entry in entries:
         path = folder / entry.name

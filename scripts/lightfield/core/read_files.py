@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.files import Identity, identity_and_sha256, sha256
 
 
@@ -89,7 +89,7 @@ def damaged(path: str | Path) -> UserError:
     """
     with suppress(OSError):
         Path(path).touch()
-    return UserError(f"{path}: is not as its job made it; the next run makes it again")
+    return OutsideError(f"{path}: is not as its job made it; the next run makes it again")
 
 
 def check_since_plan(path: str | Path, planned: str) -> None:
@@ -100,9 +100,9 @@ def check_since_plan(path: str | Path, planned: str) -> None:
 
 def changed_since_plan(path: str | Path) -> UserError:
     """Return the error about a user's file that is not as it was when the run was planned."""
-    return UserError(f"{path}: has changed since the plan; start the run again")
+    return OutsideError(f"{path}: has changed since the plan; start the run again")
 
 
 def changed(path: str | Path) -> UserError:
     """Return the error about a file that was written while a job read it."""
-    return UserError(f"{path}: has changed while this job read it; start the run again")
+    return OutsideError(f"{path}: has changed while this job read it; start the run again")

@@ -31,7 +31,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.files import (
     DAMAGE,
     Stamp,
@@ -39,8 +39,8 @@ from lightfield.core.files import (
     atomic_path,
     file_watchers,
     read_bytes,
+    read_error,
     read_json_lines,
-    read_problem,
     read_watchers,
     set_aside,
     unreadable,
@@ -310,7 +310,7 @@ class OpenReceipt:
             return
         if is_receipt(name):
             if (receipt := read(name)) is None:
-                raise UserError(f"{name}: is missing or damaged; the next run makes it again")
+                raise OutsideError(f"{name}: is missing or damaged; the next run makes it again")
             self.inputs[name] = receipt.sum
             for made, output in receipt.outputs.items():
                 self._made_files[made] = output.stamp.sha256
@@ -333,7 +333,7 @@ class OpenReceipt:
         try:
             return self._read.read(name, self._made(name))
         except OSError as error:
-            raise UserError(f"{name}: cannot be read: {read_problem(error)}") from None
+            raise read_error(name, error) from None
 
     def add_shared_input(self, path: str | Path) -> None:
         """Note a file that the job reads, and that another run may replace meanwhile.
@@ -466,6 +466,25 @@ class OpenReceipt:
         for file in self._files:
             if unreadable(file):
                 self._set_aside(file)
+
+    def set_all_damaged_aside(self) -> list[str]:
+        """Move each damaged file aside that this job or an earlier try made. Reads all of them.
+
+        Returns the paths of these files, and of files that this job has made and that are gone.
+        """
+        damaged_files = []
+        for path, output in {**self._known, **self.outputs}.items():
+            must_be_there = path in self.outputs or os.path.lexists(path)
+            if must_be_there and self._own_name(path) and not output.has_bytes(path):
+                self._set_aside(Path(path))
+                damaged_files.append(path)
+        return damaged_files
+
+    def keep_intact_files(self) -> None:
+        """Note all files that an earlier try made, and that still have their bytes."""
+        for path, output in self._known.items():
+            if path not in self.outputs and self._own_name(path) and output.has_bytes(path):
+                self.outputs[path] = output
 
     def check_inputs(self) -> None:
         """Raise `UserError` if a file that was read has or had other bytes than it must have."""

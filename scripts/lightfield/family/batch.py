@@ -1,10 +1,13 @@
 """Builds a batch of members: one after the other, in a process that may die without the others.
 
-A worker process builds the members. A signal may end it, as when memory runs out or Blender
-crashes. Then the member at hand has failed, and another worker goes on with the next. The history
-in the batch's receipt says what each process did. So if this process dies as well, the next run
-knows which member was at hand, and builds it last: a user may have killed the run, or the member
-may have taken all memory. A member at which three runs in a row have died has failed.
+A member has failed if a stage refused it, or if Blender crashed at it. A cause outside the member,
+such as a full disk, is no failure of it: the other members are built, and then the job fails.
+
+A worker process builds the members. If a signal ends it, another worker goes on with the next
+member. The history in the batch's receipt says what each process did. So if this process dies as
+well, the next run knows which member was at hand, and builds it last: a user may have killed the
+run, or the member may have taken all memory. A member at which processes were killed in three runs
+in a row has failed, so that the rest of its family can be collected.
 
 Each member has a receipt of its own. The batch's receipt has the files that the members were read
 from, and a few small files that stand for each member. A plan looks at these alone.
@@ -28,7 +31,7 @@ from lightfield.core.files import append_json_line
 from lightfield.core.names import SPLITS
 from lightfield.core.progress import Progress
 from lightfield.core.receipts import PART_SUFFIX, OpenReceipt
-from lightfield.family.member import MemberBuild
+from lightfield.family.member import MemberBuild, cause_of
 from lightfield.formats.layout import SUMS
 from lightfield.stages.family import BuildMembers
 from lightfield.workflow.failures import signal_cause
@@ -36,7 +39,17 @@ from lightfield.workflow.history import History
 
 # These signals stop a run. They are no fault of the member at hand.
 _STOPS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-# A member at which so many runs died has failed.
+# With these, a process ends itself at a member: Blender crashed, or a view hung. Others come from
+# outside: the system ends a process with SIGKILL if memory runs out.
+_CRASHES = (
+    signal.SIGSEGV,
+    signal.SIGABRT,
+    signal.SIGILL,
+    signal.SIGFPE,
+    signal.SIGTRAP,
+    signal.SIGALRM,
+)
+# A member at which processes were killed in so many runs in a row has failed.
 _MOST_DEATHS = 3
 # The files that stand for a member in the receipt of its batch.
 _OF_MEMBER = (RECORD, SPLITS, SUMS)
@@ -45,29 +58,39 @@ _OF_MEMBER = (RECORD, SPLITS, SUMS)
 def run(job: BuildMembers) -> None:
     """Build the members of a batch that are not finished.
 
-    Raises `UserError` if nothing can be written, if the run is stopped, or if a file has changed
-    after a member was read from it.
+    Raises `UserError` if the run is stopped, if a file has changed after a member was read from it,
+    or if anything else outside the members kept one of them from being built.
     """
     builds = {member.name: MemberBuild(job.settings, member) for member in job.settings.members}
     leftovers.remove()
     failed: list[str] = []
     lines = _history(job)
     last = member_at_hand(lines)
-    if name := deadly_member(lines):
-        if name in builds:
-            builds[name].note_death(
+    for deadly in sorted(deadly_members(lines)):
+        if deadly in builds:
+            builds[deadly].note_death(
                 f"{_MOST_DEATHS} runs died at it: most likely memory ran out, or Blender crashed"
             )
-            failed.append(name)
-        _note(job, {"failed": name})
+            failed.append(deadly)
+        _note(job, {"failed": deadly})
     history = History()
-    while signal_number := _work(job, failed, last):
+    killed: dict[str, str] = {}
+    while signal_number := _work(job, [*failed, *killed], last):
         name = member_at_hand(_history(job))
-        if name is None or signal_number in _STOPS:
+        if name is None:
             raise UserError(f"killed by {signal.Signals(signal_number).name}")
-        builds[name].note_death(signal_cause(signal_number))
-        _note(job, {"failed": name})
-        failed.append(name)
+        if signal_number in _STOPS:
+            _note(job, {"stopped": name})
+            raise UserError(f"killed by {signal.Signals(signal_number).name}")
+        if signal_number in _CRASHES:
+            builds[name].note_death(signal_cause(signal_number))
+            _note(job, {"failed": name})
+            failed.append(name)
+        else:
+            _note(job, {"killed": name})
+            killed[name] = signal_cause(signal_number)
+    if killed:
+        raise UserError("; ".join(f"member {name}: {cause}" for name, cause in killed.items()))
     if batch := receipts.current():
         _note_members(batch, builds.values())
     history.end()
@@ -112,30 +135,51 @@ def _build_members(job: BuildMembers, members: Sequence[Member]) -> None:
         len(missing), f"build {job.settings.family}", "members", already=len(builds) - len(missing)
     )
     parent = os.getppid()
+    errors: list[Exception] = []
     for build in missing:
         if os.getppid() != parent:
             raise UserError("the run has ended")
-        _note(job, {"member": build.member.name, "began": round(time.time(), 3)})
-        began = time.process_time()
+        try:
+            record = _build(job, build)
+        except (UserError, OSError, MemoryError) as error:
+            errors.append(error)
+            _report(f"member {build.member.name} is not finished: {cause_of(error)}")
+        else:
+            if record["state"] == "failed":
+                failure = record["failure"]
+                cause = f"{failure['stage']}: {failure['cause']}"
+                _report(f"member {build.member.name} failed: {cause}")
+            progress.done()
+    if errors:
+        raise errors[0]
+
+
+def _build(job: BuildMembers, build: MemberBuild) -> dict[str, Any]:
+    """Build a member, and return its record. Note when it began and ended."""
+    name = build.member.name
+    _note(job, {"member": name, "began": round(time.time(), 3)})
+    began = time.process_time()
+    try:
         record = build.build(job.device, job.threads)
-        _note(
-            job,
-            {
-                "member": build.member.name,
-                "state": record["state"],
-                "finished": round(time.time(), 3),
-                "cpu_seconds": round(time.process_time() - began, 3),
-                "memory_bytes": psutil.Process().memory_info().rss,
-            },
-        )
-        if record["state"] == "failed":
-            failure = record["failure"]
-            print(
-                f"member {build.member.name} failed: {failure['stage']}: {failure['cause']}",
-                file=sys.stderr,
-                flush=True,
-            )
-        progress.done()
+    except BaseException:
+        # Without this line, the process would count as killed at the member.
+        _note(job, {"stopped": name})
+        raise
+    _note(
+        job,
+        {
+            "member": name,
+            "state": record["state"],
+            "finished": round(time.time(), 3),
+            "cpu_seconds": round(time.process_time() - began, 3),
+            "memory_bytes": psutil.Process().memory_info().rss,
+        },
+    )
+    return record
+
+
+def _report(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 def _note_members(batch: OpenReceipt, builds: Iterable[MemberBuild]) -> None:
@@ -164,20 +208,26 @@ def member_at_hand(lines: Sequence[Mapping[str, Any]]) -> str | None:
     for line in lines:
         if "began" in line:
             name = line.get("member")
-        elif line.keys() & {"finished", "failed", "started", "ended"}:
+        elif line.keys() & {"finished", "failed", "killed", "stopped", "started", "ended"}:
             name = None
     return name
 
 
-def deadly_member(lines: Sequence[Mapping[str, Any]]) -> str | None:
-    """Return the member at which the last `_MOST_DEATHS` runs of a history died, if any."""
+def deadly_members(lines: Sequence[Mapping[str, Any]]) -> set[str]:
+    """Return the members at which a process was killed in each of the last `_MOST_DEATHS` runs."""
     runs: list[list[Mapping[str, Any]]] = []
     for line in lines:
         if "started" in line:
             runs.append([])
         elif runs:
             runs[-1].append(line)
-    at_hand = [member_at_hand(run) for run in runs[-_MOST_DEATHS:]]
-    if len(at_hand) < _MOST_DEATHS or len(set(at_hand)) > 1:
-        return None
-    return at_hand[0]
+    if len(runs) < _MOST_DEATHS:
+        return set()
+    return set.intersection(*map(_killed_members, runs[-_MOST_DEATHS:]))
+
+
+def _killed_members(run: Sequence[Mapping[str, Any]]) -> set[str]:
+    """Return the members of a run at which a worker was killed, or the whole run."""
+    names = {line["killed"] for line in run if "killed" in line}
+    at_hand = member_at_hand(run)
+    return names if at_hand is None else {*names, at_hand}

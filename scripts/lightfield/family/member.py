@@ -3,10 +3,9 @@
 import hashlib
 import json
 import os
-import shutil
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -16,10 +15,10 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core import receipts
-from lightfield.core.disk_space import obstacle
-from lightfield.core.errors import LESS_MEMORY, UserError
-from lightfield.core.files import DAMAGE, sha256, write_json
+from lightfield.core import leftovers, receipts
+from lightfield.core.disk_space import check_folder
+from lightfield.core.errors import LESS_MEMORY, OutsideError, UserError, is_outside
+from lightfield.core.files import DAMAGE, set_aside, sha256, write_json
 from lightfield.core.receipts import OpenReceipt
 from lightfield.family.stages import StageRun, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
@@ -32,6 +31,10 @@ from lightfield.workflow.member_record import read_member
 
 # What a member is made of does not depend on these keys of a scene YAML.
 _DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
+
+
+class _DamagedFilesError(OutsideError):
+    """Files of a member were damaged or removed while it was built."""
 
 
 class MemberBuild:
@@ -70,15 +73,26 @@ class MemberBuild:
     def build(self, device: Device, threads: int) -> dict[str, Any]:
         """Make the member's datasets, and return and write its record.
 
-        A failure is in the record, and the traceback in the log. Raises `UserError` only if
-        nothing can be written.
+        A failure of the member is in the record, and the traceback in the log. Raises an error for
+        which `is_outside` holds if its cause is no property of the member.
         """
+        try:
+            return self._build(device, threads)
+        except _DamagedFilesError as error:
+            print(f"warning: {error}", file=sys.stderr, flush=True)
+            # They are made again. Twice in a row is no accident.
+            return self._build(device, threads)
+
+    def _build(self, device: Device, threads: int) -> dict[str, Any]:
         run = StageRun()
         with self._opened_receipt() as receipt, _output_to(self.log):
             # From now on the member is neither valid nor failed.
             self.record.unlink(missing_ok=True)
+            # Stages believe the size and the time of a file.
+            receipt.set_all_damaged_aside()
             try:
                 written = self._written()
+                self._check_files(written)
                 rigs = written.rigs.values()
                 receipts.note_inputs(rig.file for rig in rigs if isinstance(rig, Poses))
                 datasets = self._datasets(written)
@@ -90,14 +104,29 @@ class MemberBuild:
                 record = self._write({"state": "valid", "datasets": entries})
             except (Exception, SystemExit) as error:
                 traceback.print_exc()
-                if problem := obstacle(self.folder) or obstacle(self.work):
-                    raise UserError(f"{self.folder}: cannot be written: {problem}") from None
-                record = self._fail(run.stage, _cause(error))
+                self._raise_outside_cause(error, receipt)
+                record = self._fail(receipt, run.stage, cause_of(error))
             receipt.seal()
         return record
 
+    def _raise_outside_cause(self, error: BaseException, receipt: OpenReceipt) -> None:
+        """Raise an error if something outside the member may be the cause of a stage's ``error``.
+
+        So it is if the machine refused something, or if files are missing, damaged or changed.
+        """
+        if damaged_files := receipt.set_all_damaged_aside():
+            raise _DamagedFilesError(
+                f"{damaged_files[0]}: was damaged or removed while {self.member.name} was built; "
+                "it is made again"
+            ) from error
+        if is_outside(error):
+            raise error
+        for folder in (self.folder, self.work):
+            check_folder(folder)
+        receipt.check_inputs()
+
     def note_death(self, cause: str) -> None:
-        """Write the record of a member at which a process died. Remove what is half-written."""
+        """Write the record of a member at which a process died. Keep what is whole."""
         with self._opened_receipt() as receipt:
             if self.member.model:
                 model = Path(self.member.model)
@@ -108,7 +137,7 @@ class MemberBuild:
                 with suppress(UserError, OSError, *DAMAGE):
                     references = model_files.survey(model).references
                     receipts.note_inputs(reference.path for reference in references)
-            self._fail(self._last_stage(), cause)
+            self._fail(receipt, self._last_stage(), cause)
             receipt.seal()
 
     def _opened_receipt(self) -> AbstractContextManager[OpenReceipt]:
@@ -130,6 +159,13 @@ class MemberBuild:
         file = f"{scene_yaml.OWN_SCENES}/{self.settings.family}.yaml: member {self.member.name}"
         return scene_yaml.check_member(self.content, file)
 
+    def _check_files(self, written: Scene) -> None:
+        """Raise `OutsideError` if a file that the scene YAML names has gone since the plan."""
+        poses = [rig.file for rig in written.rigs.values() if isinstance(rig, Poses)]
+        for name in filter(None, [self.member.model, written.scene.light_file, *poses]):
+            if not Path(name).exists():
+                raise OutsideError(f"{name}: there is no such file any more; put it back")
+
     def _datasets(self, written: Scene) -> list[Dataset]:
         fields = {
             "results_root": self.settings.results,
@@ -141,13 +177,18 @@ class MemberBuild:
         settings = self.settings
         return datasets_of(settings.family, written, settings.preset, settings.limits, fields)
 
-    def _fail(self, stage: str, cause: str) -> dict[str, Any]:
-        """Write and return the record of a failed member. Removes what is half-written of it."""
-        if stage != "validate":
-            for entry in self.folder.iterdir() if self.folder.is_dir() else ():
-                # What a user's link leads to stays.
-                is_folder = entry.is_dir() and not entry.is_symlink()
-                shutil.rmtree(entry) if is_folder else entry.unlink()
+    def _fail(self, receipt: OpenReceipt, stage: str, cause: str) -> dict[str, Any]:
+        """Write and return the record of a failed member.
+
+        Keeps the files that have the bytes with which they were made, so that a later run need not
+        make them again. Moves all others to work/removed, and lists of sums, which say that a
+        dataset is finished.
+        """
+        leftovers.remove_unfinished(self.folder, age=0)
+        receipt.keep_intact_files()
+        kept = [Path(name) for name in receipt.outputs if Path(name).name != SUMS]
+        kept_paths = {path for file in kept for path in (file, *file.parents)}
+        _set_others_aside(self.folder, kept_paths, receipt.work / receipts.REMOVED)
         failure = {"stage": stage, "cause": cause, "log": str(self.log)}
         return self._write({"state": "failed", "datasets": {}, "failure": failure})
 
@@ -201,7 +242,20 @@ def _listing(dataset: Dataset) -> dict[str, Any]:
     }
 
 
-def _cause(error: BaseException) -> str:
+def _set_others_aside(folder: Path, kept: Collection[Path], removed: Path) -> None:
+    """Move what is in a folder into ``removed``, but for the ``kept`` files and their folders.
+
+    Moves a link itself. Leaves what a link leads to, because the folder there may be of other use.
+    """
+    for entry in sorted(folder.iterdir()) if folder.is_dir() else ():
+        path = Path(receipts.name_of(entry))
+        if path not in kept:
+            print(f"{path}: was moved to {set_aside(entry, removed)}", flush=True)
+        elif not entry.is_symlink():
+            _set_others_aside(entry, kept, removed)
+
+
+def cause_of(error: BaseException) -> str:
     """Return why a stage failed, in one line."""
     if isinstance(error, MemoryError):
         return f"out of memory: {LESS_MEMORY}"

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from lightfield.core import gpus
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError
 from lightfield.core.machine import describe
 from lightfield.core.names import FILE
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
@@ -274,12 +274,12 @@ def gpu(device: str) -> str | None:
         if any(entry.type == name.upper() for entry in entries):
             return name.upper()
     if device == "gpu":
-        raise UserError(
+        raise OutsideError(
             f"device: this machine has no GPU that Cycles can use ({', '.join(_GPU_DEVICES)}), so "
             "there is nothing to check"
         )
     if device not in ("auto", "cpu"):
-        raise UserError(
+        raise OutsideError(
             f"device: this machine has no {device} device that Cycles can use; "
             "use device=cpu, or device=auto to use the best device here"
         )

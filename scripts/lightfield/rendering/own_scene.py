@@ -13,7 +13,7 @@ import bpy
 
 from lightfield.configuration import own_builder
 from lightfield.core import receipts
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError, is_outside
 from lightfield.rendering.quiet import quiet
 
 # The package of the builder, so that it can import files beside it with a dot, too.
@@ -30,7 +30,8 @@ def fill(builder: Path, parameters: Mapping[str, Any]) -> None:
             model = getattr(module, "Parameters", None)
             module.build(own_builder.typed(model, parameters, builder))
     except (Exception, SystemExit) as error:
-        raise UserError(own_builder.problem(files, builder, error)) from None
+        kind = OutsideError if is_outside(error) else UserError
+        raise kind(own_builder.problem(files, builder, error)) from None
     _pack(builder, files)
 
 

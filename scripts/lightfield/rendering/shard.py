@@ -24,7 +24,7 @@ import psutil
 from lightfield.configuration import keys
 from lightfield.core import gpus, leftovers, processors, units
 from lightfield.core.cli import view_slice
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError
 from lightfield.core.files import write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
@@ -148,7 +148,7 @@ def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightFi
     groups = len(lightfield.light_groups)
     needed = rendering_memory(scene, lens.width * lens.height, denoise, groups)
     if needed > available():
-        raise UserError(
+        raise OutsideError(
             f"{blend}: a view of {lens.width} × {lens.height} pixels takes {units.size(needed)} "
             f"of memory, and this machine has {units.size(available())}; render it on a "
             "machine with more memory, lower the resolution, or make the scene lighter"

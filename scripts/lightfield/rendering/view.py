@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from lightfield.core import disk_space, units
-from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, UserError
+from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, OutsideError, UserError
 from lightfield.core.leftovers import temporary_folder
 from lightfield.imaging import images
 from lightfield.planning.cost import temporary_bytes
@@ -63,11 +63,12 @@ def render_view(world_from_camera: Array, seed: int, passes: Mapping[str, str]) 
             # Blender repeats Cycles' errors at the end of the render.
             lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
             text = "; ".join(dict.fromkeys(filter(None, lines)))
-            advice = ""
+            text = f"Cycles cannot render the view: {text}"
             if _OUT_OF_MEMORY.search(text):
                 on_gpu = scene.cycles.device == "GPU"
-                advice = f": {LESS_GPU_MEMORY if on_gpu else LESS_MEMORY}"
-            raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
+                advice = LESS_GPU_MEMORY if on_gpu else LESS_MEMORY
+                raise OutsideError(f"{text}: {advice}") from None
+            raise UserError(text) from None
         try:
             # One eye of a stereo pair is in view_L.exr or view_R.exr.
             path = next(folder.glob("*.exr"), folder / "view.exr")
@@ -76,7 +77,7 @@ def render_view(world_from_camera: Array, seed: int, passes: Mapping[str, str]) 
         except UserError as error:
             free = units.size(shutil.disk_usage(folder).free)
             needed = units.size(size)
-            raise UserError(
+            raise OutsideError(
                 f"{error}; {free} are free there: free some space, or set TMPDIR to a folder with "
                 f"{needed}"
             ) from None

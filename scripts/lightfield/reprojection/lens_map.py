@@ -18,7 +18,7 @@ import numpy as np
 
 from lightfield.configuration.reprojections import DEFAULT_FILTER
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, atomic_path, check_readable, read_problem
+from lightfield.core.files import DAMAGE, atomic_path, check_readable, read_error
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import FILTERS
@@ -318,7 +318,7 @@ def load(path: Path | str) -> LensMap:
             **arrays,
         )
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
     except (EOFError, SyntaxError, TokenError, *DAMAGE) as error:
         raise UserError(
             f"{path}: is not a lens map that can be read: {error}; delete it, and the next run "

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.errors import UserError
+from lightfield.core.errors import OutsideError, UserError, is_outside
 from lightfield.core.files import keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.geometry.depth import LARGEST_STEP
@@ -42,16 +42,18 @@ def run(stage: Reproject) -> None:
     progress = Progress(len(views), label)
     paths: list[Path] = []
     failed: list[str] = []
+    kind = UserError
     for view, result in _results(job, views):
         if isinstance(result, UserError | OSError):
             failed.append(_named(view, result))
+            kind = OutsideError if is_outside(result) else kind
             print(f"error: {failed[-1]}", file=sys.stderr, flush=True)
         else:
             paths += result
         progress.done()
     if failed:
         # The run's report quotes the last line of the log.
-        raise UserError(
+        raise kind(
             f"{len(failed)} of {len(views)} views could not be reprojected, such as {min(failed)}"
         )
     if lost := sum(job.lost_depths):

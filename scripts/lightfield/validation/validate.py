@@ -20,7 +20,7 @@ from typing import Any
 
 import OpenImageIO as oiio
 
-from lightfield.core.errors import LESS_MEMORY, UserError
+from lightfield.core.errors import LESS_MEMORY, OutsideError
 from lightfield.core.files import absolute_path, read_watchers, sha256
 from lightfield.core.progress import Progress
 from lightfield.core.read_files import ReadFiles
@@ -254,7 +254,7 @@ def _workers(
         ) as pool:
             yield pool.map
     except BrokenProcessPool:
-        raise UserError(
+        raise OutsideError(
             f"{examiner.dataset}: a process that reads it was killed; most likely memory ran out: "
             f"{LESS_MEMORY}"
         ) from None

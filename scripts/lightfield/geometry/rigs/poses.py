@@ -21,7 +21,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core import receipts, units
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_bytes, read_json, read_problem, read_text
+from lightfield.core.files import read_bytes, read_error, read_json, read_text
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.frames import (
@@ -124,7 +124,7 @@ def _read_poses(path: Path) -> PosesFile:
     try:
         status = path.stat()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise read_error(path, error) from None
     if status.st_size > LARGEST_FILE:
         raise UserError(
             f"{path}: has {units.size(status.st_size)}; must be at most {units.size(LARGEST_FILE)}"
