@@ -21,7 +21,8 @@ colorspaces:
 
   - !<ColorSpace>
     name: Studio Linear
-    from_scene_reference: !<MatrixTransform> {matrix: [2, -1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
+    from_scene_reference: !<MatrixTransform>
+      matrix: [2, -1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
 """
 LOOK = """
 looks:
