@@ -1,5 +1,6 @@
 """Makes a dataset's light field from its settings."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from lightfield.stages.rig import MakeLightfield
 def write(job: MakeLightfield) -> None:
     """Write the light field of a job's settings. Raises `UserError` if it lacks a file."""
     settings = job.settings
+    if isinstance(settings.capture.rig, rigs.Poses):
+        for warning in settings.capture.rig.warnings():
+            print(f"warning: {warning}", file=sys.stderr)
     if job.calibration:
         render = calibrated(settings.render, job.calibration)
         settings = settings.model_copy(update={"render": render})
