@@ -33,9 +33,15 @@ from lightfield.geometry.frames import (
     read_frames,
     read_numbers,
 )
-from lightfield.geometry.rigs import trajectories
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
-from lightfield.geometry.rigs.trajectories import FORMATS, OPENCV_AXES
+from lightfield.geometry.rigs.trajectories import (
+    FORMATS,
+    OPENCV_AXES,
+    read_kubric,
+    read_trajectory,
+    refuse_others,
+    unit,
+)
 from lightfield.geometry.rotations import (
     TOLERANCE,
     Floats,
@@ -256,7 +262,7 @@ def _read_json(path: Path) -> Listing:
     if isinstance(content, dict) and frames is None:
         _refuse_others(path, content)
     try:
-        if isinstance(content, dict) and (kubric := trajectories.read_kubric(content)):
+        if isinstance(content, dict) and (kubric := read_kubric(content)):
             return Listing(Poses.shape, "quaternion", kubric)
         if not isinstance(frames, list):
             raise UserError(f"frames: must be a list of views; {FORMATS}")
@@ -347,7 +353,7 @@ def _are_rotations(world_from_cameras: Floats) -> NDArray[np.bool_]:
 def _read_colmap(path: Path) -> Listing:
     """Read COLMAP's images.txt or images.bin, or another trajectory in a .txt."""
     is_text = path.suffix == ".txt"
-    if is_text and (trajectory := trajectories.read_text(path, read_text(path))):
+    if is_text and (trajectory := read_trajectory(path, read_text(path))):
         return Listing(Poses.shape, "matrix", trajectory)
     images = [*(_colmap_text(path) if is_text else _colmap_binary(path))]
     names = _view_names([image for _, _, image in images])
@@ -414,7 +420,7 @@ _READERS = {".csv": _read_csv, ".json": _read_json, ".txt": _read_colmap, ".bin"
 def _refuse_others(path: Path, header: Sequence[str] | Mapping[str, Any]) -> None:
     """Raise `UserError` for a CSV's ``header``, or a JSON, of a known format that is not read."""
     try:
-        trajectories.refuse_others(header)
+        refuse_others(header)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 
@@ -454,6 +460,6 @@ def _number(path: Path, where: str, value: str | float) -> float:
 def _unit(path: Path, where: str, quaternion: Floats) -> Floats:
     """Return a quaternion (4,) with length 1, because files round it."""
     try:
-        return trajectories.unit(quaternion)
+        return unit(quaternion)
     except UserError as error:
         raise UserError(f"{path}: {where}: {error}") from None

@@ -41,7 +41,7 @@ def refuse_others(header: Sequence[str] | Mapping[str, Any]) -> None:
             raise UserError(f"is {format_name}; {FORMATS}")
 
 
-def read_text(path: Path, text: str) -> list[Frame] | None:
+def read_trajectory(path: Path, text: str) -> list[Frame] | None:
     """Return the poses of a trajectory of KITTI or TUM. None if the text is neither."""
     lines = {
         f"line {number}": line.split()
