@@ -379,6 +379,116 @@ def _rotations(matrix):
     matrix[:3, :3] = np.eye(3)
 
 
+# The axes of a camera of computer vision (x right, y down, z forward).
+FORWARD = POSES @ np.diag([1, -1, -1, 1])
+
+
+def _kitti():
+    lines = [" ".join(f"{number:.6e}" for number in pose[:3].ravel()) for pose in FORWARD]
+    return "poses.txt", "\n".join(lines), ["000000", "000001", "000002"]
+
+
+def _tum():
+    turns = Rotation.from_matrix(FORWARD[:, :3, :3]).as_quat()
+    times = ["1305031102.1753", "1305031102.2112", "1305031102.2753"]
+    lines = ["# ground truth trajectory", "# timestamp tx ty tz qx qy qz qw"]
+    for time, pose, turn in zip(times, FORWARD, turns, strict=True):
+        lines.append(" ".join([time, *(f"{number:.6f}" for number in (*pose[:3, 3], *turn))]))
+    return "groundtruth.txt", "\n".join(lines), times
+
+
+def _kubric():
+    camera = {"focal_length": 35.0, "positions": POSES[:, :3, 3].tolist()}
+    content = {"camera": camera | {"quaternions": WXYZ.tolist()}, "instances": []}
+    return "metadata.json", json.dumps(content), ["rgba_00000", "rgba_00001", "rgba_00002"]
+
+
+@pytest.mark.parametrize("made", [_kitti, _tum, _kubric])
+def test_trajectories_of_data_sets_are_read_and_named_as_their_images(made, tmp_path):
+    name, text, names = made()
+    (tmp_path / name).write_text(text)
+    rig = from_settings({"type": "poses", "file": str(tmp_path / name)})
+    assert [pose.name for pose in rig.poses()] == names
+    np.testing.assert_allclose(matrices(rig), POSES, atol=3e-6)
+
+
+EUROC = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x []\n1,2,3,4,5,6\n"
+CAMERA_PATH = {"camera_path": [{"camera_to_world": list(range(16))}], "render_height": 9}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("data.csv", EUROC, "is EuRoC's poses of a body and not of a camera"),
+        ("a.csv", "#name,x,y,alt,heading,pitch,roll\n", "is a table of RealityScan"),
+        ("camera_path.json", json.dumps(CAMERA_PATH), "is a camera path of nerfstudio"),
+        ("1.json", '{"t_00": 1, "t_01": 0, "fx": 500}', "is one camera of Polycam"),
+        ("other.json", '{"poses": []}', "frames: must be a list of views"),
+        ("other.txt", "0 0 0\n", "image 0: must be IMAGE_ID"),
+    ],
+)
+def test_other_formats_are_named_beside_the_formats_that_are_read(
+    name, content, expected, tmp_path
+):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(UserError) as caught:
+        from_settings({"type": "poses", "file": str(tmp_path / name)}).poses()
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / name}: ") and expected in message
+    for readable in ("transforms.json", "images.bin", "KITTI", "TUM", "Kubric", "name,x,y,z"):
+        assert readable in message
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0\n", "line 2: must be 12 finite numbers"),
+        ("0 0 0 0 0 0 0 1\n\n1 0 0 0 0 0 1 1\n", "line 3: quaternion: has the length"),
+    ],
+)
+def test_a_wrong_line_of_a_trajectory_is_named(text, expected, tmp_path):
+    (tmp_path / "a.txt").write_text(text)
+    with pytest.raises(UserError, match=rf"a\.txt: {expected}"):
+        from_settings({"type": "poses", "file": str(tmp_path / "a.txt")}).poses()
+
+
+@pytest.mark.parametrize(
+    ("files", "names"),
+    [
+        (["cam0/0001.jpg", "cam1/0001.jpg"], ["cam0_0001", "cam1_0001"]),
+        (["rig/a/x/1.png", "rig/b/x/1.png"], ["a_x_1", "b_x_1"]),
+        ([r".\images\0001.jpg", r".\images\0002.jpg"], ["0001", "0002"]),
+        ([r"..\left\1.jpg", r"..\right\1.jpg"], ["left_1", "right_1"]),
+        (["deep/folder/a.png", "b.png"], ["a", "b"]),
+    ],
+)
+def test_equal_file_names_get_as_many_folders_as_they_need(files, names, tmp_path):
+    lines = [f"{number} 1 0 0 0 0 0 0 1 {file}\n\n" for number, file in enumerate(files, 1)]
+    (tmp_path / "images.txt").write_text("".join(lines))
+    frames = [{"file_path": file, "transform_matrix": np.eye(4).tolist()} for file in files]
+    (tmp_path / "transforms.json").write_text(json.dumps({"frames": frames}))
+    for file in ("images.txt", "transforms.json"):
+        rig = from_settings({"type": "poses", "file": str(tmp_path / file)})
+        assert [pose.name for pose in rig.poses()] == names
+
+
+def test_an_image_that_is_listed_twice_is_refused(tmp_path):
+    line = "1 1 0 0 0 0 0 0 1 cam0/0001.jpg\n\n"
+    (tmp_path / "images.txt").write_text(2 * line)
+    with pytest.raises(UserError, match="name: '0001' occurs twice"):
+        from_settings({"type": "poses", "file": str(tmp_path / "images.txt")}).poses()
+
+
+@pytest.mark.parametrize(("angle", "is_warned"), [(6.28, False), (-90, True), (7, True)])
+def test_angles_beyond_a_turn_are_warned_of_as_degrees(angle, is_warned, tmp_path):
+    (tmp_path / "poses.csv").write_text(f"name,x,y,z,rx,ry,rz\na,0,0,0,1.5,0,{angle}\n")
+    rig = from_settings({"type": "poses", "file": str(tmp_path / "poses.csv")})
+    warnings = list(rig.warnings())
+    assert len(warnings) == is_warned
+    if is_warned:
+        assert f"poses.csv: its angles reach {abs(angle)}" in warnings[0]
+
+
 @pytest.mark.parametrize(
     ("applied", "change", "keys", "expected"),
     [

@@ -152,6 +152,7 @@ FACTS = {
     ("change", "said"),
     [
         ({"display": "Display P3"}, "display is Display P3"),
+        ({"unknown": {"look": ["ACES Look"]}}, "look ACES Look .Blender lacks it"),
         ({"curves": True, "curve_tone": "FILMLIKE"}, "Film Like"),
         ({"white": [1, 1, 1], "working_space": "ACEScg"}, "white balance change ACEScg"),
         ({"view_transform": "Raw", "look": "High Contrast"}, "Raw with the look High Contrast"),

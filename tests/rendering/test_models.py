@@ -325,6 +325,13 @@ def Mesh "a" {
     point3f[] points = [(0, 0, 0), (nan, 0, 0), (0, 1, 0)]
 }
 """
+# A file may declare any type, and Blender leaves out what it cannot read.
+INT_POINTS = NOT_A_NUMBER.replace(
+    "point3f[] points = [(0, 0, 0), (nan, 0, 0), (0, 1, 0)]", "int points = 3"
+)
+TEXT_CORNERS = NOT_A_NUMBER.replace(
+    "int[] faceVertexIndices = [0, 1, 2]", 'string faceVertexIndices = "a"'
+)
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 STL = """solid a
 facet normal 0 0 1
@@ -385,6 +392,8 @@ BROKEN = [
     ("a.ply", HEAD + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", "corners that do not exist"),
     ("a.ply", HEAD + f"comment {'x' * 70000}\n" + FACE, "line 7 of its header"),
     ("a.usda", NOT_A_NUMBER, "not numbers"),
+    ("a.usda", INT_POINTS, "points of another type than point3f[]"),
+    ("a.usda", TEXT_CORNERS, "faceVertexIndices of another type than int[]"),
     ("a.stl", STL + STL.replace("solid a", "solid b")[:-20], "cut short"),
     ("a.gltf", UNREAD_TEXTURE, "does not read"),
     ("a.gltf", json.dumps({"asset": {"version": "2.0"}}), "has no faces"),

@@ -1503,6 +1503,23 @@ def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
 
 
+def test_a_failed_check_without_a_problem_is_named_by_its_detail(
+    tmp_path: Path, run_program: Any
+) -> None:
+    dataset = tmp_path / "room/sphere"
+    checks = [Check("exports", False, "2 of 3 are there"), Check("files", False, "9 files")]
+    result = Result("room/sphere", 3, checks, {})
+    write_json(dataset / "validation.json", result.to_json())
+    published = publish(run_program, dataset)
+    assert published.returncode == 1
+    assert "exports: 2 of 3 are there; files: 9 files: see the page" in published.stderr
+    assert "Traceback" not in published.stderr
+    assert result.failures() == [
+        "room/sphere: exports: 2 of 3 are there",
+        "room/sphere: files: 9 files",
+    ]
+
+
 @pytest.mark.parametrize("size", [(1, 40), (40, 1), (40, 2)])
 def test_an_image_without_inner_pixels_has_no_surfaces(size: tuple[int, int]) -> None:
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": size})

@@ -61,8 +61,9 @@ class ReadFiles:
         Forgets the files.
         """
         files, self._files = self._files, {}
-        if self._problem:
-            raise self._problem
+        problem, self._problem = self._problem, None
+        if problem:
+            raise problem
         for path, read in files.items():
             identity = Identity.of(path)
             if identity != read.identity and not _is_same(path, identity, read):

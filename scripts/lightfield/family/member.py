@@ -101,6 +101,7 @@ class MemberBuild:
                 run.run(jobs_of(datasets, written, scene, work, device, threads))
                 write_json(self.work / "cpu_seconds.json", run.seconds)
                 entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
+                receipt.check_inputs()
                 record = self._write({"state": "valid", "datasets": entries})
             except (Exception, SystemExit) as error:
                 traceback.print_exc()

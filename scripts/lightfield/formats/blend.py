@@ -205,7 +205,9 @@ def _display(blend: Settings, uses_look: bool) -> Iterator[str]:
 
     ``uses_look`` says whether something is developed with them. Views are light in any case.
     """
-    parts = [f"view transform {blend['view_transform']}"]
+    unknown = _unknown(blend)
+    parts = [unknown.pop("view_transform", f"view transform {blend['view_transform']}")]
+    parts += unknown.values()
     if blend["look"] != NO_LOOK:
         parts.append(f"look {blend['look']}")
     if blend["exposure"]:
@@ -218,7 +220,20 @@ def _display(blend: Settings, uses_look: bool) -> Iterator[str]:
         parts.append("white balance")
     them = "it" if len(parts) == 1 else "them"
     use = "applied by look: file" if uses_look else f"not applied; look: file applies {them}"
+    if _unknown(blend):
+        use = "not applied; look: file is not possible"
     yield f"{', '.join(parts)}: {use}"
+
+
+def _unknown(blend: Settings) -> dict[str, str]:
+    """Return what to say of each setting for display that Blender's OpenColorIO lacks."""
+    titles = {"view_transform": "view transform", "look": "look", "display": "display"}
+    return {
+        setting: f"{titles[setting]} {' or '.join(names)} (Blender lacks it, and has put "
+        f"{blend[setting]} in its place)"
+        for setting, names in blend.get("unknown", {}).items()
+        if setting in titles
+    }
 
 
 def look_of(blend: Settings) -> dict[str, Any]:
@@ -226,6 +241,11 @@ def look_of(blend: Settings) -> dict[str, Any]:
 
     Raises `UserError` for what would not give Blender's own pictures.
     """
+    if unknown := _unknown(blend):
+        raise UserError(
+            f"look: file: the .blend has the {next(iter(unknown.values()))}; choose one of "
+            "Blender's in its Color Management, or give look a name"
+        )
     if blend["display"] != DISPLAY:
         raise UserError(
             f"look: file: the .blend's display is {blend['display']}, and PNGs are {DISPLAY}; "
@@ -271,7 +291,9 @@ def _film(blend: Settings, render: RenderBlock) -> Iterator[str]:
         yield "simplify ON"
     if blend["culling"]:
         yield "culling ignored"
-    if blend["working_space"] != REC_709:
+    if "working_space" in blend.get("unknown", {}):
+        yield "working space unknown, colours taken as Rec. 709"
+    elif blend["working_space"] != REC_709:
         yield f"working space {blend['working_space']} converted to Rec. 709"
     if blend["unit_scale"] != 1:
         yield f"unit scale {blend['unit_scale']:g} ignored"

@@ -54,9 +54,7 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
         "look": view.look,
         "exposure": round(view.exposure, 4),
         "gamma": round(view.gamma, 4),
-        "curves": bool(view.use_curve_mapping),
-        "curve_tone": view.curve_mapping.tone,
-        "curve_tables": _curve_tables(view.curve_mapping) if view.use_curve_mapping else None,
+        **_curves(view),
         "white": list(view.white_balance_whitepoint) if view.use_white_balance else None,
         "pixel_aspect": round(render.pixel_aspect_x / render.pixel_aspect_y, 4),
         "border": bool(render.use_border),
@@ -70,6 +68,20 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
         "unit_scale": round(scene.unit_settings.scale_length, 6),
         "scripts": bool(bpy.app.autoexec_fail),
         "camera": camera,
+    }
+
+
+def _curves(view: Any) -> dict[str, Any]:
+    """Return whether curves change the light for display, how, and their tables.
+
+    Blender makes curves only once a user turns them on. Until then there may be none.
+    """
+    mapping = view.curve_mapping
+    is_on = bool(view.use_curve_mapping and mapping)
+    return {
+        "curves": is_on,
+        "curve_tone": mapping.tone if mapping else "STANDARD",
+        "curve_tables": _curve_tables(mapping) if is_on else None,
     }
 
 

@@ -1,5 +1,6 @@
 """Opens scenes from .blend files, with their scripts disabled, and saves scenes."""
 
+import os
 import struct
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -61,12 +62,13 @@ def open_scene(
     path: Path,
     scene_block: Mapping[str, Any] = MappingProxyType({}),
     inventory: Mapping[str, Any] | None = None,
+    printed: Path = Path(os.devnull),
 ) -> list[str]:
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
     ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
     choose the scene and its view layers. ``inventory`` lists the files that the .blend reads, which
-    become inputs of the job at work.
+    become inputs of the job at work. The file ``printed`` gets what Blender prints.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
@@ -78,7 +80,7 @@ def open_scene(
         receipts.note_inputs(path.parent / file["path"] for file in files)
     this_version = bpy.app.version_string
     try:
-        with reading_quietly(path):
+        with reading_quietly(path, printed):
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         problem = str(error).strip()

@@ -1,6 +1,7 @@
 """Writes free places for cameras in a scene's geometry, and the clearance of each camera."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
+from lightfield.geometry import framing
+from lightfield.geometry.rotations import Floats
 from lightfield.rendering import blend_file, clearance, drawings, frames, viewport
 from lightfield.rendering.clearance import REACH
 from lightfield.rendering.limits import warnings
@@ -62,9 +65,18 @@ def write_clearance(job: CheckCameras) -> None:
             f"{', '.join(objects)}: {', '.join(enclosed_views[:8])}{more}; "
             "move the rig or make it smaller (center and size in the scene YAML)"
         )
-    write_json(job.output, {"views": views})
+    shown = clearance.contents()
+    cameras = (lightfield.lens, lightfield.world_from_cameras)
+    content: dict[str, Any] = {"views": views}
+    if shown.box is not None:
+        content["box"] = shown.box.round(6).tolist()
+    content["without_depth"] = sorted(
+        name for name, box in shown.without_depth.items() if framing.may_see(*cameras, box).any()
+    )
+    write_json(job.output, content)
     camera_type = lightfield.content["camera"]["type"]
     for warning in (
+        *_framing_warnings(lightfield, shown.box),
         *clearance.open_mesh_warnings(enclosures),
         *warnings(positions, distances),
         *drawings.warnings(camera_type),
@@ -73,6 +85,14 @@ def write_clearance(job: CheckCameras) -> None:
     nearest = min(distances)
     away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"
     print(f"{len(names)} cameras, none inside geometry; the nearest surface is {away} away")
+
+
+def _framing_warnings(lightfield: LightField, box: Floats | None) -> Iterator[str]:
+    """Yield a line if cameras cannot see, or hardly see, what is in the scene's ``box`` (2, 3)."""
+    # Otherwise objects may follow each camera.
+    if box is not None and not lightfield.follows_views:
+        names = [view.name for view in lightfield.views]
+        yield from framing.warnings(lightfield.lens, names, lightfield.world_from_cameras, box)
 
 
 def _contents(inventory: Path | None) -> dict[str, Any] | None:

@@ -4,8 +4,9 @@ The functions find geometry in the viewport. `viewport.show_what_is_rendered` ma
 is rendered.
 """
 
+import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import bpy
@@ -31,6 +32,9 @@ _TRIES = 100
 _SAMPLES = 64
 # The number of rays from a camera that find the object around it.
 _RAYS = len(icosphere(1))
+# Types of objects that views show without depth, and types that views do not show.
+_WITHOUT_DEPTH = {"GREASEPENCIL", "VOLUME"}
+_SHOW_NOTHING = {"ARMATURE", "CAMERA", "EMPTY", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
 
 class Surroundings(NamedTuple):
@@ -70,17 +74,63 @@ def surroundings(positions: Floats, reach: float = REACH) -> Surroundings:
 
 def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
     """Yield every rendered mesh: mesh, world matrix, and corners of its world bounding box."""
+    for obj, world_from_object in _rendered():
+        if obj.type == "MESH":
+            yield obj.data, world_from_object, *_box(world_from_object, obj.bound_box)
+
+
+def _rendered() -> Iterator[tuple[Any, Any]]:
+    """Yield every rendered object and instance, and its world matrix."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if not instance.show_self or obj.type != "MESH":
-            continue
         # Particles may show copies of an object that is hidden itself.
-        if obj.hide_render and not instance.is_instance:
-            continue
-        world_from_object = instance.matrix_world.copy()
-        corners = np.array([world_from_object @ Vector(corner) for corner in obj.bound_box])
-        yield obj.data, world_from_object, corners.min(axis=0), corners.max(axis=0)
+        if instance.show_self and (instance.is_instance or not obj.hide_render):
+            yield obj, instance.matrix_world.copy()
+
+
+def _box(world_from_object: Any, corners: Iterable[Any]) -> Floats:
+    """Return the box (2, 3) in the world around an object's own ``corners``."""
+    places = np.array([world_from_object @ Vector(corner) for corner in corners])
+    return np.array([places.min(axis=0), places.max(axis=0)])
+
+
+class Contents(NamedTuple):
+    """What views may show.
+
+    - ``box`` (2, 3): around all that has depth. None without any.
+    - ``without_depth``: boxes (2, 3) around lamps, drawings and volumes, by name.
+    """
+
+    box: Floats | None
+    without_depth: dict[str, Floats]
+
+
+def contents() -> Contents:
+    """Return what the views of the open scene may show, wherever their cameras are."""
+    boxes = []
+    without_depth = {}
+    for obj, world_from_object in _rendered():
+        if obj.type == "LIGHT":
+            # A sun is at no place, and a lamp without a size is too small to be seen.
+            if obj.visible_camera and (size := _lamp_size(obj.data)):
+                corners = list(itertools.product((-size, size), repeat=3))
+                without_depth[str(obj.name_full)] = _box(world_from_object, corners)
+        elif obj.type in _WITHOUT_DEPTH:
+            without_depth[str(obj.name_full)] = _box(world_from_object, obj.bound_box)
+        elif obj.type not in _SHOW_NOTHING:
+            boxes.append(_box(world_from_object, obj.bound_box))
+    if not boxes:
+        return Contents(None, without_depth)
+    low, high = np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]
+    return Contents(np.array([low, high]), without_depth)
+
+
+def _lamp_size(lamp: Any) -> float:
+    """Return a size that a lamp's surface does not exceed, in each direction from its middle."""
+    if lamp.type == "AREA":
+        return float(max(lamp.size, lamp.size_y))
+    return 0.0 if lamp.type == "SUN" else float(lamp.shadow_soft_size)
 
 
 class Enclosure(NamedTuple):

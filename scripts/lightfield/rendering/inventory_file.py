@@ -2,6 +2,7 @@
 
 import os.path
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from lightfield.rendering import (
     pruning,
     scene_memory,
     simulations,
+    unknown_colours,
 )
 from lightfield.rendering.inventory import FEATURES, inventory
 from lightfield.stages import job_settings
@@ -61,7 +63,9 @@ def write_of_datasets(
     it, the inventory does not say how much the scene takes.
     """
     scene_block = written.scene.model_dump() if written else {}
-    layers = blend_file.open_scene(path, scene_block)
+    with tempfile.NamedTemporaryFile() as printed:
+        layers = blend_file.open_scene(path, scene_block, printed=Path(printed.name))
+        unknown = unknown_colours.named_in(printed.read().decode(errors="replace"))
     external_files.refuse_special(path)
     saved_frame = frames.current()
     chosen_frames = rendered_frames(datasets)
@@ -70,10 +74,13 @@ def write_of_datasets(
     contents: dict[str, Any] = {}
     if scene_block.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
+        unknown_to_blender = unknown_colours.of_scene(unknown)
         try:
             contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
+        if unknown_to_blender:
+            contents["blend"]["unknown"] = unknown_to_blender
     if written and written.render and written.render.motion_blur is not None:
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
@@ -83,6 +90,11 @@ def write_of_datasets(
         raise UserError(f"{path}: {error}") from None
     if contents["missing"] and not scene_block.get("allow_missing"):
         raise UserError(_refusal(path, contents["missing"]))
+    unknown_textures = unknown_colours.textures(unknown, contents["textures"])
+    wrong_colours = unknown_colours.refusal(path, unknown_textures, unknown)
+    if wrong_colours and not scene_block.get("allow_missing"):
+        raise UserError(wrong_colours)
+    contents["missing"] += unknown_textures
     if not light.may_be_lit():
         raise UserError(
             f"{path}: has no light, so all views would be black; add a lamp, a material that "

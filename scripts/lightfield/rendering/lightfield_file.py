@@ -1,5 +1,6 @@
 """Makes a dataset's light field from its settings."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,11 @@ from lightfield.stages.rig import MakeLightfield
 def write(job: MakeLightfield) -> None:
     """Write the light field of a job's settings. Raises `UserError` if it lacks a file."""
     settings = job.settings
-    if settings.poses_sha256 and isinstance(settings.rig, rigs.Poses):
-        check_since_plan(settings.rig.file, settings.poses_sha256)
+    if isinstance(settings.rig, rigs.Poses):
+        if settings.poses_sha256:
+            check_since_plan(settings.rig.file, settings.poses_sha256)
+        for warning in settings.rig.warnings():
+            print(f"warning: {warning}", file=sys.stderr)
     if job.calibration:
         render = calibrated(settings.render, job.calibration)
         settings = settings.model_copy(update={"render": render})

@@ -38,7 +38,7 @@ def openusd() -> SimpleNamespace:
     # Only for this import: the folder has other packages, such as OpenImageIO, in other versions.
     sys.path.append(str(folder))
     try:
-        names = ("Ar", "Sdf", "Usd", "UsdGeom", "UsdUtils")
+        names = ("Ar", "Sdf", "Usd", "UsdGeom", "UsdUtils", "Vt")
         return SimpleNamespace(**{name: importlib.import_module(f"pxr.{name}") for name in names})
     finally:
         sys.path.remove(str(folder))
@@ -138,8 +138,8 @@ def _surfaces_left_out(stage: Any) -> list[str]:
     roots = [stage.GetPseudoRoot(), *stage.GetPrototypes()]
     for prim in itertools.chain.from_iterable(map(usd.Usd.PrimRange, roots)):
         type_name = prim.GetTypeName()
-        if type_name == "Mesh" and _lacks_corners(usd.UsdGeom.Mesh(prim)):
-            problem = f"the mesh {prim.GetName()} has faces with corners that do not exist"
+        if type_name == "Mesh" and (fault := _fault(usd.UsdGeom.Mesh(prim))):
+            problem = f"the mesh {prim.GetName()} has {fault}"
         elif type_name in _IMPORTED and prim.IsInstance():
             problem = f"Blender does not import the {type_name} {prim.GetName()}, an instance"
         elif type_name not in _IMPORTED | _NO_SURFACES and prim.IsA(usd.UsdGeom.Gprim):
@@ -153,12 +153,24 @@ def _surfaces_left_out(stage: Any) -> list[str]:
     return sorted(problems)
 
 
-def _lacks_corners(mesh: Any) -> bool:
-    """Return whether faces of a mesh have corners without a place."""
-    earliest = openusd().Usd.TimeCode.EarliestTime()
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(earliest) or (), int)
-    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(earliest) or (), int)
-    if counts.sum() != len(corners):
-        return True
-    places = len(mesh.GetPointsAttr().Get(earliest) or ())
-    return bool(len(corners) and (corners.min() < 0 or corners.max() >= places))
+def _fault(mesh: Any) -> str | None:
+    """Return what is wrong with the faces of a mesh, if anything. Blender leaves such faces out."""
+    usd = openusd()
+    earliest = usd.Usd.TimeCode.EarliestTime()
+    attributes = {
+        mesh.GetFaceVertexCountsAttr(): usd.Vt.IntArray,
+        mesh.GetFaceVertexIndicesAttr(): usd.Vt.IntArray,
+        mesh.GetPointsAttr(): usd.Vt.Vec3fArray,
+    }
+    values = []
+    for attribute, array in attributes.items():
+        value = attribute.Get(earliest)
+        # A file may declare any type.
+        if not isinstance(value, array | None):
+            return f"{attribute.GetName()} of another type than {attribute.GetTypeName()}"
+        values.append(value or ())
+    counts, corners = (np.array(each, int) for each in values[:2])
+    places = len(values[2])
+    exist = not len(corners) or (corners.min() >= 0 and corners.max() < places)
+    fits = counts.sum() == len(corners) and exist
+    return None if fits else "faces with corners that do not exist"

@@ -86,6 +86,7 @@ class CheckCameras(PlainStage):
 
     name = "check_cameras"
     function = "lightfield.rendering.camera_files:write_clearance"
+    version = 2
 
     blend: Path = reads("the scene's .blend")
     lightfield: Path = reads("lightfield.json of the dataset")

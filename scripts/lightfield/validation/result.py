@@ -81,21 +81,33 @@ class Result:
         return f"{self.dataset}: {'valid' if self.valid else 'INVALID'}: {'; '.join(parts)}"
 
     def failures(self) -> list[str]:
-        """Return the first problems of each check, one line each."""
+        """Return the first problems of each check, one line each.
+
+        A failed check without problems has its detail instead.
+        """
         lines = []
         for check in self.checks:
-            shown = check.problems[:_LINES_A_CHECK]
-            if len(check.problems) > len(shown):
-                shown.append(f"… and {len(check.problems) - len(shown)} more")
+            problems = [check.detail] if check.passed is False else []
+            problems = check.problems or problems
+            shown = problems[:_LINES_A_CHECK]
+            if len(problems) > len(shown):
+                shown.append(f"… and {len(problems) - len(shown)} more")
             lines += [f"{self.dataset}: {check.name}: {line}" for line in shown]
         return lines
 
 
 def causes(validation: Mapping[str, Any]) -> str:
-    """Return the first problem of the first failed checks, and the number of other problems."""
-    failed_checks = [check for check in validation["checks"] if check["passed"] is False]
-    parts = [f"{check['name']}: {check['problems'][0]}" for check in failed_checks[:_CAUSES]]
-    other_problems = sum(len(check["problems"]) for check in failed_checks) - len(parts)
+    """Return the first problem of the first failed checks, and the number of other problems.
+
+    A check that names no problem has its detail instead.
+    """
+    problems_by_check = {
+        check["name"]: check["problems"] or [check["detail"]]
+        for check in validation["checks"]
+        if check["passed"] is False
+    }
+    parts = [f"{name}: {problems_by_check[name][0]}" for name in [*problems_by_check][:_CAUSES]]
+    other_problems = sum(map(len, problems_by_check.values())) - len(parts)
     if other_problems:
         parts.append(f"and {other_problems} more")
     return "; ".join(parts)

@@ -29,7 +29,7 @@ from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import File, ImageSet
 from lightfield.formats.lightfield import MACHINE, LightField
-from lightfield.validation import clipping, files, geometry, pixels, splits_check
+from lightfield.validation import clipping, emptiness, files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
@@ -81,7 +81,8 @@ def validate(
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
     checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
-    checks += _clipping_checks(dataset, sets, facts, export_lists)
+    emptiness_checks = _emptiness_checks(sets, facts, clearance, volumes)
+    checks += emptiness_checks or _clipping_checks(dataset, sets, facts, export_lists)
     digests, files_checks = _check_files(dataset, sets, facts, export_files, made or {})
     if len(sets) <= len(reprojections):
         files_checks[0] = _UNLISTED
@@ -100,6 +101,20 @@ _Sums = dict[str, tuple[int, str]]
 
 # Stands for the check of the files while a lightfield.json cannot be read.
 _UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+
+
+def _emptiness_checks(
+    sets: Sequence[ImageSet],
+    facts: Mapping[File, Facts],
+    clearance: Path | None,
+    volumes: Sequence[str],
+) -> list[Check]:
+    """Return a check if no rendered view shows a surface."""
+    rendered_set = layout.rendered(sets)
+    if rendered_set is None:
+        return []
+    views = {file: fact for file, fact in facts.items() if file.is_view and file.set == 0}
+    return emptiness.checks(rendered_set, views, clearance, volumes)
 
 
 def _clipping_checks(

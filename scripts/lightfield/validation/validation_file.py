@@ -12,10 +12,13 @@ from lightfield.core.receipts import made_in
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
-from lightfield.validation import clipping, sequence
+from lightfield.validation import clipping, emptiness, sequence
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import Result
 from lightfield.validation.validate import validate
+
+# The checks whose warnings the terminal shows.
+_SHOWN_WARNINGS = (clipping.NAME, emptiness.NAME)
 
 
 def check(job: Validate) -> Result:
@@ -82,9 +85,9 @@ def _check_paths(job: Validate | ValidateSequence, folder: Path) -> None:
 
 def _print(result: Result) -> None:
     print(result.summary())
-    # The terminal shows lines with this word. No picture of the page shows what is lost.
+    # The terminal shows lines with this word. No picture of the page shows what these lines say.
     for check in result.checks:
-        for warning in check.warnings if check.name == clipping.NAME else ():
+        for warning in check.warnings if check.name in _SHOWN_WARNINGS else ():
             print(f"warning: {warning}", file=sys.stderr)
     for line in result.failures():
         print(line, file=sys.stderr)

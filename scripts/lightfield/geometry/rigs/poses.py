@@ -1,7 +1,8 @@
 """A rig of poses that a file lists.
 
-The file is a lightfield.json, a CSV with angles or quaternions, a transforms.json, or COLMAP's
-images.txt or images.bin. Only its poses are read. The scene YAML gives the lens.
+The file is a lightfield.json, a CSV with angles or quaternions, a transforms.json, COLMAP's
+images.txt or images.bin, or one that `trajectories` reads. Only its poses are read. The scene YAML
+gives the lens.
 """
 
 import csv
@@ -28,13 +29,20 @@ from lightfield.geometry.frames import (
     MIRRORED,
     SKEWED,
     Frame,
-    check_list,
     check_mapping,
     check_name,
     read_frames,
     read_numbers,
 )
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
+from lightfield.geometry.rigs.trajectories import (
+    FORMATS,
+    OPENCV_AXES,
+    read_kubric,
+    read_trajectory,
+    refuse_others,
+    unit,
+)
 from lightfield.geometry.rotations import (
     TOLERANCE,
     Floats,
@@ -49,7 +57,7 @@ CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 _QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 _LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
 # The axes of a camera in our axes, by the camera_convention of a transforms.json.
-_CAMERA_AXES = {"opengl": np.eye(4), "opencv": np.diag([1.0, -1.0, -1.0, 1.0])}
+_CAMERA_AXES = {"opengl": np.eye(4), "opencv": OPENCV_AXES}
 # In bytes. It is enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
 
@@ -88,8 +96,9 @@ class Poses(Rig):
     file: str = Field(
         pattern=pattern(r"\.(json|csv|txt|bin)$", "a path that ends in .json, .csv, .txt or .bin"),
         description="Path of the file with the poses: a lightfield.json, a transforms.json, "
-        "COLMAP's images.txt or images.bin, or a CSV. The CSV's header is name,x,y,z,rx,ry,rz "
-        "(metres and radians) or name,x,y,z,qw,qx,qy,qz.",
+        "COLMAP's images.txt or images.bin, a trajectory of KITTI or TUM (.txt), Kubric's "
+        "metadata.json, or a CSV. The CSV's header is name,x,y,z,rx,ry,rz (metres and radians) or "
+        "name,x,y,z,qw,qx,qy,qz.",
     )
     max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
@@ -101,6 +110,15 @@ class Poses(Rig):
     def lf_type(self) -> str:
         """The type that the file gives."""
         return _read_poses(Path(self.file)).lf_type
+
+    def warnings(self) -> Iterator[str]:
+        """Yield a line if angles of the file are most likely degrees."""
+        largest = np.abs(_read_poses(Path(self.file)).rotations).max()
+        if largest > 2 * math.pi + TOLERANCE:
+            yield (
+                f"{self.file}: its angles reach {largest:.4g}, which is more than a whole turn in "
+                "radians; if they are degrees, convert them to radians"
+            )
 
     def unit_poses(self) -> UnitPoses:
         poses = _read_poses(Path(self.file))
@@ -204,6 +222,7 @@ def _read_csv(path: Path) -> Listing:
         with StringIO(read_text(path), newline="") as file:
             reader = csv.reader(file)
             keys = next(reader, [])
+            _refuse_others(path, keys)
             if keys not in (CSV_HEADER, _QUATERNION_HEADER):
                 raise UserError(
                     f"{path}: row 1: must be {','.join(CSV_HEADER)} (metres, radians) "
@@ -239,8 +258,13 @@ def _read_json(path: Path) -> Listing:
     """Read a lightfield.json or a transforms.json."""
     content = read_json(path)
     frames = content.get("frames") if isinstance(content, dict) else None
+    if isinstance(content, dict) and frames is None:
+        _refuse_others(path, content)
     try:
-        check_list(frames)
+        if isinstance(content, dict) and (kubric := read_kubric(content)):
+            return Listing(Poses.shape, "quaternion", kubric)
+        if not isinstance(frames, list):
+            raise UserError(f"frames: must be a list of views; {FORMATS}")
         first = frames[0] if frames and isinstance(frames[0], dict) else {}
         if "transform_matrix" in first or "transform_matrix_start" in first:
             return Listing(Poses.shape, "transform_matrix", _transforms_frames(content))
@@ -276,7 +300,7 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
         scale = float(read_numbers("applied_scale", content["applied_scale"], ()))
         if scale <= 0:
             raise UserError(f"applied_scale: is {scale:g}; must be above 0")
-    names = []
+    files = []
     world_from_cameras = []
     for index, frame in enumerate(content["frames"]):
         where = f"frames[{index}]"
@@ -288,7 +312,10 @@ def _transforms_frames(content: Mapping[str, Any]) -> list[Frame]:
             )
         key = "transform_matrix"
         world_from_cameras.append(read_numbers(f"{where}: {key}", frame.get(key), (4, 4)))
-        names.append(_view_name(where, frame.get("file_path")))
+        if not isinstance(frame.get("file_path"), str):
+            raise UserError(f"{where}: file_path: must be a text, not {frame.get('file_path')!r}")
+        files.append(frame["file_path"])
+    names = _view_names(files)
     originals = _unapplied(np.array(world_from_cameras) @ _CAMERA_AXES[convention], applied, scale)
     return [
         Frame(f"frames[{index}]", name, world_from_camera)
@@ -323,13 +350,17 @@ def _are_rotations(world_from_cameras: Floats) -> NDArray[np.bool_]:
 
 
 def _read_colmap(path: Path) -> Listing:
-    """Read COLMAP's images.txt or images.bin."""
-    images = _colmap_text(path) if path.suffix == ".txt" else _colmap_binary(path)
+    """Read COLMAP's images.txt or images.bin, or another trajectory in a .txt."""
+    is_text = path.suffix == ".txt"
+    if is_text and (trajectory := read_trajectory(path, read_text(path))):
+        return Listing(Poses.shape, "matrix", trajectory)
+    images = [*(_colmap_text(path) if is_text else _colmap_binary(path))]
+    names = _view_names([image for _, _, image in images])
     frames = []
-    for where, values, image in images:
+    for (where, values, _), name in zip(images, names, strict=True):
         numbers = np.array([_number(path, where, value) for value in values])
         world_from_camera = colmap.world_from_camera(_unit(path, where, numbers[:4]), numbers[4:])
-        frames.append(Frame(where, _view_name(where, image), world_from_camera))
+        frames.append(Frame(where, name, world_from_camera))
     return Listing(Poses.shape, "quaternion", frames)
 
 
@@ -348,7 +379,8 @@ def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[str], str]]:
         where = f"image {number}"
         if len(fields) != 9:
             raise UserError(
-                f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME"
+                f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; "
+                f"{FORMATS}"
             )
         yield where, fields[:7], fields[8]
         may_be_points = True
@@ -384,11 +416,33 @@ def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[float], str]]:
 _READERS = {".csv": _read_csv, ".json": _read_json, ".txt": _read_colmap, ".bin": _read_colmap}
 
 
-def _view_name(where: str, image: Any) -> str:
-    """Return the name of an image file without its folders and suffix."""
-    if not isinstance(image, str):
-        raise UserError(f"{where}: file_path: must be a text, not {image!r}")
-    return re.sub(r"(?i)\.(png|jpe?g|exr|tiff?|webp)$", "", image.rpartition("/")[2])
+def _refuse_others(path: Path, header: Sequence[str] | Mapping[str, Any]) -> None:
+    """Raise `UserError` for a CSV's ``header``, or a JSON, of a known format that is not read."""
+    try:
+        refuse_others(header)
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def _view_names(files: Sequence[str]) -> list[str]:
+    """Return the names of views by the paths of their images, without suffix.
+
+    A name has as many folders before it as all names need to differ: cam0_0001, cam1_0001.
+    """
+    paths = [_parts(file) for file in files]
+    for count in range(1, max(map(len, paths), default=0) + 1):
+        names = ["_".join(parts[-count:]) for parts in paths]
+        if len({*names}) == len(names):
+            return names
+    return [parts[-1] for parts in paths]
+
+
+def _parts(file: str) -> list[str]:
+    """Return the folders of an image's path, and its name without suffix."""
+    stem = re.sub(r"(?i)\.(png|jpe?g|exr|tiff?|webp)$", "", file.replace("\\", "/"))
+    return [part for part in stem.split("/")[:-1] if part not in ("", ".", "..")] + [
+        stem.rpartition("/")[2]
+    ]
 
 
 def _number(path: Path, where: str, value: str | float) -> float:
@@ -404,7 +458,7 @@ def _number(path: Path, where: str, value: str | float) -> float:
 
 def _unit(path: Path, where: str, quaternion: Floats) -> Floats:
     """Return a quaternion (4,) with length 1, because files round it."""
-    length = math.hypot(*quaternion)
-    if not abs(length - 1) <= TOLERANCE:
-        raise UserError(f"{path}: {where}: quaternion: has the length {length:g}; must be 1")
-    return quaternion / length
+    try:
+        return unit(quaternion)
+    except UserError as error:
+        raise UserError(f"{path}: {where}: {error}") from None

@@ -1,0 +1,97 @@
+"""Rigs that see nothing of the scene: warned of before the render, and not valid after it."""
+
+import json
+
+import numpy as np
+import pytest
+from conftest import BLENDER
+from scipy.spatial.transform import Rotation
+from test_users_scenes import write_lightfield
+
+from lightfield.geometry import framing, lenses
+
+LENSES = [
+    {"lens": "rectilinear", "fov": 60, "resolution": [40, 20]},
+    {"lens": "equidistant", "fov": 180, "resolution": [32, 32]},
+    {"lens": "equidistant", "fov": 360, "resolution": [32, 32]},
+    {"lens": "equirectangular", "resolution": [64, 32]},
+]
+BOX = np.array([[-0.2, -0.1, 0], [0.2, 0.1, 0.5]])
+
+
+@pytest.mark.parametrize("camera", LENSES, ids=lambda camera: camera["lens"])
+def test_a_camera_that_sees_a_point_of_a_box_is_never_said_to_miss_it(camera):
+    lens = lenses.from_camera(camera)
+    random = np.random.default_rng(1)
+    cameras = np.tile(np.eye(4), (500, 1, 1))
+    cameras[:, :3, :3] = Rotation.random(500, random_state=1).as_matrix()
+    cameras[:, :3, 3] = random.normal(size=(500, 3)) * random.choice([0.3, 2, 30], (500, 1))
+    points = BOX[0] + random.random((200, 3)) * (BOX[1] - BOX[0])
+    seen = []
+    for pose in cameras:
+        local = (points - pose[:3, 3]) @ pose[:3, :3]
+        seen.append(bool(lens.in_frame(lens.pixels(local)).any()))
+    may_see = framing.may_see(lens, cameras, BOX)
+    assert not (np.array(seen) & ~may_see).any()
+    # Few of the cameras that see nothing are taken for some that do.
+    if camera["lens"] == "rectilinear":
+        assert (~may_see).sum() > 0.8 * (~np.array(seen)).sum()
+
+
+@pytest.fixture(scope="module")
+def folder(run_program, tmp_path_factory):
+    """A folder with the .blend of each scene."""
+    folder = tmp_path_factory.mktemp("users")
+    run_program(BLENDER / "users_scenes.py", folder)
+    return folder
+
+
+def checked(folder, run_program, blend, places, output):
+    """Check cameras that look along y. Return the warnings, and write cameras.json beside."""
+    write_lightfield(output / "lightfield.json", "flat", places, passes=[])
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
+    result = run_program("check_cameras.py", *arguments, "--output", output.parent / "cameras.json")
+    return result.stderr.splitlines()
+
+
+def validated(folder, run_program, blend, output):
+    """Render the views of a light field, and return the validation's status and messages."""
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *arguments, "--output", output / "exr")
+    clearance = ("--clearance", output.parent / "cameras.json")
+    result = run_program("validate.py", output, *clearance, check=False)
+    return result.returncode, result.stderr
+
+
+FAR = [(0, 50, 0), (0.1, 50, 0)]
+
+
+@pytest.mark.slow
+def test_a_rig_far_away_is_warned_of_and_its_dataset_is_not_valid(folder, run_program, tmp_path):
+    (warning,) = checked(folder, run_program, "box", FAR, tmp_path / "far")
+    assert "2 of 2 cameras look past the scene: view_0000f, view_0001f: " in warning
+    assert "it reaches from (-1, -1, -1) to (1, 1, 1) m" in warning
+    assert "the cameras are 50 m from its middle; move the rig" in warning
+    status, said = validated(folder, run_program, "box", tmp_path / "far")
+    assert status == 1
+    assert "surfaces: lightfield.json: no view shows a surface or a light: the scene" in said
+    assert "(-1, -1, -1) to (1, 1, 1) m, and the cameras are 50 m from its middle" in said
+    assert "brighter" not in said
+
+
+@pytest.mark.slow
+def test_a_lamp_in_view_is_something_to_see(folder, run_program, tmp_path):
+    blend = tmp_path / "lamp.blend"
+    run_program(BLENDER / "lamp_scene.py", folder / "box.blend", blend)
+    checked(tmp_path, run_program, "lamp", FAR, tmp_path / "far")
+    assert json.loads((tmp_path / "cameras.json").read_text())["without_depth"] == ["seen"]
+    status, said = validated(tmp_path, run_program, "lamp", tmp_path / "far")
+    assert status == 0
+    assert "warning: no view shows a surface, but maybe seen: the scene reaches" in said
+
+
+@pytest.mark.slow
+def test_a_scene_that_is_too_small_is_warned_of(folder, run_program, tmp_path):
+    places = [(0, -800, 0), (1, -800, 0)]
+    (warning,) = checked(folder, run_program, "box", places, tmp_path / "small")
+    assert "the scene covers at most" in warning and "800 m from its middle" in warning
