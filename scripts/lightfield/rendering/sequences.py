@@ -1,0 +1,55 @@
+"""Finds the files of a numbered sequence that a render reads."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+
+def number_of(file: Path) -> int | None:
+    """Return the number at the end of a file's name. None without a number."""
+    digits = re.search(r"\d+$", file.stem.removesuffix(".bobj"))
+    return int(digits[0]) if digits else None
+
+
+def files_of_volume(volume: Any, first: Path, frames: Sequence[float]) -> list[Path]:
+    """Return the files of a sequence of VDBs that are shown at the ``frames``.
+
+    ``first`` is any file of the sequence, and its name ends with its number.
+    """
+    digits = re.search(r"\d+$", first.stem)
+    if not digits:
+        return [first]
+    render = bpy.context.scene.render
+    # Blender may stretch the time.
+    times = [frame * render.frame_map_new / render.frame_map_old for frame in frames]
+    numbers = {_number_in_volume(volume, math.floor(time)) for time in times}
+    stem = first.stem[: digits.start()]
+    return [
+        first.with_name(f"{stem}{number:0{len(digits[0])}}{first.suffix}")
+        for number in sorted(number for number in numbers if number is not None)
+    ]
+
+
+def _number_in_volume(volume: Any, frame: int) -> int | None:
+    """Return the number of the file that a sequence of VDBs shows at a frame. None for nothing."""
+    length = volume.frame_duration
+    place = frame - volume.frame_start
+    if not length:
+        return None
+    match volume.sequence_mode:
+        case "CLIP" if not 0 <= place < length:
+            return None
+        case "EXTEND":
+            place = min(max(place, 0), length - 1)
+        case "REPEAT":
+            place %= length
+        case "PING_PONG" if length > 1:
+            place %= 2 * (length - 1)
+            place = min(place, 2 * (length - 1) - place)
+        case "PING_PONG":
+            place = 0
+    return int(place + 1 + volume.frame_offset)
