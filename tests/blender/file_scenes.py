@@ -79,6 +79,19 @@ def movies():
         save(suffix)
 
 
+def pictures():
+    new_scene()
+    _, node, _ = textured(cube(), "flip_001.png", "SEQUENCE")
+    node.image_user.frame_duration = FRAMES
+    node.image_user.frame_start = -1
+    for number in range(1, FRAMES + 1):
+        picture = bpy.data.images.new("picture", 4, 4)
+        picture.filepath_raw, picture.file_format = str(FOLDER / f"flip_{number:03}.png"), "PNG"
+        picture.save()
+        bpy.data.images.remove(picture)
+    save("pictures")
+
+
 def alembic():
     new_scene()
     obj = cube()
@@ -244,6 +257,7 @@ def switches(name, is_on):
 
 
 movies()
+pictures()
 alembic()
 mesh_caches()
 imports()

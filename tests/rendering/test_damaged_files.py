@@ -61,6 +61,7 @@ FILES = {
     "mp4": ("mp4.mp4", "texture", "is cut short"),
     "mkv": ("mkv.mkv", "texture", "is cut short"),
     "avi": ("avi.avi", "texture", "is cut short"),
+    "pictures": ("flip_003.png", "texture", "cannot be read"),
     "abc": ("abc.abc", "cache", "is cut short"),
     "mdd": ("mdd.mdd", "modifier's file", "is cut short"),
     "pc2": ("pc2.pc2", "modifier's file", "is cut short"),
@@ -98,6 +99,7 @@ def test_a_damaged_file_is_refused_by_its_name(name, damage, folder, listed):
 @pytest.mark.parametrize(
     ("name", "shown", "other"),
     [
+        ("pictures", "flip_003.png", "flip_005.png"),
         ("sequence", "smoke_003.vdb", "smoke_005.vdb"),
         (
             "cloth",

@@ -135,7 +135,7 @@ def _rendered_files(
         if needed.includes(block, path):
             absolute = bpy.path.abspath(path, library=block.library)
             kind = "shader" if is_shader(block, path) else KINDS[type(block).__name__]
-            for file in _files_at(block, absolute, frames):
+            for file in _files_at(block, absolute, frames, needed):
                 yield kind, block, file
     for obj, folder in _baked_folders():
         for file in _files(obj, folder):
@@ -259,8 +259,11 @@ def _tile(path: str, number: int) -> Path:
     return Path(name.replace("<UVTILE>", f"u{column + 1}_v{row + 1}"))
 
 
-def _files_at(block: Any, path: str, frames: Sequence[float]) -> list[Path]:
+def _files_at(block: Any, path: str, frames: Sequence[float], needed: Needed) -> list[Path]:
     """Return the files that a path stands for at the rendered ``frames``."""
+    if isinstance(block, bpy.types.Image) and block.source == "SEQUENCE":
+        users = needed.image_users(block)
+        return sequences.files_of_image(users, Path(path), frames) or _files(block, path)
     if isinstance(block, bpy.types.Volume) and block.is_sequence:
         return sequences.files_of_volume(block, Path(path), frames)
     files = _files(block, path)

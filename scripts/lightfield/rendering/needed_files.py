@@ -52,6 +52,15 @@ class Needed:
             return any(node in self._nodes and _is_used(node) for node in nodes)
         return bool(block.users > block.use_fake_user)
 
+    def image_users(self, image: Any) -> list[Any]:
+        """Return the settings with which nodes and textures read an image. They choose frames."""
+        readers = [*self._nodes, *self._users[image]]
+        return [
+            reader.image_user
+            for reader in readers
+            if hasattr(reader, "image_user") and reader.image == image
+        ]
+
     def _reads_image(self, user: Any) -> bool:
         """Return whether a user of an image shows it, besides nodes."""
         if isinstance(user, bpy.types.Texture):
