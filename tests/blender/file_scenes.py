@@ -99,9 +99,13 @@ def alembic():
         obj.location.x = frame / FRAMES
         obj.keyframe_insert("location", frame=frame)
     bpy.ops.wm.alembic_export(filepath=str(FOLDER / "abc.abc"), start=1, end=FRAMES)
+    bpy.ops.wm.usd_export(filepath=str(FOLDER / "usdc.usdc"), export_animation=True)
     new_scene()
     bpy.ops.wm.alembic_import(filepath=str(FOLDER / "abc.abc"))
     save("abc")
+    new_scene()
+    bpy.ops.wm.usd_import(filepath=str(FOLDER / "usdc.usdc"))
+    save("usdc")
 
 
 def mesh_caches():

@@ -63,6 +63,7 @@ FILES = {
     "avi": ("avi.avi", "texture", "is cut short"),
     "pictures": ("flip_003.png", "texture", "cannot be read"),
     "abc": ("abc.abc", "cache", "is cut short"),
+    "usdc": ("usdc.usdc", "cache", "is cut short"),
     "mdd": ("mdd.mdd", "modifier's file", "is cut short"),
     "pc2": ("pc2.pc2", "modifier's file", "is cut short"),
     "stl": ("stl.stl", "geometry", "is cut short"),

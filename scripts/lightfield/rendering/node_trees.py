@@ -27,8 +27,7 @@ def contributing(node: Any) -> Iterator[Any]:
         yield node
         if getattr(node, "node_tree", None):
             pending += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
-        # The end of a zone, such as a simulation, has no link from its start.
-        pending += [n for n in node.id_data.nodes if _end_of_zone(n) == node]
+        pending += _starts_of_zone(node)
 
 
 def _sockets(node: Any) -> list[Any]:
@@ -36,5 +35,8 @@ def _sockets(node: Any) -> list[Any]:
     return [link.from_socket for link in node.internal_links] if node.mute else list(node.inputs)
 
 
-def _end_of_zone(node: Any) -> Any:
-    return getattr(node, "paired_output_node", None)
+def _starts_of_zone(node: Any) -> list[Any]:
+    """Return the start of a zone, such as a simulation, from its end. No link leads there."""
+    if "Output" not in node.bl_idname:
+        return []
+    return [n for n in node.id_data.nodes if getattr(n, "paired_output_node", None) == node]
