@@ -192,7 +192,8 @@ class Origin(Settings):
     allow_missing: bool | None = Field(
         None,
         description="Render even if files of the .blend or model are missing or cannot be read: "
-        "textures, fonts, libraries, volumes or caches. Missing textures are magenta.",
+        "textures, fonts, libraries, volumes or caches. Missing textures are magenta. A damaged "
+        "Alembic file stays an error.",
     )
     shared_folder: SharedFolder | None = Field(
         None,

@@ -1,6 +1,7 @@
 """Walks through the nodes whose results can reach an output."""
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 
@@ -9,6 +10,7 @@ def contributing(node: Any) -> Iterator[Any]:
 
     A muted link passes nothing on. A muted node is not yielded: it only passes inputs on.
     """
+    links_of_trees: dict[Any, Mapping[Any, Sequence[Any]]] = {}
     visited = set()
     pending = [node]
     while pending:
@@ -16,23 +18,28 @@ def contributing(node: Any) -> Iterator[Any]:
         if node in visited:
             continue
         visited.add(node)
-        pending += [
-            link.from_node
-            for socket in _sockets(node)
-            for link in socket.links
-            if not link.is_muted
-        ]
+        tree = node.id_data
+        if tree not in links_of_trees:
+            links_of_trees[tree] = _links_by_target(tree)
+        links = links_of_trees[tree].get(node, ())
         if node.mute:
+            passed_on = {link.from_socket for link in node.internal_links}
+            pending += [link.from_node for link in links if link.to_socket in passed_on]
             continue
+        pending += [link.from_node for link in links]
         yield node
         if getattr(node, "node_tree", None):
             pending += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
         pending += _starts_of_zone(node)
 
 
-def _sockets(node: Any) -> list[Any]:
-    """Return the inputs of a node that can change its outputs."""
-    return [link.from_socket for link in node.internal_links] if node.mute else list(node.inputs)
+def _links_by_target(tree: Any) -> Mapping[Any, Sequence[Any]]:
+    """Return the links into each node of a tree. Blender itself searches all for each socket."""
+    links = defaultdict(list)
+    for link in tree.links:
+        if not link.is_muted:
+            links[link.to_node].append(link)
+    return links
 
 
 def _starts_of_zone(node: Any) -> list[Any]:
