@@ -223,6 +223,10 @@ def cloth():
     with bpy.context.temp_override(scene=scene, active_object=obj, point_cache=cache):
         bpy.ops.ptcache.bake(bake=True)
     save("cloth")
+    name = obj.name.encode().hex().upper()
+    cache.use_external = True
+    cache.filepath, cache.name, cache.index = "//blendcache_cloth/", name, 0
+    save("external")
 
 
 def switches(name, is_on):

@@ -75,6 +75,7 @@ FILES = {
     "sequence": ("smoke_003.vdb", "volume", "may be cut short"),
     "ies": ("ies.ies", "light profile", "is cut short"),
     "osl": ("osl.osl", "shader", "cannot be compiled"),
+    "external": ("blendcache_cloth/7361696C_000001_00.bphys", "simulation", "is cut short"),
     "cloth": ("blendcache_cloth/7361696C_000001_00.bphys", "simulation", "is cut short"),
 }
 
@@ -114,6 +115,12 @@ def test_only_the_frames_that_are_shown_must_exist(name, shown, other, folder, l
     assert listed(name)["missing"] == []
     (folder / shown).unlink()
     assert f" at {folder / shown} (missing)" in listed(name)
+
+
+@pytest.mark.parametrize("name", ["cloth", "external"])
+def test_the_missing_folder_of_a_simulation_is_named_once(name, folder, listed):
+    shutil.rmtree(folder / "blendcache_cloth")
+    assert listed(name).count(f"{folder / 'blendcache_cloth'} (missing)") == 1
 
 
 def test_a_file_that_no_pixel_needs_may_be_missing(folder, listed):

@@ -132,7 +132,7 @@ def _rendered_files(
     """Yield the files that a render reads, with their kinds and the data-blocks that name them."""
     needed = Needed(shaders)
     for block, path in _blocks_and_paths():
-        if needed.includes(block, path):
+        if needed.includes(block, path) and not _is_external_cache(block, path):
             absolute = bpy.path.abspath(path, library=block.library)
             kind = "shader" if is_shader(block, path) else KINDS[type(block).__name__]
             for file in _files_at(block, absolute, frames, needed):
@@ -142,6 +142,13 @@ def _rendered_files(
             # The folder may hold caches of other objects.
             if file.suffix == ".json":
                 yield KINDS["Object"], obj, file
+
+
+def _is_external_cache(block: Any, path: str) -> bool:
+    """Return whether a path is the folder of a simulation, of which only some files are read."""
+    return isinstance(block, bpy.types.Object) and any(
+        cache.use_external and cache.filepath == path for cache in caches_of(block)
+    )
 
 
 def _cached_frames(frames: Sequence[float]) -> Iterator[tuple[str, Any, Path]]:
