@@ -139,7 +139,10 @@ bpy.context.scene.collection.objects.link(wanted.objects[0])
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=False)
 
 tree = bpy.data.node_groups.new("tree", "GeometryNodeTree")
-tree.nodes.new("GeometryNodeImportSTL").inputs[0].default_value = folder + "/leaf.stl"
+tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+leaf = tree.nodes.new("GeometryNodeImportSTL")
+leaf.inputs[0].default_value = folder + "/leaf.stl"
+tree.links.new(leaf.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
 room.build({})
 bpy.data.objects["cone"].modifiers.new("tree", "NODES").node_group = tree
 tree = bpy.data.node_groups.new("any tree", "GeometryNodeTree")

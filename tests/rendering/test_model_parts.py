@@ -335,6 +335,17 @@ def test_a_file_in_the_shared_folder_is_read_and_recorded(tmp_path, monkeypatch,
         assert record["box"][1][0] == pytest.approx(7)
 
 
+DOME = 'def DomeLight "sky" {\n    asset inputs:texture:file = @./place.png@\n}\n'
+
+
+def test_the_picture_of_a_light_may_be_missing_unless_a_texture_names_it_too(tmp_path):
+    """Lights of a model are not imported."""
+    model = written(tmp_path / "a.usda", usd(DOME))
+    assert [entry["path"] for entry in imported(model)["external_files"]] == ["a.usda"]
+    written(model, usd(DOME + TEXTURED.replace("NAME", "./place.png")))
+    assert "place.png" in refusal(model)
+
+
 @pytest.mark.parametrize("suffix", ["usdc", "usdz"])
 @pytest.mark.parametrize("case", ["usd reference", "usd sublayer", "usd texture"])
 def test_binary_usd_and_archives_obey_the_same_rule(tmp_path, monkeypatch, case, suffix):

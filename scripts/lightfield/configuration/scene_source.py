@@ -193,7 +193,8 @@ class Origin(Settings):
         None,
         description="Render even if files of the .blend or model are missing or cannot be read: "
         "textures, fonts, libraries, volumes or caches. Missing textures are magenta. Also render "
-        "textures whose colour space Blender lacks, as they are.",
+        "textures whose colour space Blender lacks, as they are. A damaged Alembic file stays an "
+        "error.",
     )
     shared_folder: SharedFolder | None = Field(
         None,

@@ -1,19 +1,23 @@
 """Lists the files that a .blend reads for its pixels, and finds what is wrong with them."""
 
 import glob
+import math
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import listed, special_kind
+from lightfield.core.files import check_readable, listed, special_kind
 from lightfield.core.paths import files_below
-from lightfield.imaging.images import is_readable
-from lightfield.rendering.blend_file import path_of
+from lightfield.rendering import point_caches, sequences
+from lightfield.rendering.blend_file import new_scene, path_of
+from lightfield.rendering.file_readers import DamagedError, check
+from lightfield.rendering.needed_files import Needed, format_of, is_shader, paths_of_inputs
+from lightfield.rendering.point_caches import cache_folder, caches_of
 from lightfield.rendering.quiet import quiet
 
 # The kind of a file by the type of the data-block that reads it. Sounds, texts (scripts) and movie
@@ -40,6 +44,10 @@ KINDS = {
 }
 
 
+# A file that is missing or cannot be read: its kind, name, path and problem.
+Missing = dict[str, str]
+
+
 def external_files() -> list[dict[str, Any]]:
     """Return each file that the open .blend reads: ``path`` from its folder, size, time, SHA-256.
 
@@ -63,33 +71,92 @@ def refuse_special(blend: Path) -> None:
                 )
 
 
-def problems(images: Collection[Any]) -> list[dict[str, str]]:
-    """Return the scene's files that are missing or cannot be read.
+def refuse_damaged_alembic(blend: Path) -> None:
+    """Raise `UserError` if an Alembic file of a .blend is damaged. Blender crashes on opening it.
+
+    Reads nothing else from the .blend. Opens an empty scene.
+    """
+    check_readable(blend)
+    new_scene()
+    try:
+        with quiet(), bpy.data.libraries.load(str(blend)) as (content, wanted):
+            wanted.cache_files = content.cache_files
+    except (OSError, RuntimeError):
+        # Opening it says what is wrong.
+        return
+    caches = [
+        (cache.name, Path(os.path.normpath(bpy.path.abspath(cache.filepath))))
+        for cache in bpy.data.cache_files
+    ]
+    # Blender would read them when it updates the scene.
+    bpy.data.batch_remove(bpy.data.cache_files)
+    for name, file in caches:
+        if file.suffix.lower() != ".abc" or not file.is_file():
+            continue
+        try:
+            check("abc", file)
+        except DamagedError as error:
+            raise UserError(
+                f"{blend}: the cache {name} at {file} ({error.problem}); Blender would crash on "
+                "it; export it again"
+            ) from None
+
+
+def problems(shaders: Sequence[Any], frames: Sequence[float]) -> list[Missing]:
+    """Return the files that are missing or cannot be read, and that a render reads.
 
     Each entry has the ``kind`` and ``name`` of the data-block that reads the file. It also has the
-    ``path`` from the .blend's folder, and the ``problem``. An image counts only if it is in
-    ``images`` (read by shading), or if a modifier reads it.
+    ``path`` from the .blend's folder, and the ``problem``. ``shaders`` are the materials, worlds
+    and lights that are rendered, at the ``frames``.
     """
     home = Path(bpy.data.filepath).parent
-    users = bpy.data.user_map()
-    problem_entries = []
-
-    def note(block: Any, kind: str, path: Path, problem: str) -> None:
-        name = {"kind": kind, "name": block.name}
-        problem_entries.append(name | {"path": _from(home, path), "problem": problem})
-
-    for block, path in _blocks_and_absolute_paths():
-        if not _is_needed(block, images, users):
-            continue
-        for file in _files(block, path):
-            problem = _problem(block, file)
-            if problem:
-                note(block, KINDS[type(block).__name__], file, problem)
-    for block in users:
+    problem_entries = {
+        (kind, _from(home, file), block.name): problem
+        for kind, block, file in [*_rendered_files(shaders, frames), *_cached_frames(frames)]
+        if (problem := _problem(block, file))
+    }
+    for block in bpy.data.user_map():
         if block.library and block.is_missing and path_of(block.library).is_file():
-            library = path_of(block.library)
-            note(block, f"linked {type(block).__name__.lower()}", library, "not in its library")
-    return sorted(problem_entries, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
+            kind = f"linked {type(block).__name__.lower()}"
+            path = _from(home, path_of(block.library))
+            problem_entries[kind, path, block.name] = "not in its library"
+    return [
+        {"kind": kind, "name": name, "path": path, "problem": problem}
+        for (kind, path, name), problem in sorted(problem_entries.items())
+    ]
+
+
+def _rendered_files(
+    shaders: Sequence[Any], frames: Sequence[float]
+) -> Iterator[tuple[str, Any, Path]]:
+    """Yield the files that a render reads, with their kinds and the data-blocks that name them."""
+    needed = Needed(shaders)
+    for block, path in _blocks_and_paths():
+        if needed.includes(block, path) and not _is_external_cache(block, path):
+            absolute = bpy.path.abspath(path, library=block.library)
+            kind = "shader" if is_shader(block, path) else KINDS[type(block).__name__]
+            for file in _files_at(block, absolute, frames, needed):
+                yield kind, block, file
+    for obj, folder in _baked_folders():
+        for file in _files(obj, folder):
+            # The folder may hold caches of other objects.
+            if file.suffix == ".json":
+                yield KINDS["Object"], obj, file
+
+
+def _is_external_cache(block: Any, path: str) -> bool:
+    """Return whether a path is the folder of a simulation, of which only some files are read."""
+    return isinstance(block, bpy.types.Object) and any(
+        cache.use_external and cache.filepath == path for cache in caches_of(block)
+    )
+
+
+def _cached_frames(frames: Sequence[float]) -> Iterator[tuple[str, Any, Path]]:
+    """Yield the frames of simulations that a render reads from the disk."""
+    for obj in bpy.data.objects:
+        for file in point_caches.files(obj, frames):
+            # One folder stands for all that it lacks.
+            yield "simulation", obj, file if file.parent.is_dir() else file.parent
 
 
 def check_reachable(blend: Path, files: Iterable[Mapping[str, Any]]) -> None:
@@ -132,42 +199,33 @@ def _blocks_and_paths() -> Iterator[tuple[Any, str]]:
     # Blender lists paths inside nodes, but no paths in the inputs of a modifier.
     for obj in bpy.data.objects:
         for modifier in _node_modifiers(obj):
-            tree = modifier.node_group
-            for item in tree.interface.items_tree if tree else ():
-                if getattr(item, "subtype", None) != "FILE_PATH":
-                    continue
-                path = _modifier_input(modifier, item.identifier)
-                if path:
-                    yield obj, path
+            for path in paths_of_inputs(modifier):
+                yield obj, path
 
 
 def _node_modifiers(obj: Any) -> list[Any]:
     return [modifier for modifier in obj.modifiers if modifier.type == "NODES"]
 
 
-def _modifier_input(modifier: Any, identifier: str) -> str:
-    """Return the text of an input of a geometry nodes modifier."""
-    # Blender 5.2 keeps the inputs in `properties`.
-    inputs = getattr(modifier, "properties", None)
-    return str(getattr(inputs.inputs, identifier).value if inputs else modifier[identifier])
-
-
 def _blocks_and_absolute_paths() -> Iterator[tuple[Any, str]]:
     """Yield each data-block that reads a file or a cache's folder, and the absolute path."""
     for block, path in _blocks_and_paths():
         yield block, bpy.path.abspath(path, library=block.library)
+    yield from _baked_folders()
     for obj in bpy.data.objects:
-        folder = _cache_folder(obj)
-        caches = [getattr(modifier, "point_cache", None) for modifier in obj.modifiers]
-        caches += [system.point_cache for system in obj.particle_systems]
-        if any(cache and cache.use_disk_cache and not cache.use_external for cache in caches):
-            yield obj, str(folder)
+        if any(cache.use_disk_cache and not cache.use_external for cache in caches_of(obj)):
+            yield obj, str(cache_folder(obj))
+
+
+def _baked_folders() -> Iterator[tuple[Any, str]]:
+    """Yield each object with geometry nodes that are baked on the disk, and the bakes' folders."""
+    for obj in bpy.data.objects:
         for modifier in _node_modifiers(obj):
             bake_folders = {modifier.bake_directory}
             bake_folders.update(bake.directory for bake in modifier.bakes)
             bake_folders.discard("")
             if modifier.bakes:
-                bake_folders.add(str(folder))
+                bake_folders.add(str(cache_folder(obj)))
             for bake_folder in sorted(bake_folders):
                 path = bpy.path.abspath(bake_folder, library=obj.library)
                 # A bake may be in the .blend itself.
@@ -175,28 +233,15 @@ def _blocks_and_absolute_paths() -> Iterator[tuple[Any, str]]:
                     yield obj, path
 
 
-def _cache_folder(obj: Any) -> Path:
-    """Return the folder beside an object's .blend where Blender keeps its caches on disk."""
-    blend = path_of(obj.library) if obj.library else Path(bpy.data.filepath)
-    return blend.parent / f"blendcache_{blend.stem}"
-
-
 def _is_cache_folder(obj: Any, path: str) -> bool:
     absolute = bpy.path.abspath(path, library=obj.library)
-    return bool(os.path.normpath(absolute) == os.path.normpath(_cache_folder(obj)))
+    return bool(os.path.normpath(absolute) == os.path.normpath(cache_folder(obj)))
 
 
 def _is_packed(block: Any) -> bool:
     if isinstance(block, bpy.types.Image):
         return bool(block.packed_files) or block.source in ("GENERATED", "VIEWER")
     return isinstance(block, bpy.types.Library) or bool(getattr(block, "packed_file", None))
-
-
-def _is_needed(block: Any, images: Collection[Any], users: Mapping[Any, Any]) -> bool:
-    if isinstance(block, bpy.types.Image):
-        modifiers = (bpy.types.Texture, bpy.types.GeometryNodeTree)
-        return block in images or any(isinstance(user, modifiers) for user in users[block])
-    return isinstance(block, bpy.types.Library) or block.users > block.use_fake_user
 
 
 def _files(block: Any, path: str) -> list[Path]:
@@ -221,25 +266,32 @@ def _tile(path: str, number: int) -> Path:
     return Path(name.replace("<UVTILE>", f"u{column + 1}_v{row + 1}"))
 
 
+def _files_at(block: Any, path: str, frames: Sequence[float], needed: Needed) -> list[Path]:
+    """Return the files that a path stands for at the rendered ``frames``."""
+    if isinstance(block, bpy.types.Image) and block.source == "SEQUENCE":
+        users = needed.image_users(block)
+        return sequences.files_of_image(users, Path(path), frames) or _files(block, path)
+    if isinstance(block, bpy.types.Volume) and block.is_sequence:
+        return sequences.files_of_volume(block, Path(path), frames)
+    files = _files(block, path)
+    if Path(path).is_dir():
+        # It holds the cache of a fluid.
+        wholes = {math.floor(frame) for frame in frames}
+        return [file for file in files if sequences.number_of(file) in {None, *wholes}]
+    return files
+
+
 def _problem(block: Any, path: Path) -> str | None:
     """Return the problem of a file, or None. Blender itself would only print it."""
     if not path.exists():
         return "missing"
-    if path.is_dir() and not isinstance(block, bpy.types.Object):
-        return "is a folder"
-    readable = True
-    if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
-        # Do not let Blender read it: 5.0 crashes on some broken EXRs.
-        readable = is_readable(path)
-    elif isinstance(block, bpy.types.Volume):
-        readable = block.grids.load()
-    elif isinstance(block, bpy.types.VectorFont):
-        try:
-            with quiet():
-                bpy.data.fonts.remove(bpy.data.fonts.load(str(path)))
-        except RuntimeError:
-            readable = False
-    return None if readable else "cannot be read"
+    if path.is_dir():
+        return None if isinstance(block, bpy.types.Object) else "is a folder"
+    try:
+        check(format_of(block, path), path)
+    except DamagedError as error:
+        return error.problem
+    return None
 
 
 def _from(home: Path, path: Path) -> str:

@@ -1,13 +1,14 @@
 """Lists what a scene contains: geometry, materials, textures, animation, and external files."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import bpy
 import numpy as np
 
 from lightfield.rendering import animation, cycles, frames, modifiers, motion_blur, pruning
-from lightfield.rendering.external_files import external_files, problems
+from lightfield.rendering.external_files import Missing, external_files, problems
+from lightfield.rendering.node_trees import contributing
 from lightfield.rendering.render_graph import in_render
 
 # The feature that a shader node gives a material. The Principled BSDF gives them by its inputs.
@@ -44,10 +45,13 @@ _IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
 MOST_FRAMES = 8
 
 
-def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
+def inventory(
+    rendered_frames: Sequence[float], refuse: Callable[[Sequence[Missing]], None] | None = None
+) -> dict[str, Any]:
     """Return what the open scene contains at any frame. Removes all else from the open file.
 
-    Objects and triangles are counted at the ``rendered_frames``.
+    Objects and triangles are counted at the ``rendered_frames``. If files are missing or cannot be
+    read, ``refuse`` gets them before Blender evaluates the scene with them.
     """
     scene = bpy.context.scene
     hidden = pruning.removable_objects()
@@ -70,6 +74,9 @@ def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
     worlds = {world for world in (scene.world, layer.world_override) if world}
     materials = rendered_materials()
     lights = {obj.data for obj in objects if obj.type == "LIGHT"}
+    missing = problems([*materials, *worlds, *lights], rendered_frames)
+    if missing and refuse:
+        refuse(missing)
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
     for shader in (*materials, *worlds, *lights):
@@ -95,7 +102,7 @@ def inventory(rendered_frames: Sequence[float]) -> dict[str, Any]:
         **changing,
         "motion_blur": motion_blur.is_on(),
         "external_files": external_files(),
-        "missing": problems(images),
+        "missing": missing,
     }
 
 
@@ -169,21 +176,6 @@ def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
                 socket = node.inputs[name]
                 if socket.is_linked or socket.default_value != without or _is_animated(socket):
                     yield feature, None
-
-
-def contributing(node: Any) -> Iterator[Any]:
-    """Yield every node whose result can reach ``node``, also nodes inside groups."""
-    visited = set()
-    pending = [node]
-    while pending:
-        node = pending.pop()
-        if node in visited:
-            continue
-        visited.add(node)
-        yield node
-        pending += [link.from_node for socket in node.inputs for link in socket.links]
-        if getattr(node, "node_tree", None):
-            pending += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
 
 
 def _is_animated(socket: Any) -> bool:

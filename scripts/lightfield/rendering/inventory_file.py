@@ -4,6 +4,7 @@ import os.path
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,7 @@ def write_of_datasets(
     it, the inventory does not say how much the scene takes.
     """
     scene_block = written.scene.model_dump() if written else {}
+    external_files.refuse_damaged_alembic(path)
     with tempfile.NamedTemporaryFile() as printed:
         layers = blend_file.open_scene(path, scene_block, printed=Path(printed.name))
         unknown = unknown_colours.named_in(printed.read().decode(errors="replace"))
@@ -84,12 +86,11 @@ def write_of_datasets(
     if written and written.render and written.render.motion_blur is not None:
         motion_blur.turn(written.render.motion_blur)
     _refuse_fluids(path)
+    refuse = None if scene_block.get("allow_missing") else partial(_refuse_missing, path)
     try:
-        contents |= inventory(shown_frames)
+        contents |= inventory(shown_frames, refuse)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
-    if contents["missing"] and not scene_block.get("allow_missing"):
-        raise UserError(_refusal(path, contents["missing"]))
     unknown_textures = unknown_colours.textures(unknown, contents["textures"])
     wrong_colours = unknown_colours.refusal(path, unknown_textures, unknown)
     if wrong_colours and not scene_block.get("allow_missing"):
@@ -160,16 +161,16 @@ def _refuse_fluids(path: Path) -> None:
         )
 
 
-def _refusal(path: Path, problems: list[dict[str, str]]) -> str:
-    """Return which files of a .blend are missing or cannot be read, and what to do about them."""
+def _refuse_missing(path: Path, problems: Sequence[external_files.Missing]) -> None:
+    """Raise `UserError`: files of a .blend are missing or cannot be read. Say what to do."""
     descriptions = []
     for entry in problems[:8]:
         file = Path(os.path.normpath(path.parent / entry["path"]))
         place = f"{file} ({entry['problem']}){case_hint(file)}"
         descriptions.append(f"the {entry['kind']} {entry['name']} at {place}")
     more = " …" if len(problems) > 8 else ""
-    return (
-        f"{path}: {len(problems)} of the files that it shows are missing or cannot be read: "
+    raise UserError(
+        f"{len(problems)} of the files that it shows are missing or cannot be read: "
         f"{'; '.join(descriptions)}{more}; mend them, pack them into the "
         ".blend (in Blender: File, External Data), or render without them: scene: "
         "{allow_missing: true}"

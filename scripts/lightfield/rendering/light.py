@@ -7,7 +7,8 @@ import numpy as np
 
 from lightfield.formats.light_groups import WORLD
 from lightfield.rendering import animation
-from lightfield.rendering.inventory import contributing, rendered_materials
+from lightfield.rendering.inventory import rendered_materials
+from lightfield.rendering.node_trees import contributing
 from lightfield.rendering.render_graph import in_render
 
 # The inputs of shader nodes that emit light if none of them is 0: colour and strength.

@@ -9,7 +9,8 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from lightfield.core.names import LIGHTS, SOFTBOXES
-from lightfield.rendering.inventory import contributing, rendered_materials
+from lightfield.rendering.inventory import rendered_materials
+from lightfield.rendering.node_trees import contributing
 
 # Each lamp has a direction from the model, as azimuth (0 is +X) and elevation in degrees, and an
 # irradiance at the model in W/m². The model's front is towards −Y.

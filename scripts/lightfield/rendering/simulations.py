@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 
 from lightfield.rendering import animation, frames
+from lightfield.rendering.point_caches import point_caches
 from lightfield.rendering.render_graph import in_render
 
 
@@ -65,7 +66,7 @@ def _unbaked(frame: float) -> Iterator[tuple[Any, str, int]]:
         for modifier in obj.modifiers:
             if not modifier.show_render:
                 continue
-            for kind, cache in _point_caches(modifier):
+            for kind, cache in point_caches(modifier):
                 if not cache.is_baked:
                     yield obj, kind, cache.frame_start
             if modifier.type == "NODES":
@@ -78,23 +79,6 @@ def _is_moved(obj: Any) -> bool:
     """Return whether the rigid-body simulation moves an object at some frame."""
     body = obj.rigid_body
     return body.type == "ACTIVE" and (not body.kinematic or animation.is_animated(obj))
-
-
-def _point_caches(modifier: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the kind and the cache of each simulation of a modifier that has a point cache."""
-    if modifier.type in ("CLOTH", "SOFT_BODY"):
-        yield modifier.name, modifier.point_cache
-    elif modifier.type == "PARTICLE_SYSTEM":
-        system = modifier.particle_system
-        settings = system.settings
-        # Hair without dynamics stands still, and particles without physics need no past.
-        is_hair = settings.type == "HAIR"
-        if system.use_hair_dynamics if is_hair else settings.physics_type != "NO":
-            yield f"{'hair' if is_hair else 'particles'} {system.name}", system.point_cache
-    elif modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings:
-        for surface in modifier.canvas_settings.canvas_surfaces:
-            if surface.is_active and surface.is_cache_user:
-                yield f"dynamic paint {surface.name}", surface.point_cache
 
 
 def _first_simulated_frame(modifier: Any) -> int | None:

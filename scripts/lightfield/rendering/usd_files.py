@@ -8,6 +8,7 @@ import itertools
 import os
 import re
 import sys
+from collections.abc import Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -72,6 +73,8 @@ def survey(path: Path) -> Survey:
         ) from None
     except UnicodeError:
         raise UserError(f"{path}: names a file by bytes that are not UTF-8; rename it") from None
+    lights = _names_of_lights(stage)
+    references = [each for each in references if each.name not in lights]
     # An expression may name a layer, and a layer may be in a format of another library.
     noted = {reference.path for reference in references}
     for file in {_file(each.realPath) for each in [*layers, *stage.GetUsedLayers()]}:
@@ -130,13 +133,30 @@ def _composition_errors(path: Path, stage: Any) -> list[str]:
     return sorted(messages)
 
 
+def _names_of_lights(stage: Any) -> set[str]:
+    """Return the files that only lights name, such as an environment's. No light is imported."""
+    earliest = openusd().Usd.TimeCode.EarliestTime()
+    names: dict[bool, set[str]] = {True: set(), False: set()}
+    for prim in _prims(stage):
+        is_light = re.search(r"Light(_\d+)?$", str(prim.GetTypeName())) is not None
+        attributes = [
+            each for each in prim.GetAuthoredAttributes() if each.GetTypeName() == "asset"
+        ]
+        names[is_light] |= {value.path for each in attributes if (value := each.Get(earliest))}
+    return names[True] - names[False]
+
+
+def _prims(stage: Any) -> Iterator[Any]:
+    """Yield the prims of a stage, and of its instances, which the stage's own do not include."""
+    roots = [stage.GetPseudoRoot(), *stage.GetPrototypes()]
+    return itertools.chain.from_iterable(map(openusd().Usd.PrimRange, roots))
+
+
 def _surfaces_left_out(stage: Any) -> list[str]:
     """Return the visible surfaces of a stage that Blender does not import, or not as they are."""
     usd = openusd()
     problems = []
-    # The stage's own prims do not include the prims of instances.
-    roots = [stage.GetPseudoRoot(), *stage.GetPrototypes()]
-    for prim in itertools.chain.from_iterable(map(usd.Usd.PrimRange, roots)):
+    for prim in _prims(stage):
         type_name = prim.GetTypeName()
         if type_name == "Mesh" and (fault := _fault(usd.UsdGeom.Mesh(prim))):
             problem = f"the mesh {prim.GetName()} has {fault}"
