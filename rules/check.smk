@@ -17,7 +17,6 @@ from lightfield.core.receipts import (
     FOLDER as FOLDER_OF_RECEIPTS,
     SUFFIX,
     make_way,
-    name_of,
 )
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
@@ -222,7 +221,7 @@ def expression_of(job):
     )
 
 
-CHECK = JobCheck(Path(WORK), wanted_settings, VERSIONS)
+CHECK = JobCheck(Path(WORK), Path(RESULTS), wanted_settings, VERSIONS)
 if IS_MAIN_PROCESS:
     # The next plan need not read the same files again.
     atexit.register(CHECK.sums.save)
@@ -240,12 +239,11 @@ def scene_folders():
 
 def check_folders():
     """Raise `UserError` if the receipts are of files in other folders than the chosen ones."""
-    chosen = tuple(f"{name_of(folder)}/" for folder in (RESULTS, WORK))
     for receipt, verdict in CHECK.verdicts.items():
-        if verdict.example and not verdict.example.startswith(chosen):
+        if verdict.elsewhere:
             raise config_mistake(
                 f"results: is {RESULTS}, and work is {WORK}, but {receipt} is the receipt of "
-                f"{verdict.example}: after a move, leave a link in the old place, and keep the key; "
+                f"{verdict.elsewhere}: after a move, leave a link in the old place, and keep the key; "
                 "a second build needs a folder work of its own"
             )
 

@@ -40,9 +40,11 @@ from lightfield.core.files import (
     read_json_lines,
     read_problem,
     set_aside,
+    size_and_time,
     unreadable,
     writing,
 )
+from lightfield.core.paths import is_normal
 
 FOLDER = "receipts"
 """The folder of all receipts, in the workflow's folder of intermediate files."""
@@ -155,7 +157,9 @@ def _sorted(lines: Iterable[dict[str, Any]]) -> tuple[dict[str, Output], list[di
                 _checked(line["bytes"], int),
                 _checked(line["modified_ns"], int),
             )
-            outputs[_checked(line["file"], str)] = Output(stamp, line.get("key"))
+            if not is_normal(line["file"]):
+                raise ValueError("is not a path in normal form")
+            outputs[line["file"]] = Output(stamp, line.get("key"))
         else:
             history.append(line)
     return outputs, history
@@ -260,8 +264,9 @@ def damaged(path: str | Path) -> UserError:
 
     So the next plan compares its bytes, also if its size and its time were those in the receipt.
     """
-    with suppress(OSError):
-        Path(path).touch()
+    if size_and_time(path):
+        with suppress(OSError):
+            os.utime(path)
     return UserError(f"{path}: is not as its job made it; the next run makes it again")
 
 
@@ -352,6 +357,8 @@ class OpenReceipt:
         header = {"stage": earlier.stage, "version": earlier.version, "settings": earlier.settings}
         return (
             header == self._header
+            # Another program wrote the line of a file that the job does not make.
+            and all(self._own_name(path) == path for path in earlier.outputs)
             and self.inputs.items() <= earlier.inputs.items()
             and all(
                 name in self.inputs or input_sum(name) == digest
