@@ -86,6 +86,7 @@ def reads(job, stage=None, are_noted=False, **inputs):
             made = (f"{RESULTS}/{name}", f"{WORK}/{name}", log_of(name), times_of(name))
             for path in (*made, receipt):
                 end_unless_writable(os.path.dirname(path))
+            wait_until_past([receipt, log_of(name), times_of(name)])
         if not os.path.exists(MARK):
             new_mark()
         files = {name: unless_newer(receipt, each) for name, each in files.items()}

@@ -1,7 +1,10 @@
 """Old results are used for what they are: in copies, with new times, and from older versions."""
 
 import os
+import re
 import shutil
+import subprocess
+import time
 
 import bookkeeping
 import pytest
@@ -73,6 +76,45 @@ def test_new_times_run_nothing(tiny_build, without_notes):
     ):
         os.utime(tiny_build / name)
         assert NOTHING in plan(tiny_build), name
+
+
+def spoil_a_view(folder):
+    content = bytearray((folder / tiny.VIEW).read_bytes())
+    content[-1] ^= 1
+    (folder / tiny.VIEW).write_bytes(content)
+
+
+def change_samples(folder):
+    tiny.edit(folder, "samples: 4", "samples: 3")
+
+
+@pytest.mark.parametrize("change", [spoil_a_view, change_samples])
+def test_files_of_a_clock_that_was_ahead_hide_no_change(tiny_build, change):
+    set_times(tiny_build, time.time() + 3600)
+    assert NOTHING in plan(tiny_build)
+    change(tiny_build)
+    set_times(tiny_build, time.time() + 3600)
+    for option in ("--keep-going", "--dry-run"):
+        result = snakemake(tiny_build, *tiny.CHOSEN, option)
+        assert result.returncode == 1
+        assert ": its time is in the future (" in result.stderr
+    (remedy,) = re.findall(r"present time: (.*)$", result.stderr, re.M)
+    subprocess.run(remedy, shell=True, cwd=tiny_build, check=True)
+    jobs = planned(tiny_build, *tiny.CHOSEN)
+    assert jobs["render"] == (1 if change is spoil_a_view else 3)
+
+
+def test_a_run_waits_for_a_clock_that_is_seconds_ahead(tiny_build):
+    change_samples(tiny_build)
+    set_times(tiny_build, time.time() + 4)
+    assert planned(tiny_build, *tiny.CHOSEN)["render"] == 3
+
+
+def set_times(folder, moment):
+    """Give all files of a build a time."""
+    for name in ("results", "work"):
+        for path in (folder / name).rglob("*"):
+            os.utime(path, (moment, moment))
 
 
 def test_touching_outputs_with_snakemake_hides_nothing(tiny_build):
