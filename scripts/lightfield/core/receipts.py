@@ -561,7 +561,7 @@ def note_shared_inputs(paths: Iterable[str | Path]) -> None:
     """Note files as `note_inputs` does. Another run may replace them while the job reads them."""
     if receipt := current():
         for path in paths:
-            receipt.add_shared_input(os.path.relpath(path))
+            receipt.add_shared_input(path)
 
 
 @contextmanager
