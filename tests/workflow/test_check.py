@@ -80,6 +80,15 @@ def test_a_touched_file_is_read_once_for_all_jobs_and_plans(folder, monkeypatch)
     assert reads == ["scene.blend"]
 
 
+@pytest.mark.parametrize("content", ["5", "[]", "{", '{"a": 5}', '{"a": []}', '{"a": [1, 2]}'])
+def test_damaged_notes_of_sums_are_no_hindrance(folder, content):
+    path = make("a", "[]")
+    file = Path("results/scene/a.json")
+    os.utime(file, (1, 1))
+    Path("work/sums.json").write_text(content.replace('"a"', f'"{file}"'))
+    assert verdict(path).is_fine
+
+
 @pytest.mark.parametrize("fault", sorted(FAULTS))
 def test_the_check_names_the_damaged_file(folder, fault):
     files = [Path(f"results/scene/{name}.json") for name in "ab"]

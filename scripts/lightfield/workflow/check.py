@@ -52,7 +52,8 @@ class Sums:
         self._stamps: dict[str, list[Any]] = {}
         self._has_new = False
         try:
-            self._stamps = dict(json.loads(read_bytes(path)))
+            stamps = json.loads(read_bytes(path)).items()
+            self._stamps = {name: stamp for name, stamp in stamps if isinstance(stamp, list)}
         except (OSError, *DAMAGE):
             pass
 
