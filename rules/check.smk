@@ -82,10 +82,9 @@ def reads(job, stage=None, are_noted=False, **inputs):
         is_fine = CHECK.verdict(receipt, content, noted).is_fine
         if not is_fine:
             # Snakemake would name read-only files in many lines, or end with a traceback.
+            for folder in folders_of(job, wildcards):
+                end_unless_writable(folder)
             name = job_of(receipt)
-            made = (f"{RESULTS}/{name}", f"{WORK}/{name}", log_of(name), times_of(name))
-            for path in (*made, receipt):
-                end_unless_writable(os.path.dirname(path))
             wait_until_past([receipt, log_of(name), times_of(name)])
         if not os.path.exists(MARK):
             new_mark()
@@ -97,6 +96,17 @@ def reads(job, stage=None, are_noted=False, **inputs):
 
     JOBS.append((job, wanted))
     return unpack(input_function)
+
+
+def folders_of(job, wildcards):
+    """Return folders in which a job writes. ``job`` is its name, with wildcards."""
+    paths = [f"{RESULTS}/{job}", f"{WORK}/{job}", f"{RECEIPTS}/{job}"]
+    paths += [log_of(job), times_of(job)]
+    if KINDS[job].stage == "render":
+        paths.append(f"{PATHS.views}/{{first}}")
+    elif job in ("{scene}/{rig}/figures", "{scene}/{rig}/page"):
+        paths.append(PATHS.page)
+    return [os.path.dirname(path.format(**dict(wildcards.items()))) for path in paths]
 
 
 def carried(files):

@@ -178,3 +178,51 @@ def test_no_view_of_an_older_version_is_rendered_again(built_tiny, tiny_build, w
     assert not rendered(tiny_build)
     assert_same_bytes(built_tiny, tiny_build)
     assert NOTHING in plan(tiny_build)
+
+
+# ---- what a run says at its end, and Snakemake's own files -----------------------------------
+
+DATASET = f"results/{tiny.NAME}"
+VALID = f"valid: {DATASET}/report/index.html\n"
+
+
+def test_a_run_that_leaves_jobs_out_calls_nothing_valid(tiny_build):
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    for arguments in (["--until", "lens_map"], ["--touch"]):
+        said = tiny.build(tiny_build, *arguments)
+        assert f"not finished: {DATASET}\n" in said and "valid: " not in said, arguments
+    said = tiny.build(tiny_build)
+    assert VALID in said and "not " not in said
+
+
+def test_a_page_of_views_that_contradict_each_other_is_not_called_valid(tiny_build):
+    first, second = (tiny_build / DATASET / f"exr/view_000{n}f.exr" for n in (0, 1))
+    shutil.copyfile(first, second)
+    bookkeeping.accept(tiny_build, tiny.NAME, "render", "0-2", "exr/view_0001f.exr")
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--until", "page")
+    assert result.returncode == 0, result.stderr
+    assert f"not valid: {DATASET}/report/index.html\n" in result.stderr
+    assert f"\n{VALID}" not in result.stderr
+
+
+def test_a_note_of_snakemake_that_is_no_text_is_named(tiny_build):
+    note = next((tiny_build / ".snakemake/metadata").iterdir())
+    note.write_bytes(b"\xff\xfe")
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--dry-run")
+    assert result.returncode == 1
+    assert f"error: .snakemake/metadata/{note.name}: is not text" in result.stderr
+    assert "Traceback" not in result.stderr
+    (remedy,) = re.findall(r"(rm -r \S+);", result.stderr)
+    subprocess.run(remedy, shell=True, cwd=tiny_build, check=True)
+    assert NOTHING in plan(tiny_build)
+
+
+@pytest.mark.parametrize("name", ["exr", "perspective", "report"])
+def test_a_plan_names_a_folder_that_is_a_link_to_itself(tiny_build, name):
+    folder = tiny_build / DATASET / name
+    shutil.rmtree(folder)
+    folder.symlink_to(name)
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--dry-run")
+    assert result.returncode == 1
+    assert f"error: {DATASET}/{name}: cannot be written: " in result.stderr
+    assert f"{name} is a link that leads nowhere" in result.stderr

@@ -12,9 +12,9 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import Family
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, read_bytes, size_and_time
+from lightfield.core.files import DAMAGE, read_bytes, read_text, size_and_time
 from lightfield.core.names import LIGHTS
-from lightfield.core.paths import case_hint, lies_below
+from lightfield.core.paths import case_hint, files_below, lies_below
 from lightfield.core.receipts import name_of
 from lightfield.workflow.failures import CLOCKS_DIFFER
 
@@ -130,6 +130,17 @@ def time_of(path: str) -> float:
     """Return when a file was changed, in seconds since 1970. 0 without a file."""
     stamp = size_and_time(path)
     return stamp[1] / 1e9 if stamp else 0.0
+
+
+def check_notes(folder: Path) -> None:
+    """Raise `UserError` for a note of Snakemake that is no text, at which Snakemake would crash."""
+    for path in files_below(folder, strict=False):
+        try:
+            read_text(path)
+        except UserError as error:
+            raise UserError(
+                f"{error}; remove the folder: rm -r {folder}; no plan needs it"
+            ) from None
 
 
 def check_imported(dataset: Dataset) -> None:
