@@ -17,7 +17,6 @@ from lightfield.core.receipts import (
     FOLDER as FOLDER_OF_RECEIPTS,
     SUFFIX,
     make_way,
-    name_of,
 )
 from lightfield.stages import job_settings
 from lightfield.stages.registry import VERSIONS
@@ -83,10 +82,10 @@ def reads(job, stage=None, are_noted=False, **inputs):
         is_fine = CHECK.verdict(receipt, content, noted).is_fine
         if not is_fine:
             # Snakemake would name read-only files in many lines, or end with a traceback.
+            for folder in folders_of(job, wildcards):
+                end_unless_writable(folder)
             name = job_of(receipt)
-            made = (f"{RESULTS}/{name}", f"{WORK}/{name}", log_of(name), times_of(name))
-            for path in (*made, receipt):
-                end_unless_writable(os.path.dirname(path))
+            wait_until_past([receipt, log_of(name), times_of(name)])
         if not os.path.exists(MARK):
             new_mark()
         files = {name: unless_newer(receipt, each) for name, each in files.items()}
@@ -97,6 +96,17 @@ def reads(job, stage=None, are_noted=False, **inputs):
 
     JOBS.append((job, wanted))
     return unpack(input_function)
+
+
+def folders_of(job, wildcards):
+    """Return folders in which a job writes. ``job`` is its name, with wildcards."""
+    paths = [f"{RESULTS}/{job}", f"{WORK}/{job}", f"{RECEIPTS}/{job}"]
+    paths += [log_of(job), times_of(job)]
+    if KINDS[job].stage == "render":
+        paths.append(f"{PATHS.views}/{{first}}")
+    elif job in ("{scene}/{rig}/figures", "{scene}/{rig}/page"):
+        paths.append(PATHS.page)
+    return [os.path.dirname(path.format(**dict(wildcards.items()))) for path in paths]
 
 
 def carried(files):
@@ -222,7 +232,7 @@ def expression_of(job):
     )
 
 
-CHECK = JobCheck(Path(WORK), wanted_settings, VERSIONS)
+CHECK = JobCheck(Path(WORK), Path(RESULTS), wanted_settings, VERSIONS)
 if IS_MAIN_PROCESS:
     # The next plan need not read the same files again.
     atexit.register(CHECK.sums.save)
@@ -240,12 +250,11 @@ def scene_folders():
 
 def check_folders():
     """Raise `UserError` if the receipts are of files in other folders than the chosen ones."""
-    chosen = tuple(f"{name_of(folder)}/" for folder in (RESULTS, WORK))
     for receipt, verdict in CHECK.verdicts.items():
-        if verdict.example and not verdict.example.startswith(chosen):
+        if verdict.elsewhere:
             raise config_mistake(
                 f"results: is {RESULTS}, and work is {WORK}, but {receipt} is the receipt of "
-                f"{verdict.example}: after a move, leave a link in the old place, and keep the key; "
+                f"{verdict.elsewhere}: after a move, leave a link in the old place, and keep the key; "
                 "a second build needs a folder work of its own"
             )
 

@@ -41,6 +41,7 @@ try:
     )
     BUILD = Build.load(SETTINGS, CLUSTER)
     if IS_MAIN_PROCESS:
+        presence.check_notes(Path(".snakemake/metadata"))
         for dataset in BUILD.chosen:
             presence.check_presence(dataset)
         for name, family in BUILD.families.items():

@@ -6,6 +6,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from lightfield.core.files import read_json
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import duration
 from lightfield.planning.cost import Cost, cost
@@ -137,9 +138,7 @@ def print_summary():
 def print_results():
     """Print the end of a run that made all that it should."""
     print_summary()
-    print_pages()
-    print_packages()
-    print_families()
+    print_ends()
 
 
 def print_failures():
@@ -149,32 +148,68 @@ def print_failures():
     print(failures or UNFINISHED, file=sys.stderr, flush=True)
 
 
-def print_pages():
-    """Print the paths of the pages of this run's datasets, which are all valid."""
-    jobs = {job_of(receipt) for receipt in ASKED}
-    pages = [
-        f"{STORE_PREFIX}{dataset.paths.page}"
-        for dataset in DATASETS.values()
-        if f"{dataset.name}/page" in jobs
-    ]
-    if len(pages) > MOST_PAGES:
-        pages = [f"{len(pages)} datasets: {STORE_PREFIX}{RESULTS}/index.html"]
-    for page in pages:
-        print(f"valid: {page}", file=sys.stderr)
+def print_ends():
+    """Print what this run has finished: pages of valid datasets, packages, and families.
+
+    A run with --until or --touch leaves jobs out, and ends without an error, too.
+    """
+    is_left = left_out()
+    print_pages(is_left)
+    print_packages(is_left)
+    print_families(is_left)
 
 
-def print_packages():
+def left_out():
+    """Return a function that says whether the job of a receipt, or a job before it, must still run.
+
+    A storage has all receipts, which nobody looks at again.
+    """
+    if STORE:
+        return lambda receipt: False
+    check = JobCheck(Path(WORK), Path(RESULTS), wanted_settings, VERSIONS)
+    check.sums = CHECK.sums
+    return check.will_run
+
+
+def print_pages(is_left):
+    """Print the pages of the datasets that this run has finished, and the folders of others."""
+    ends = {"valid": [], "not valid": [], "not finished": []}
+    for dataset in DATASETS.values():
+        receipt = f"{RECEIPTS}/{dataset.name}/page{SUFFIX}"
+        if receipt in ASKED and is_left(receipt):
+            ends["not finished"].append(f"{STORE_PREFIX}{dataset.paths.folder}")
+        elif receipt in ASKED:
+            ends[validity(dataset)].append(f"{STORE_PREFIX}{dataset.paths.page}")
+    for state, paths in ends.items():
+        if len(paths) > MOST_PAGES:
+            paths = [f"{len(paths)} datasets: {STORE_PREFIX}{RESULTS}/index.html"]
+        for path in paths:
+            print(f"{state}: {path}", file=sys.stderr)
+
+
+def validity(dataset):
+    """Return whether the validation of a finished dataset says that it is valid.
+
+    With a storage, the checksums that this run made say so.
+    """
+    is_valid = STORE or read_json(dataset.paths.validation)["valid"]
+    return "valid" if is_valid else "not valid"
+
+
+def print_packages(is_left):
     """Print the paths of the first archives of this run's packages."""
-    for job, names in ASKED.values():
+    for receipt, (job, names) in ASKED.items():
         if job == "{scene}/{rig}/package":
+            state = "not packed" if is_left(receipt) else "packed"
             archive = PATHS.package.format(**names)
-            print(f"packed: {STORE_PREFIX}{archive}", file=sys.stderr)
+            print(f"{state}: {STORE_PREFIX}{archive}", file=sys.stderr)
 
 
-def print_families():
+def print_families(is_left):
     """Print how many members of each family are built, if this run has counted them."""
-    for job, names in planned_jobs():
-        if KINDS[job].stage == "count_members":
+    for receipt, (job, names) in ASKED.items():
+        is_planned = KINDS[job].stage == "count_members" and CHECK.will_run(receipt)
+        if is_planned and not is_left(receipt):
             log = Path(log_of(job.format(**names)))
             print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
 

@@ -4,6 +4,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from lightfield.configuration.blend_lock import expected_blend
@@ -142,6 +143,22 @@ def end_unless_writable(folder):
         sys.exit(f"error: {error}")
 
 
+def wait_until_past(paths):
+    """Wait until files are older than the mark, or end the run with one line if it takes long.
+
+    The clock of the machine that wrote them may be ahead. Snakemake starts a job only if an input is
+    newer than what the job made before.
+    """
+    try:
+        presence.check_times(paths, [RESULTS, WORK])
+    except UserError as error:
+        sys.exit(f"error: {error}")
+    ahead = max(map(presence.time_of, paths)) - time.time()
+    if ahead >= 0:
+        time.sleep(ahead + 0.01)
+        new_mark.cache_clear()
+
+
 def check_start():
     """Raise `UserError` for a run that cannot work, before the first job."""
     DISPLAY.at_close(explain_full_disk)
@@ -162,7 +179,8 @@ def check_times():
     paths = {}
     for job, names in planned_jobs():
         paths |= dict.fromkeys(flat(inputs[job](names)[0].values()))
-    presence.check_times(path for path in paths if not CHECK.is_made(path))
+    paths = [path for path in paths if not CHECK.is_made(path)]
+    presence.check_times(paths, [RESULTS, WORK])
 
 
 def check_input(job, names):

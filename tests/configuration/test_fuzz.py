@@ -254,13 +254,19 @@ def read_scene_inventory(path, dataset):
 def receipt_lines(_):
     view = {"view": "a", "finished": 3.0}
     view |= dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 1.0)
-    made = {"file": "exr/a.exr", "sha256": "0" * 64, "bytes": 7, "modified_ns": 7, "key": "k"}
     header = {"job": "own/View/render/0-2", "stage": "render_shard", "version": 1}
+    made = {
+        "file": "results/exr/a.exr",
+        "sha256": "0" * 64,
+        "bytes": 7,
+        "modified_ns": 7,
+        "key": "k",
+    }
     inputs = {"a.json": "0" * 64, "work/receipts/b.jsonl": "0" * 64}
     return [
         header | {"settings": {"a": 1}, "inputs": inputs},
         made,
-        {**made, "file": "exr/b.exr"},
+        {**made, "file": "results/exr/b.exr"},
         {"started": 1.0, "host": "here", "pid": 7},
         {"start_up_seconds": 1.0, "device": "CPU", "threads": 1},
         view,
@@ -269,7 +275,7 @@ def receipt_lines(_):
 
 
 def read_receipt(path, _):
-    check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+    check = JobCheck(Path("work"), Path("results"), lambda _: None, VERSIONS)
     check.verdict(str(path), {})
     check.will_run(str(path))
     if receipt := receipts.read(path):
@@ -277,7 +283,7 @@ def read_receipt(path, _):
     # The same lines in the receipt of a job that was killed.
     path.with_suffix(".part").write_bytes(path.read_bytes())
     with receipts.opened(path, {}, []) as job:
-        job.is_finished(Path("exr/a.exr"), "k")
+        job.is_finished(Path("results/exr/a.exr"), "k")
         job.add_input("a.json")
     for run in history.read(path):
         for key in ("later_views", "last_heard", "wall_seconds", "cpu_seconds"):

@@ -1,6 +1,7 @@
 """Files of a job reach another folder in a bundle, and only with the bytes that the job made."""
 
 import shutil
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,18 @@ def test_a_damaged_bundle_is_refused(other):
     bundle.write_bytes(sound[:700])
     with pytest.raises(UserError, match=r"0-1\.tar: is damaged"):
         bundles.unpack(RECEIPT)
+
+
+@pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE])
+@pytest.mark.parametrize("target", ["nowhere", "/etc/passwd", "results/s/r/a.json"])
+def test_a_link_in_a_bundle_is_no_file_of_a_job(other, kind, target):
+    member = tarfile.TarInfo(str(VIEW))
+    member.type, member.linkname = kind, target
+    with tarfile.open(bundles.bundle_of(RECEIPT), "w") as archive:
+        archive.addfile(member)
+    with pytest.raises(UserError, match=r"exr/a\.exr: the storage does not have the bytes"):
+        bundles.unpack(RECEIPT)
+    assert not VIEW.is_symlink() and not VIEW.exists()
 
 
 def test_a_newer_file_of_the_user_stays(other):

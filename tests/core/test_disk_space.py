@@ -51,6 +51,19 @@ with temporary_folder(sys.argv[1]) as folder:
 """
 
 
+@pytest.mark.slow
+def test_a_limit_of_files_below_a_log_is_refused_before_snakemake_meets_it(tmp_path):
+    folder = checkout(tmp_path / "plenoforge", one=ONE)
+    command = "ulimit -f 8; exec snakemake --cores 1 --dry-run --config scenes=[one] preset=full"
+    result = subprocess.run(
+        ["bash", "-c", command], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    (line,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert line.startswith("error: .snakemake: cannot be written: a file may have 8.19 kB here: ")
+    assert "ulimit -f" in line
+
+
 @pytest.mark.parametrize(
     ("sizes", "expected"),
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.core import bundles, leftovers
+from lightfield.core import bundles, leftovers, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.core.paths import files_below, inside, place_in
+from lightfield.core.paths import files_below, inside, lies_below, place_in
 from lightfield.formats.layout import read_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.workflow.member_record import read_member
@@ -34,6 +34,22 @@ def test_other_names_stay_in_the_folder(name, tmp_path):
     path = inside(tmp_path, name, "list.json")
     write(path)
     assert path.resolve().is_relative_to(tmp_path.resolve())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(*HOSTILE, None, 3, ["x"], "results", "results/", "results/.", "results/../x"),
+        *("resultsx/y", "results//x", "./results/x", "/results/x", "../results/x", "results/a\0b"),
+    ],
+)
+def test_a_path_that_is_not_written_as_one_below_a_folder_is_none(name):
+    assert not lies_below(name, ["results", Path("work")])
+
+
+@pytest.mark.parametrize("folder", ["results", "../results", "/data/results"])
+def test_paths_below_a_folder_lie_below_it_wherever_it_is(folder):
+    assert lies_below(f"{folder}/s/..x", ["work", Path(folder)])
 
 
 def test_a_walk_follows_links_to_folders_and_files(tmp_path):
@@ -119,7 +135,9 @@ def bundle(home, name):
     line = '{"file": %s, "sha256": "%s", "bytes": 1, "modified_ns": 1}' % (quoted(name), DIGEST)  # noqa: UP031
     write(receipt, f"{header}\n{line}\n")
     write(bundles.bundle_of(receipt))
-    return bundles.unpack(receipt)
+    bundles.unpack(receipt)
+    with receipts.opened(home / "receipts/reader.jsonl", {}, []) as job:
+        job.add_input(receipt)
 
 
 def member(home, name):

@@ -1,11 +1,15 @@
 """Receipts of jobs: which inputs and outputs they name."""
 
+import json
+import os
 from pathlib import Path
 
 import pytest
 
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
+from lightfield.core.files import Stamp
+from lightfield.core.receipts import Output
 
 RECEIPT = Path("work/receipts/garden/job.jsonl")
 
@@ -49,3 +53,57 @@ def test_a_kept_file_stays_an_output():
         receipt.note_kept(Path("made/kept.webp"))
         receipt.seal()
     assert [*receipts.read(RECEIPT).outputs] == ["made/kept.webp"]
+
+
+HEADER = {"stage": "job", "version": 1, "settings": {}, "inputs": {}}
+
+
+def write_lines(path, *names):
+    """Write a receipt with files that are not as it says."""
+    lines = [{"file": name, "sha256": "0" * 64, "bytes": 1, "modified_ns": 1} for name in names]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(json.dumps(line) + "\n" for line in (HEADER, *lines)))
+
+
+@pytest.mark.parametrize("name", ["made/../x", "./made/x", "made//x", "made/", "", "a\0b", 5, None])
+def test_a_receipt_with_a_path_in_another_form_counts_as_damaged(name):
+    write_lines(RECEIPT, "made/a", name)
+    assert receipts.read(RECEIPT) is None
+    write_lines(RECEIPT.with_suffix(".part"), "made/a", name)
+    assert [*receipts.read_part(RECEIPT)[0]] == ["made/a"]
+
+
+@pytest.mark.parametrize("suffix", [".jsonl", ".part"])
+def test_a_job_moves_no_file_of_others(suffix, tmp_path):
+    """A FIFO stands for a device, which looks damaged, too."""
+    outside = tmp_path.parent / f"{tmp_path.name}_outside"
+    outside.mkdir()
+    os.mkfifo(outside / "fifo")
+    (tmp_path / "mine.txt").write_text("mine")
+    names = [str(outside / "fifo"), f"../{outside.name}/fifo", "mine.txt"]
+    write_lines(RECEIPT.with_suffix(suffix), "made/a", *names)
+    with opened() as receipt:
+        assert not receipt.still_holds()
+        receipt.seal()
+    assert (outside / "fifo").is_fifo()
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+    assert not receipts.read(RECEIPT).outputs
+
+
+def test_a_job_does_not_keep_a_receipt_that_names_files_of_others():
+    Path("made").mkdir()
+    for name in ("made/a", "mine.txt"):
+        Path(name).write_text(name)
+    with opened() as receipt:
+        for name in ("made/a", "mine.txt"):
+            receipt.outputs[name] = Output(Stamp.of(name))
+        receipt.seal()
+    with opened() as receipt:
+        assert not receipt.still_holds()
+
+
+def test_a_damaged_file_that_is_missing_is_not_made_by_its_reader():
+    write_lines(RECEIPT, "made/a")
+    with pytest.raises(UserError, match="made/a: is not as its job made it"):
+        receipts.check_files([RECEIPT])
+    assert not Path("made").exists()

@@ -256,7 +256,7 @@ def test_a_view_replaced_by_an_older_file_of_equal_size_is_imported_again(
     views = sorted((published / "exr").iterdir())
 
     def outdated():
-        check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+        check = JobCheck(Path("work"), Path("results"), lambda _: None, VERSIONS)
         return check.verdict(path, job.settings.as_json()).outdated
 
     assert outdated() == []

@@ -533,7 +533,7 @@ def run_batch(run_program):
 
 def verdict(settings):
     """Return what the check before a plan finds about the batch."""
-    check = JobCheck(Path("work"), lambda _: None, VERSIONS)
+    check = JobCheck(Path("work"), Path("results"), lambda _: None, VERSIONS)
     return check.verdict(str(BATCH), settings.as_json())
 
 

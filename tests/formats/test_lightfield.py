@@ -172,6 +172,11 @@ BROKEN = {
         'render: samples: is "64"; must be a whole number',
     ),
     "a pass that there is not": (content(render={"passes": ["x"]}), "passes: must be of normal"),
+    "no side": (content(resolution=[0, 8]), "resolution: is 0; must be two whole numbers"),
+    "no image of this world": (
+        content(resolution=[8, 1e308]),
+        "resolution: is 1e+308; must be two whole numbers of pixels from 1 to 524288",
+    ),
     "frame is not a mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }
 BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {

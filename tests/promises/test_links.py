@@ -1,6 +1,7 @@
-"""Folders of a dataset that are links: no view is lost, and nothing outside is moved."""
+"""Links and hostile paths: no view is lost, and nothing outside the build is moved."""
 
 import json
+import os
 import shutil
 import tarfile
 from pathlib import Path
@@ -152,3 +153,31 @@ def test_no_run_writes_through_a_link_in_place_of_a_file(tiny_build, tmp_path):
     tiny.edit(tiny_build, "samples: 4", "samples: 2")
     tiny.build(tiny_build)
     assert {path: path.read_bytes() for path in before} == before
+
+
+@pytest.mark.slow
+def test_no_receipt_makes_a_run_move_files_outside_the_build(
+    tiny_build, tmp_path, run_program, monkeypatch
+):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    os.mkfifo(outside / "fifo")
+    places = [outside / "mine", tiny_build / "README", tiny_build.parent / "mine"]
+    for place in places:
+        place.write_text("mine")
+    names = [str(outside / "fifo"), str(outside / "mine"), "/dev/null", "../mine", "README"]
+    names.append(f"results/{tiny.NAME}/../../../README")
+    bookkeeping.claim(tiny_build, names)
+    tiny.build(tiny_build)
+    assert "Nothing to be done" in tiny.build(tiny_build, "-n")
+    assert not (tiny_build / "work/removed").exists()
+    bookkeeping.claim(tiny_build, names)
+    monkeypatch.chdir(tiny_build)
+    dataset = f"results/{tiny.NAME}"
+    run_program("verify.py", dataset, "--work", "work", "--mend", check=False)
+    removed = [path for path in Path("work/removed").rglob("*") if not path.is_dir()]
+    assert removed
+    assert all(path.is_relative_to(f"work/removed/{bookkeeping.NOTES}") for path in removed)
+    assert all(place.read_text() == "mine" for place in places)
+    assert (outside / "fifo").is_fifo()
+    assert Path("/dev/null").is_char_device()

@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 import tiny
-from checkouts import snakemake
+from checkouts import checkout, snakemake
+
+from lightfield.formats.lightfield import LightField
+from lightfield.geometry import lenses
 
 pytestmark = pytest.mark.slow
 
@@ -22,6 +25,49 @@ def test_a_link_in_the_old_place_keeps_a_moved_build_finished(tiny_build):
     (tiny_build / "results").rename(tiny_build / "elsewhere")
     (tiny_build / "results").symlink_to(tiny_build / "elsewhere")
     status, plan = said(tiny_build, "--dry-run")
+    assert status == 0 and "Nothing to be done" in plan
+
+
+POSES = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  LFPoses:
+    type: poses
+    file: poses.csv
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+"""
+IMPORTED = "scene: {dataset: published}\n"
+ARGUMENTS = ("--config", "scenes=[posed,imported]", "rigs=all", "preset=full", "--")
+# Their settings have the rig.
+TARGETS = ("results/posed/LFPoses/lightfield.json", "results/imported/LFMine/lightfield.json")
+
+
+def test_a_copied_folder_with_a_file_of_poses_has_nothing_to_do(tmp_path):
+    folder = checkout(tmp_path / "first", posed=POSES, imported=IMPORTED)
+    (folder / "poses.csv").write_text("name,x,y,z,rx,ry,rz\na,0,0,1,1.57,0,0\n")
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
+    rig = {"type": "plane", "cameras": [1, 1]}
+    LightField.from_rig(rig, lens).write(folder / "published/LFMine/lightfield.json")
+    run = snakemake(folder, *ARGUMENTS, *TARGETS)
+    assert run.returncode == 0, run.stderr
+    copy = folder.rename(tmp_path / "second")
+    plan = snakemake(copy, "--dry-run", *ARGUMENTS, *TARGETS)
+    assert "Nothing to be done" in plan.stderr
+    (copy / "poses.csv").write_text("name,x,y,z,rx,ry,rz\na,1,0,1,1.57,0,0\n")
+    plan = snakemake(copy, "--dry-run", *ARGUMENTS, *TARGETS)
+    assert "outdated: posed/LFPoses/lightfield: setting poses_sha256" in plan.stderr
+
+
+def test_an_absolute_folder_of_results_has_nothing_to_do_after_its_run(tmp_path):
+    folder = tiny.checked_out(tmp_path / "plenoforge")
+    results = f"results={tmp_path / 'elsewhere'}"
+    tiny.build(folder, results)
+    status, plan = said(folder, results, "--dry-run")
+    assert status == 0 and "Nothing to be done" in plan
+    (tmp_path / "elsewhere" / tiny.NAME / "exr/view_0000f.exr").write_bytes(b"spoilt")
+    tiny.build(folder, results)
+    status, plan = said(folder, results, "--dry-run")
     assert status == 0 and "Nothing to be done" in plan
 
 

@@ -1,7 +1,10 @@
 """Old results are used for what they are: in copies, with new times, and from older versions."""
 
 import os
+import re
 import shutil
+import subprocess
+import time
 
 import bookkeeping
 import pytest
@@ -75,6 +78,45 @@ def test_new_times_run_nothing(tiny_build, without_notes):
         assert NOTHING in plan(tiny_build), name
 
 
+def spoil_a_view(folder):
+    content = bytearray((folder / tiny.VIEW).read_bytes())
+    content[-1] ^= 1
+    (folder / tiny.VIEW).write_bytes(content)
+
+
+def change_samples(folder):
+    tiny.edit(folder, "samples: 4", "samples: 3")
+
+
+@pytest.mark.parametrize("change", [spoil_a_view, change_samples])
+def test_files_of_a_clock_that_was_ahead_hide_no_change(tiny_build, change):
+    set_times(tiny_build, time.time() + 3600)
+    assert NOTHING in plan(tiny_build)
+    change(tiny_build)
+    set_times(tiny_build, time.time() + 3600)
+    for option in ("--keep-going", "--dry-run"):
+        result = snakemake(tiny_build, *tiny.CHOSEN, option)
+        assert result.returncode == 1
+        assert ": its time is in the future (" in result.stderr
+    (remedy,) = re.findall(r"present time: (.*)$", result.stderr, re.M)
+    subprocess.run(remedy, shell=True, cwd=tiny_build, check=True)
+    jobs = planned(tiny_build, *tiny.CHOSEN)
+    assert jobs["render"] == (1 if change is spoil_a_view else 3)
+
+
+def test_a_run_waits_for_a_clock_that_is_seconds_ahead(tiny_build):
+    change_samples(tiny_build)
+    set_times(tiny_build, time.time() + 4)
+    assert planned(tiny_build, *tiny.CHOSEN)["render"] == 3
+
+
+def set_times(folder, moment):
+    """Give all files of a build a time."""
+    for name in ("results", "work"):
+        for path in (folder / name).rglob("*"):
+            os.utime(path, (moment, moment))
+
+
 def test_touching_outputs_with_snakemake_hides_nothing(tiny_build):
     (tiny_build / tiny.VIEW).write_text("not a view")
     tiny.build(tiny_build, "--touch")
@@ -136,3 +178,51 @@ def test_no_view_of_an_older_version_is_rendered_again(built_tiny, tiny_build, w
     assert not rendered(tiny_build)
     assert_same_bytes(built_tiny, tiny_build)
     assert NOTHING in plan(tiny_build)
+
+
+# ---- what a run says at its end, and Snakemake's own files -----------------------------------
+
+DATASET = f"results/{tiny.NAME}"
+VALID = f"valid: {DATASET}/report/index.html\n"
+
+
+def test_a_run_that_leaves_jobs_out_calls_nothing_valid(tiny_build):
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    for arguments in (["--until", "lens_map"], ["--touch"]):
+        said = tiny.build(tiny_build, *arguments)
+        assert f"not finished: {DATASET}\n" in said and "valid: " not in said, arguments
+    said = tiny.build(tiny_build)
+    assert VALID in said and "not " not in said
+
+
+def test_a_page_of_views_that_contradict_each_other_is_not_called_valid(tiny_build):
+    first, second = (tiny_build / DATASET / f"exr/view_000{n}f.exr" for n in (0, 1))
+    shutil.copyfile(first, second)
+    bookkeeping.accept(tiny_build, tiny.NAME, "render", "0-2", "exr/view_0001f.exr")
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--until", "page")
+    assert result.returncode == 0, result.stderr
+    assert f"not valid: {DATASET}/report/index.html\n" in result.stderr
+    assert f"\n{VALID}" not in result.stderr
+
+
+def test_a_note_of_snakemake_that_is_no_text_is_named(tiny_build):
+    note = next((tiny_build / ".snakemake/metadata").iterdir())
+    note.write_bytes(b"\xff\xfe")
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--dry-run")
+    assert result.returncode == 1
+    assert f"error: .snakemake/metadata/{note.name}: is not text" in result.stderr
+    assert "Traceback" not in result.stderr
+    (remedy,) = re.findall(r"(rm -r \S+);", result.stderr)
+    subprocess.run(remedy, shell=True, cwd=tiny_build, check=True)
+    assert NOTHING in plan(tiny_build)
+
+
+@pytest.mark.parametrize("name", ["exr", "perspective", "report"])
+def test_a_plan_names_a_folder_that_is_a_link_to_itself(tiny_build, name):
+    folder = tiny_build / DATASET / name
+    shutil.rmtree(folder)
+    folder.symlink_to(name)
+    result = snakemake(tiny_build, *tiny.CHOSEN, "--dry-run")
+    assert result.returncode == 1
+    assert f"error: {DATASET}/{name}: cannot be written: " in result.stderr
+    assert f"{name} is a link that leads nowhere" in result.stderr

@@ -395,6 +395,22 @@ def test_shards_and_parts_of_an_archive_come_back_from_a_storage(
     assert [(taken / part.name).read_bytes() for part in parts] == [p.read_bytes() for p in parts]
 
 
+def test_what_is_no_file_of_a_report_stays_in_the_storage(run_program, folder, tmp_path):
+    dataset, home = tmp_path / "store/results/smoke/LFPlane", tmp_path / "home"
+    shutil.copytree(folder, dataset)
+    report = dataset / "report"
+    (report / "subfolder").mkdir()
+    (report / "overview.png").write_text("a picture")
+    (report / "loop").symlink_to("loop")
+    (report / "link").symlink_to("/etc/passwd")
+    home.mkdir()
+    path = "results/smoke/LFPlane"
+    run_program("take_dataset.py", "--store", tmp_path / "store", path, cwd=home)
+    taken = {each.name for each in (home / path / "report").iterdir()}
+    assert taken == {"overview.png", "costs.json"}
+    assert (home / path / "exr/view_0000f.exr").is_file()
+
+
 @pytest.mark.slow
 def test_the_program_writes_shards_and_descriptions(run_program, folder, tmp_path):
     settings = tmp_path / "settings.json"

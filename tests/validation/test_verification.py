@@ -170,3 +170,35 @@ def test_mending_moves_each_faulty_file_and_nothing_else(small, capsys):
     assert aside == {Path("work/removed", path) for path in paths}
     assert not any(path.exists() for path in paths)
     assert problems_of(small) == {str(path): "is missing" for path in sorted(paths)}
+
+
+def test_mending_moves_nothing_that_other_programs_made(small, tmp_path, capsys):
+    """Neither files that a receipt names, nor receipts, nor lists beside the build."""
+    outside = tmp_path.parent / f"{tmp_path.name}_outside"
+    names = ["README.md", "results/notes.txt", f"../{outside.name}/a.txt", f"{outside}/a.txt"]
+    foreign_receipt = f"../{outside.name}/receipts/a.jsonl"
+    for name in [*names, foreign_receipt, "sha256sums.txt", "results/sha256sums.txt"]:
+        put(Path(name), "mine")
+    put(small / "member/member.json", "{}")
+    receipt = Path("work/receipts", *small.parts[1:], "hostile.jsonl")
+    stamp = Stamp("0" * 64, 1, 1)
+    write_receipt(receipt, dict.fromkeys([*names, small / VIEW], stamp), [foreign_receipt])
+    spoil(Path("work", *small.parts[1:], "places.json"))
+    with pytest.raises(UserError, match="the next run makes them again"):
+        parsed(Verify, None, [str(small), "--work", "work", "--mend"]).run()
+    assert (
+        f"{receipt}: names README.md, which no job of this build makes" in capsys.readouterr().out
+    )
+    aside = {path for path in Path("work/removed").rglob("*") if path.is_file()}
+    places = Path("work/removed/work", *small.parts[1:], "places.json")
+    assert aside >= {Path("work/removed", receipt), places}
+    for name in [*names, foreign_receipt, "sha256sums.txt", "results/sha256sums.txt"]:
+        assert Path(name).read_text() == "mine"
+
+
+def test_a_receipt_with_a_path_that_leads_out_and_in_is_damaged(small):
+    receipt = Path("work/receipts", *small.parts[1:], "hostile.jsonl")
+    put(Path("x"), "mine")
+    up = "/".join([".."] * len(small.parts))
+    write_receipt(receipt, {f"{small}/{up}/x": Stamp("0" * 64, 1, 1)})
+    assert problems_of(small) == {str(receipt): "is damaged"}

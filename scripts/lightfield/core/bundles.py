@@ -102,11 +102,14 @@ def extract(bundle: Path, sums: Mapping[str, str | None]) -> list[str]:
     damaged = []
     with _opened(bundle) as archive:
         for member in archive if sums else ():
-            content = archive.extractfile(member) if member.name in sums else None
-            if content is None:
+            if member.name not in sums:
                 continue
             check_inside(member.name, f"{bundle}: a name")
             damaged.append(member.name)
+            # A link could lead to another file, and no job packs one.
+            content = archive.extractfile(member) if member.isreg() else None
+            if content is None:
+                continue
             with suppress(_OtherBytesError), atomic_path(member.name) as temporary:
                 with temporary.open("wb") as file:
                     shutil.copyfileobj(content, file)

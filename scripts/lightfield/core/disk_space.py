@@ -2,6 +2,7 @@
 
 import errno
 import os
+import resource
 import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -74,8 +75,15 @@ def obstacle(path: Path) -> str | None:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise `UserError` for a folder in which no file can be written. It may be missing."""
-    if problem := obstacle(folder / "file"):
+    """Raise `UserError` for a folder in which no file can be written. It may be missing.
+
+    Also raise it if no file may be large enough for a log.
+    """
+    problem = obstacle(folder / "file")
+    limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if 0 <= limit < _LEAST_BYTES:
+        problem = f"a file may have {units.size(limit)} here: {REMEDIES[errno.EFBIG]}"
+    if problem:
         raise UserError(f"{folder}: cannot be written: {problem}")
 
 

@@ -137,6 +137,22 @@ def leads_inside(name: Any) -> bool:
     return bool(parts) and ".." not in parts
 
 
+def lies_below(name: Any, folders: Iterable[str | Path]) -> bool:
+    """Return whether a path that a file names is in normal form, and leads below a folder.
+
+    It may be one of several ``folders``. All paths are from the present folder, or from the root.
+    """
+    return is_normal(name) and name.startswith(tuple(f"{folder}/" for folder in folders))
+
+
+def is_normal(name: Any) -> bool:
+    """Return whether a path that a file names is a path in normal form.
+
+    Any other form could lead out of a folder with which it begins.
+    """
+    return isinstance(name, str) and "\0" not in name and os.path.normpath(name) == name
+
+
 def check_inside(name: Any, where: str) -> None:
     """Raise `UserError`, which says ``where`` a path stands, unless it leads inside a folder."""
     if not leads_inside(name):

@@ -89,7 +89,7 @@ def damaged(path: str | Path) -> UserError:
     So the next plan compares its bytes, also if its size and its time were those in the receipt.
     """
     with suppress(OSError):
-        Path(path).touch()
+        os.utime(path)
     return OutsideError(f"{path}: is not as its job made it; the next run makes it again")
 
 

@@ -46,6 +46,7 @@ from lightfield.core.files import (
     unreadable,
     writing,
 )
+from lightfield.core.paths import is_normal
 from lightfield.core.read_files import ReadFiles, changed_since_plan
 
 FOLDER = "receipts"
@@ -161,7 +162,9 @@ def _sorted(lines: Iterable[dict[str, Any]]) -> tuple[dict[str, Output], list[di
                 _checked(line["bytes"], int),
                 _checked(line["modified_ns"], int),
             )
-            outputs[_checked(line["file"], str)] = Output(stamp, line.get("key"))
+            if not is_normal(line["file"]):
+                raise ValueError("is not a path in normal form")
+            outputs[line["file"]] = Output(stamp, line.get("key"))
         else:
             history.append(line)
     return outputs, history
@@ -382,6 +385,8 @@ class OpenReceipt:
         header = {"stage": earlier.stage, "version": earlier.version, "settings": earlier.settings}
         return (
             header == self._header
+            # Another program wrote the line of a file that the job does not make.
+            and all(self._own_name(path) == path for path in earlier.outputs)
             and self.inputs.items() <= earlier.inputs.items()
             and all(
                 name in self.inputs or input_sum(name) == digest
@@ -601,7 +606,7 @@ def note_shared_inputs(paths: Iterable[str | Path]) -> None:
     """Note files as `note_inputs` does. Another run may replace them while the job reads them."""
     if receipt := current():
         for path in paths:
-            receipt.add_shared_input(os.path.relpath(path))
+            receipt.add_shared_input(path)
 
 
 @contextmanager

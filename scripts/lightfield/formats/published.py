@@ -46,7 +46,7 @@ def rigs(dataset: str) -> dict[str, Poses]:
         lightfield.require_centre()
         settings = {
             "type": "poses",
-            "file": str(path.resolve()),
+            "file": str(path),
             "camera": lightfield.lens.settings(),
             **_split(lightfield.views),
         }

@@ -10,7 +10,7 @@ from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.core.names import CORPUS
-from lightfield.core.paths import files_below
+from lightfield.core.paths import files_below, inside
 from lightfield.formats.layout import REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables
@@ -55,14 +55,16 @@ def _family(results: Path, folder: Path) -> dict[str, Any]:
     content = read_json(folder / CORPUS)
     with reading(folder / CORPUS, "corpus"):
         numbers = content["statistics"]
-        pictures = [each["thumbnail"] for each in content["members"] if "thumbnail" in each]
+        pictures = (each["thumbnail"] for each in content["members"] if "thumbnail" in each)
+        picture = next(pictures, None)
+        thumbnail = inside(folder, picture, f"{folder / CORPUS}: thumbnail") if picture else None
         return {
             "name": content["name"],
             "link": quote(f"{folder.relative_to(results).as_posix()}/index.html"),
             "members": numbers["members"],
             "views": numbers["views"],
             "state": f"{numbers['failed']} failed" if numbers["failed"] else "valid",
-            "picture": page.photo(folder / pictures[0], THUMBNAIL) if pictures else None,
+            "picture": page.photo(thumbnail, THUMBNAIL) if thumbnail else None,
         }
 
 

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from lightfield.configuration.dataset_paths import REPORT_FILES
 from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading, sha256
@@ -27,8 +28,8 @@ def take_datasets(job: TakeDataset) -> None:
 def _take(storage: Storage, dataset: Path, work: str) -> None:
     """Copy all files of a dataset, and its page."""
     report = dataset / REPORT
-    for name in storage.names(str(report)):
-        storage.bring(str(inside(report, name, f"{storage.url}: {report}")))
+    for name in REPORT_FILES:
+        storage.bring(str(report / name))
     listing, sums = _sums_of(storage, dataset, work)
     progress = Progress(len(sums), "take", "files")
     lost_files = set(sums)

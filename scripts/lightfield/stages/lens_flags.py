@@ -22,15 +22,13 @@ from lightfield.core.flags import checked_flags
 from lightfield.core.setting_types import REINHARD, Stops, White
 from lightfield.core.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
-from lightfield.geometry.lenses.base import named_numbers
+from lightfield.geometry.lenses.base import MOST_PIXELS, named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.blender_looks import LOOK_FLAG, LookName
 
 if TYPE_CHECKING:
     from lightfield.formats.lightfield import LightField
 
-# The longest side of an image, or of a cube map's strip of faces.
-_MOST_PIXELS = 2**19
 _LENGTHS = "Lengths in mm, angles in radians, or in degrees as in 120deg"
 _INPUT = f"Input lens, with --no-configs. {_LENGTHS}"
 _OUTPUT = f"Output lens. {_LENGTHS}"
@@ -120,7 +118,7 @@ _OutputLens: type[ByHand] = create_model("_OutputLens", __base__=ByHand, **_lens
 class LensMapFlags(_OutputLens):
     """The output lens and how it is sampled."""
 
-    cubemap: Annotated[int, Field(ge=1, le=_MOST_PIXELS // 6)] | None = option(
+    cubemap: Annotated[int, Field(ge=1, le=MOST_PIXELS // 6)] | None = option(
         "six perspective faces of 90°, each SIZE × SIZE pixels",
         None,
         metavar="SIZE",
@@ -199,8 +197,8 @@ class LensMapFlags(_OutputLens):
         height = int(source.height * self.scale)
         if min(width, height) < 1:
             raise UserError(f"--scale {self.scale:g}: leaves no pixel")
-        if max(width, height) > _MOST_PIXELS:
-            raise UserError(f"--scale {self.scale:g}: makes a side of over {_MOST_PIXELS}")
+        if max(width, height) > MOST_PIXELS:
+            raise UserError(f"--scale {self.scale:g}: makes a side of over {MOST_PIXELS}")
         return width, height
 
 
@@ -276,6 +274,6 @@ def _numbers(text: str, flag: str, form: str) -> list[float]:
 
 def _size(text: str, flag: str) -> tuple[int, int]:
     width, height = _numbers(text, flag, "WIDTH,HEIGHT")
-    if not all(side.is_integer() and 1 <= side <= _MOST_PIXELS for side in (width, height)):
-        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {_MOST_PIXELS}")
+    if not all(side.is_integer() and 1 <= side <= MOST_PIXELS for side in (width, height)):
+        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {MOST_PIXELS}")
     return int(width), int(height)

@@ -17,7 +17,14 @@ from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
 from lightfield.core.names import CORPUS
-from lightfield.core.paths import files_below, kept_behind_link, link_above, stray_places
+from lightfield.core.paths import (
+    files_below,
+    kept_behind_link,
+    leads_inside,
+    lies_below,
+    link_above,
+    stray_places,
+)
 from lightfield.formats.layout import IMAGES, PACKAGED, REPORT, SUMS, VALIDATION, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify
@@ -39,7 +46,7 @@ def verify(job: Verify) -> None:
                 problems[path] = problem
                 print(f"{path}: {problem}", flush=True)
                 if job.mend and job.work:
-                    _mend(path, problem, folder, job.work / receipts.REMOVED)
+                    _mend(path, problem, folder, job.work)
     names = ", ".join(map(str, job.dataset))
     if problems:
         mended = "; the next run makes them again" if job.mend else ""
@@ -52,6 +59,7 @@ def faults(folder: Path, work: Path | None = None) -> dict[str, str]:
 
     ``work`` is the workflow's folder of intermediate files. A copy has none.
     """
+    work = Path(receipts.name_of(work)) if work else None
     verification = _Verification(Path(receipts.name_of(folder)), work)
     verification.check()
     return dict(sorted(verification.problems.items()))
@@ -63,6 +71,8 @@ class _Verification:
     def __init__(self, folder: Path, work: Path | None) -> None:
         self.folder = folder
         self.work = work
+        # The folders above this one, up to the folder of all results.
+        self.parents = [*folder.parents][: _depth(folder, work)] if work else []
         self.problems: dict[str, str] = {}
         # The SHA-256 that files may have, each with the receipt that says so.
         self.made: dict[str, dict[str, str]] = {}
@@ -87,8 +97,10 @@ class _Verification:
 
     def _read_receipts(self, work: Path) -> None:
         """Read the receipts of the folder, and of the jobs before them."""
-        pending = set(_receipts(self.folder, work))
+        pending = set(_receipts(self.folder, work, len(self.parents)))
         read = set()
+        built = [*self.parents[-1:], work]
+        strays: list[tuple[Path, str]] = []
         while pending:
             path = pending.pop()
             read.add(path)
@@ -97,6 +109,7 @@ class _Verification:
             if receipt:
                 outputs = {**receipt.outputs, **outputs}
                 pending |= {*_makers(receipt, work)} - read
+                strays += [(path, name) for name in receipt.outputs if not lies_below(name, built)]
             elif os.path.lexists(path):
                 self.problems[str(path)] = broken(path) or "is damaged"
             for name, output in outputs.items():
@@ -105,10 +118,13 @@ class _Verification:
         if not any(_is_below(name, self.folder) for name in self.made):
             # The folder is a copy, or older than receipts.
             self.made = {}
+        for path, name in strays if self.made else ():
+            problem = f"names {name}, which no job of this build makes"
+            self.problems.setdefault(str(path), problem)
 
     def _concerns(self, path: str) -> bool:
         """Return whether a file is one of the folder, of work, or of the folder's scene."""
-        is_of_scene = Path(path).parent in self.folder.parents
+        is_of_scene = Path(path).parent in self.parents[:-1]
         return is_of_scene or _is_below(path, self.folder) or _is_below(path, self.work)
 
     def _read_list(self, home: Path) -> bool:
@@ -229,31 +245,40 @@ def _is_below(path: str, folder: Path | None) -> bool:
     return folder is not None and path.startswith(f"{folder}/")
 
 
-def _receipts(folder: Path, work: Path) -> Iterator[Path]:
-    """Yield the receipts of a dataset, a sequence or a family, and of its scene."""
+def _depth(folder: Path, work: Path) -> int:
+    """Return how many folders lead from the folder of all results to a folder of a build.
+
+    0 if there are no receipts of it.
+    """
     parts = absolute_path(folder).parts
-    root = work / receipts.FOLDER
     # The folder of a frame lies in the folder of a rig, and this in the folder of a scene.
     for count in (3, 2, 1):
-        home = root.joinpath(*parts[-count:])
-        if home.is_dir():
-            of_scene = (parent.glob("*") for parent in home.parents if root in parent.parents)
-            for path in chain(home.rglob("*"), *of_scene):
-                if path.suffix in (receipts.SUFFIX, receipts.PART_SUFFIX):
-                    yield path.with_suffix(receipts.SUFFIX)
-            return
+        if work.joinpath(receipts.FOLDER, *parts[-count:]).is_dir():
+            return count
+    return 0
+
+
+def _receipts(folder: Path, work: Path, depth: int) -> Iterator[Path]:
+    """Yield the receipts of a dataset, a sequence or a family, and of its scene."""
+    root = work / receipts.FOLDER
+    home = root.joinpath(*absolute_path(folder).parts[-depth:])
+    of_scene = (parent.glob("*") for parent in home.parents if root in parent.parents)
+    for path in chain(home.rglob("*"), *of_scene) if depth else ():
+        if path.suffix in (receipts.SUFFIX, receipts.PART_SUFFIX):
+            yield path.with_suffix(receipts.SUFFIX)
 
 
 def _makers(receipt: receipts.Receipt, work: Path) -> Iterator[Path]:
     """Yield the receipts of the jobs that made the inputs of a job."""
     for name in receipt.inputs:
         if receipts.is_receipt(name):
-            yield Path(name)
+            if lies_below(name, [work / receipts.FOLDER]):
+                yield Path(name)
         elif maker := receipts.find_output(name, work):
             yield maker[0]
 
 
-def _mend(path: str, problem: str, folder: Path, removed: Path) -> None:
+def _mend(path: str, problem: str, folder: Path, work: Path) -> None:
     """Move a faulty file away, so that the next run makes it again.
 
     The next run goes on with a family if it lacks a list of checksums.
@@ -262,8 +287,8 @@ def _mend(path: str, problem: str, folder: Path, removed: Path) -> None:
     if problem.startswith(STRAY) and link_above(folder, inside):
         return
     places = [Path(path)]
-    if any(folder.glob(f"*/{RECORD}")):
+    if leads_inside(inside) and any(folder.glob(f"*/{RECORD}")):
         places += [folder / parent / SUMS for parent in Path(inside).parents]
     for place in places:
         if os.path.lexists(place):
-            set_aside(place, removed)
+            set_aside(place, work / receipts.REMOVED)

@@ -27,6 +27,7 @@ from lightfield.core.files import (
     size_and_time,
     write_json,
 )
+from lightfield.core.paths import lies_below
 from lightfield.core.receipts import Receipt
 
 NAME = "sums.json"
@@ -36,14 +37,14 @@ NAME = "sums.json"
 class Verdict:
     """What the check found out about a job. A job without a reason to run is fine.
 
-    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files. ``example`` is
-    one of the files that the job made.
+    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files. ``elsewhere``
+    is one of the files that the job made, if all of them lie in other folders than this build's.
     """
 
     has_receipt: bool = True
     outdated: list[str] = field(default_factory=list)
     damaged: list[str] = field(default_factory=list)
-    example: str | None = None
+    elsewhere: str | None = None
 
     @property
     def is_fine(self) -> bool:
@@ -60,7 +61,7 @@ class Sums:
         self._has_new = False
         try:
             known = json.loads(read_bytes(path))
-            self._known = {name: [*each] for name, each in known.items()}
+            self._known = {name: each for name, each in known.items() if isinstance(each, list)}
         except (OSError, *DAMAGE):
             pass
 
@@ -94,21 +95,25 @@ class _Summary(NamedTuple):
 
 
 class JobCheck:
-    """Judges jobs by their receipts. ``work`` is the folder of intermediate files.
+    """Judges jobs by their receipts.
 
-    ``wanted`` returns the wanted settings of a job, by the path of its receipt. None if no job of
-    this run makes the receipt. ``versions`` has the version of each stage.
+    ``work`` is the folder of intermediate files, and ``results`` the folder of the datasets. All
+    files that jobs make lie in these two. ``wanted`` returns the wanted settings of a job, by the
+    path of its receipt. None if no job of this run makes the receipt. ``versions`` has the version
+    of each stage.
     """
 
     def __init__(
         self,
         work: Path,
+        results: Path,
         wanted: Callable[[str], Mapping[str, Any] | None],
         versions: Mapping[str, int | None],
     ) -> None:
         self.work = work
         self.verdicts: dict[str, Verdict] = {}
         self.sums = Sums(work / NAME)
+        self._folders = [receipts.name_of(folder) for folder in (results, work)]
         self._wanted = wanted
         self._versions = versions
         self._summaries: dict[str, _Summary | None] = {}
@@ -144,6 +149,11 @@ class JobCheck:
         receipt = self._read(path)
         if receipt is None:
             return Verdict(has_receipt=False)
+        strays = [name for name in receipt.outputs if not lies_below(name, self._folders)]
+        if strays:
+            # So it is after a move of all results, or if another program wrote into the receipt.
+            is_moved = len(strays) == len(receipt.outputs)
+            return Verdict(has_receipt=False, elsewhere=strays[0] if is_moved else None)
         outdated = [*self._changed_settings(receipt, settings)]
         outdated += [name for name, digest in receipt.inputs.items() if self._sum(name) != digest]
         outdated += [name for name in inputs if receipts.name_of(name) not in receipt.inputs]
@@ -159,7 +169,7 @@ class JobCheck:
                 if self.sums.of(name) != output.stamp.sha256:
                     damaged.append(name)
         self._oldest[path] = oldest
-        return Verdict(True, outdated, damaged, next(iter(receipt.outputs), None))
+        return Verdict(True, outdated, damaged)
 
     def _changed_settings(self, receipt: Receipt, settings: Mapping[str, Any]) -> Iterator[str]:
         """Yield the settings that are not as the receipt says, and the version of the stage."""

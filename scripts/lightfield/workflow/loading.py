@@ -1,7 +1,6 @@
 """Resolves the datasets of a configuration and its scene YAMLs, within a preset's limits."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 from lightfield.configuration import blend_lock, scene_yaml
@@ -278,12 +277,7 @@ def _frames(name: str, rig: Rig, frame: int | str) -> Iterator[tuple[str, int | 
 
 
 def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
-    """Return a rig within ``limits``. A file of poses gets an absolute path.
-
-    Views that exist already keep their resolution.
-    """
-    if isinstance(rig, Poses):
-        rig = rig.model_copy(update={"file": str(Path(rig.file).resolve())})
+    """Return a rig within ``limits``. Views that exist already keep their resolution."""
     if limits.views:
         rig = rig.thinned(limits.views)
     if is_rendered:

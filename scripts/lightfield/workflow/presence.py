@@ -4,7 +4,7 @@ import json
 import os
 import shlex
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -12,9 +12,10 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import Family
 from lightfield.core.errors import UserError
-from lightfield.core.files import DAMAGE, read_bytes, size_and_time
+from lightfield.core.files import DAMAGE, read_bytes, read_text, size_and_time
 from lightfield.core.names import LIGHTS
-from lightfield.core.paths import case_hint
+from lightfield.core.paths import case_hint, files_below, lies_below
+from lightfield.core.receipts import name_of
 from lightfield.workflow.failures import CLOCKS_DIFFER
 
 
@@ -103,17 +104,43 @@ def check_external_files(dataset: Dataset) -> None:
         )
 
 
-def check_times(paths: Iterable[str]) -> None:
-    """Raise `UserError` for a file whose time is in the future."""
-    now = time.time()
+def check_times(paths: Iterable[str], built: Sequence[str] = ()) -> None:
+    """Raise `UserError` for a file whose time is in the future.
+
+    ``built`` are the folders in which jobs made files, maybe on a node whose clock was ahead.
+    """
     for path in paths:
-        stamp = size_and_time(path)
-        if stamp and stamp[1] / 1e9 > now + CLOCKS_DIFFER:
-            shown = datetime.fromtimestamp(stamp[1] / 1e9).isoformat(" ", "minutes")
+        moment = time_of(path)
+        if moment > time.time() + CLOCKS_DIFFER:
+            shown = datetime.fromtimestamp(moment).isoformat(" ", "minutes")
+            problem = f"{path}: its time is in the future ({shown}), so"
+            if lies_below(path, map(name_of, built)):
+                raise UserError(
+                    f"{problem} no run sees what must be made again: set the clock of the machine "
+                    "that made it, and give all such files the present time: find -L "
+                    f"{shlex.join(built)} -newermt now -exec touch {{}} +"
+                )
             raise UserError(
-                f"{path}: its time is in the future ({shown}), so all that is made from it would "
-                f"look outdated; give it the present time: touch {shlex.quote(path)}"
+                f"{problem} all that is made from it would look outdated; give it the present "
+                f"time: touch {shlex.quote(path)}"
             )
+
+
+def time_of(path: str) -> float:
+    """Return when a file was changed, in seconds since 1970. 0 without a file."""
+    stamp = size_and_time(path)
+    return stamp[1] / 1e9 if stamp else 0.0
+
+
+def check_notes(folder: Path) -> None:
+    """Raise `UserError` for a note of Snakemake that is no text, at which Snakemake would crash."""
+    for path in files_below(folder, strict=False):
+        try:
+            read_text(path)
+        except UserError as error:
+            raise UserError(
+                f"{error}; remove the folder: rm -r {folder}; no plan needs it"
+            ) from None
 
 
 def check_imported(dataset: Dataset) -> None:

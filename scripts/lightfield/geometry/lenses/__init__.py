@@ -10,7 +10,7 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
-from lightfield.geometry.lenses.base import LENSES, Array, Lens, LensSettings, pair
+from lightfield.geometry.lenses.base import LENSES, MOST_PIXELS, Array, Lens, LensSettings, pair
 from lightfield.geometry.lenses.rectilinear import FileSettings
 
 __all__ = [
@@ -89,8 +89,11 @@ def from_lightfield(content: Mapping[str, Any]) -> Lens:
 
 def _pixel_count(side: Any) -> int:
     """Return an image's side. 96.0 is a whole number, too."""
-    if isinstance(side, bool) or not isinstance(side, int | float) or side % 1:
-        raise UserError(f"resolution: is {side!r}; must be two whole numbers of pixels")
+    is_number = isinstance(side, int | float) and not isinstance(side, bool)
+    if not is_number or side % 1 or not 1 <= side <= MOST_PIXELS:
+        raise UserError(
+            f"resolution: is {side!r}; must be two whole numbers of pixels from 1 to {MOST_PIXELS}"
+        )
     return int(side)
 
 

@@ -42,6 +42,8 @@ ANGLE_SLACK = 1e-6
 LENSES: dict[str, "type[Lens]"] = {}
 """All lenses by their names."""
 
+# The longest side of an image, or of a cube map's strip of faces.
+MOST_PIXELS = 2**19
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]

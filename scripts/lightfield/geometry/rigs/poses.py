@@ -147,11 +147,11 @@ def _read_poses(path: Path) -> PosesFile:
         raise UserError(
             f"{path}: has {units.size(status.st_size)}; must be at most {units.size(LARGEST_FILE)}"
         )
-    return _read_checked(path, status.st_mtime_ns)
+    return _read_checked(path, (status.st_ino, status.st_mtime_ns))
 
 
 @lru_cache(maxsize=8)
-def _read_checked(path: Path, _modified_ns: int) -> PosesFile:
+def _read_checked(path: Path, _version: tuple[int, int]) -> PosesFile:
     lf_type, matrix_key, frames = _READERS[path.suffix](path)
     if not frames:
         raise UserError(f"{path}: holds no pose")
