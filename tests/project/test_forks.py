@@ -8,7 +8,8 @@ PROGRAM = """
 import lightfield.core.errors
 from lightfield.core import names
 errors = lightfield.core.errors
-print(names.ROOT, errors.__file__, hasattr(errors, "added"), sep="\n")
+for said in (names.ROOT, errors.__file__, hasattr(errors, "added")):
+    print(said)
 """
 
 
@@ -49,7 +50,8 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
 
 WITH_BLENDER = """
 import os, bpy
-print(bpy.app.tempdir, len(os.listdir("/proc/self/task")), sep="\n")
+for said in (bpy.app.tempdir, len(os.listdir("/proc/self/task"))):
+    print(said)
 """
 
 
