@@ -1,5 +1,9 @@
 """Fixtures and helpers that several tests share. They run the programs as a user runs them."""
 
+import clean_environment  # noqa: F401
+
+# isort: split
+
 import compileall
 import fcntl
 import json
@@ -178,8 +182,11 @@ def small_disk(tmp_path):
 
 
 @pytest.fixture
-def nobody():
-    """A folder for a test that runs without the rights of root."""
+def nobody(monkeypatch):
+    """A folder for a test that runs without the rights of root.
+
+    The test has them again before monkeypatch returns to the checkout: it may lie in root's folder.
+    """
     with tempfile.TemporaryDirectory() as name:
         if os.geteuid():
             yield Path(name)

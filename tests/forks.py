@@ -1,8 +1,8 @@
 """Runs Snakemake and the programs in forks of a process that has imported what these need.
 
-Most of the time of a short run are imports. A server imports the libraries and the project's code,
-and reads the rules. A fork uses them as those of its test's checkout, if that has equal files.
-A second server also imports Blender. It forks for the programs that use Blender.
+Most of the time of a short run are imports. A server imports the libraries and the project's code.
+A fork uses the code as its test's checkout's, if that has equal files. A second server also
+imports Blender. It forks for the programs that use Blender.
 """
 
 import atexit
@@ -27,10 +27,7 @@ import sys
 import tempfile
 import traceback
 from contextlib import suppress
-from functools import partial
-from io import StringIO
 from pathlib import Path
-from types import CodeType, SimpleNamespace
 
 LIBRARIES = (
     # What Snakemake imports when it reads a Snakefile.
@@ -80,27 +77,14 @@ exec {python} -IS {client} {sockets} snakemake.py "$@"
 # Names what runs the programs of Snakemake's jobs in processes of their own, in place of python. It
 # is called python, too. A stand-in that imports no large library starts faster than a fork.
 PYTHON_OF_JOBS = "PYTHON_OF_JOBS"
-# Set in the environment of a request, if its fork shall obey permissions although it is root's.
-OBEDIENT = "OBEDIENT"
 # The exit status of a fork, once its program has ended.
 STATUS = []
 # The times and sizes of the files with the project's code, when it was imported.
 STATES = {}
 # The variables of the project's modules that hold paths, as pairs of all variables and a name.
 PLACES = []
-# What Snakemake makes of a file of rules, by the file's text: Python code, the line of the file for
-# each line of the code, and the number of rules. In the code, FILE stands for the file's path.
-RULES = {}
-FILE = "<file>"
-# This code as Python compiles it, by its text.
-COMPILED = {}
-# From Linux's mman.h, prctl.h and capability.h.
-MADV_COLLAPSE = 25
+# From Linux's prctl.h.
 PR_SET_PDEATHSIG = 1
-PR_CAPBSET_DROP = 24
-CAPABILITY_VERSION = 0x20080522
-CAP_DAC_OVERRIDE = 1
-CAP_DAC_READ_SEARCH = 2
 # Names the folder of the server that all test processes share.
 SHARED = "SERVER_OF_FORKS"
 
@@ -151,8 +135,12 @@ def start_server():
     # Clients can connect at once, and wait until the server has imported the libraries.
     listeners = [listen(folder / name) for name in ("plain", "blender")]
     numbers = [listener.fileno() for listener in listeners]
+    isolation = importlib.import_module("lightfield.core.isolation")
     server = subprocess.Popen(
-        [sys.executable, Path(__file__), folder, *map(str, numbers)], pass_fds=numbers
+        [sys.executable, Path(__file__), folder, *map(str, numbers)],
+        pass_fds=numbers,
+        # The libraries choose kernels by it when they are imported.
+        env=isolation.cleaned(os.environ) | isolation.own_variables(),
     )
     for listener in listeners:
         listener.close()
@@ -177,7 +165,6 @@ def start(folder, plain, blender):
     sys.modules["bpy"] = None
     import_code()
     del sys.modules["bpy"]
-    read_rules()
     first = os.getpid()
     if os.fork():
         blender.close()
@@ -205,7 +192,6 @@ def serve(folder, listener):
     # The collector would copy the memory of each fork. The forks end before they need it.
     gc.freeze()
     gc.disable()
-    use_huge_pages()
     forks = []
     while True:
         watched = [fork.ended for fork in forks] + [fork.client for fork in forks]
@@ -234,20 +220,6 @@ def serve(folder, listener):
             os.close(descriptor)
         os.setpgid(process, process)
         forks.append(Fork(process, client))
-
-
-def use_huge_pages():
-    """Put the server's memory into huge pages, so that a fork has fewer pages to copy and free.
-
-    Without it, a fork with its client takes 57 ms of CPU time instead of 42. Linux before 6.1 does
-    nothing.
-    """
-    madvise = ctypes.CDLL(None).madvise
-    for line in Path("/proc/self/maps").read_text().splitlines():
-        addresses, access, _, _, _, *name = line.split()
-        if "w" in access and name in ([], ["[heap]"]):
-            start, end = (int(address, 16) for address in addresses.split("-"))
-            madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), MADV_COLLAPSE)
 
 
 def import_libraries():
@@ -310,60 +282,6 @@ def import_code():
     for name in own_names():
         variables = vars(sys.modules[name])
         PLACES.extend((variables, key) for key, value in variables.items() if is_place(value))
-
-
-def read_rules():
-    """Parse and compile the rules. This takes most of the time in which Snakemake reads them.
-
-    Forks take the results for files with equal texts.
-    """
-    workflow = sys.modules["snakemake.workflow"]
-    source_file = sys.modules["snakemake.sourcecache"].LocalSourceFile
-    # The parser opens a file by the workflow that it belongs to.
-    opener = SimpleNamespace(open=lambda file: StringIO(Path(file.path).read_text()))
-    belongs_to = SimpleNamespace(sourcecache=opener)
-    for path in (CHECKOUT / "Snakefile", *(CHECKOUT / "rules").rglob("*.smk")):
-        lines = {}
-        code, rules = workflow.parse(source_file(str(path)), belongs_to, lines)
-        code = code.replace(repr(str(path)), repr(FILE))
-        RULES[path.read_text()] = code, lines, rules
-        COMPILED[code] = compile(code, FILE, "exec")
-    workflow.parse = partial(parse, workflow.parse)
-    workflow.compile = compile_rules
-
-
-def parse(parser, file, workflow, linemap, overwrite_shellcmd=None, rulecount=0):
-    """Do what Snakemake's ``parser`` does. Parses only what the server has not parsed.
-
-    The number of rules before a file only counts for rules without names. The project has none.
-    """
-    path = file.get_path_or_uri(secret_free=True)
-    # Other files are in Git or on the web.
-    is_local = type(file).__name__ == "LocalSourceFile" and Path(path).is_file()
-    text = Path(path).read_text() if is_local else None
-    if text not in RULES:
-        return parser(file, workflow, linemap, overwrite_shellcmd, rulecount)
-    code, lines, rules = RULES[text]
-    linemap.update(lines)
-    return code, rulecount + rules
-
-
-def compile_rules(code, path, mode):
-    """Compile the code of a file of rules. Compiles only what the server has not compiled."""
-    if code not in COMPILED:
-        return compile(code, path, mode)
-    return in_file(COMPILED[code], path)
-
-
-def in_file(code, path):
-    """Return compiled code as that of the file at a path."""
-    constants = []
-    for value in code.co_consts:
-        if isinstance(value, CodeType):
-            constants.append(in_file(value, path))
-        else:
-            constants.append(path if value == FILE else value)
-    return code.replace(co_filename=path, co_consts=tuple(constants))
 
 
 def subclasses(base):
@@ -511,28 +429,11 @@ def become(request, descriptors):
     os.environ.clear()
     os.environ.update(request["env"])
     resource.setrlimit(resource.RLIMIT_FSIZE, request["largest_file"])
-    if OBEDIENT in os.environ:
-        obey_permissions()
     for target, descriptor in enumerate(descriptors):
         os.dup2(descriptor, target)
         os.close(descriptor)
     sys.path[:0] = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     sys.argv = request["arguments"]
-
-
-def obey_permissions():
-    """Give up the rights to read and write files against their permissions."""
-    libc = ctypes.CDLL(None)
-    header = (ctypes.c_uint32 * 2)(CAPABILITY_VERSION, 0)
-    # The lower 32 capabilities that act, that are permitted, and that are inherited. Then the rest.
-    sets = (ctypes.c_uint32 * 6)()
-    libc.capget(header, sets)
-    for right in (CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH):
-        # Programs that the fork starts would have it again.
-        libc.prctl(PR_CAPBSET_DROP, right)
-        for kind in range(3):
-            sets[kind] &= ~(1 << right)
-    libc.capset(header, sets)
 
 
 def run_program(folder):

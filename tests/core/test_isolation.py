@@ -1,6 +1,7 @@
 """A user's environment, home and folder change no byte of what Python, Blender and numba make."""
 
 import ast
+import json
 import os
 import re
 import subprocess
@@ -10,10 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checkouts import checkout
 from conftest import SCRIPTS
 
+from lightfield.core import isolation
 from lightfield.core.files import sha256
 from lightfield.core.isolation import cleaned
+from lightfield.core.machine import has_avx2
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -146,7 +150,7 @@ def render(tmp_path_factory):
                 "--device",
                 "cpu",
             ],
-            env=os.environ | {name: str(value) for name, value in variables.items()},
+            env=cleaned(os.environ) | {name: str(value) for name, value in variables.items()},
             capture_output=True,
             text=True,
             check=False,
@@ -193,7 +197,7 @@ def reproject(tmp_path, run_program):
                 "--output-cfg",
                 output / "lightfield.json",
             ],
-            env=os.environ | variables,
+            env=cleaned(os.environ) | variables,
             capture_output=True,
             text=True,
             check=False,
@@ -207,6 +211,68 @@ def reproject(tmp_path, run_program):
 @pytest.mark.slow
 def test_a_reprojected_view_has_the_same_bytes_without_numbas_compiler(reproject):
     assert reproject("hostile", NUMBA_DISABLE_JIT="1") == reproject("clean")
+
+
+# Asks the libraries themselves which kernels they use.
+KERNELS = """
+import lightfield
+
+import ctypes
+import json
+from pathlib import Path
+import numba.core.registry
+import numpy
+import scipy.linalg
+
+def core(path):
+    library = ctypes.CDLL(path)
+    names = [f"{a}openblas_get_corename{b}" for a in ("", "scipy_") for b in ("", "64_")]
+    (ask,) = (getattr(library, name) for name in names if hasattr(library, name))
+    ask.restype = ctypes.c_char_p
+    return ask().decode()
+
+maps = Path("/proc/self/maps").read_text().splitlines()
+target = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+print(json.dumps({
+    "OpenBLAS": sorted({core(line.split()[-1]) for line in maps if "openblas" in line}),
+    "numpy": numpy.show_config(mode="dicts")["SIMD Extensions"]["found"][-1],
+    "numba": target[1:],
+}))
+"""
+
+
+@pytest.mark.skipif(not has_avx2(), reason="without AVX2, libraries choose by the processor")
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {},
+        {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "AVX2"},
+        {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "+sse"},
+    ],
+)
+def test_libraries_use_the_same_kernels_on_each_processor_with_avx2(variables, tmp_path):
+    program = checkout(tmp_path / "plenoforge") / "scripts/kernels.py"
+    program.write_text(KERNELS)
+    result = subprocess.run(
+        [sys.executable, program],
+        env=cleaned(os.environ) | variables,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    kernels = json.loads(result.stdout)
+    # Numpy 2.4 has a name for AVX2 with what Cycles needs, too.
+    assert kernels.pop("numpy") in ("AVX2", "X86_V3")
+    assert kernels == {"OpenBLAS": ["Haswell"], "numba": ["x86-64-v3", ""]}
+    # Each numpy passes over the names that it does not know.
+    assert not result.stderr
+
+
+def test_without_avx2_libraries_choose_their_kernels(monkeypatch):
+    """OpenBLAS would use AVX2 although the processor has none."""
+    assert "OPENBLAS_CORETYPE" in isolation.own_variables() or not has_avx2()
+    monkeypatch.setattr(isolation, "has_avx2", lambda: False)
+    assert not isolation.own_variables().keys() & {"OPENBLAS_CORETYPE", "NUMBA_CPU_NAME"}
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,16 @@ def test_a_machine_is_described_by_processor_maker_instructions_and_c_library(
     assert machine.describe(denoise, file) == f"{described}, glibc {LIBRARY().decode()}"
 
 
+@pytest.mark.parametrize(
+    ("flags", "has"), [(FAST, True), (FASTEST, True), (FAST.replace("fma ", ""), False)]
+)
+def test_a_processor_with_avx2_has_all_that_comes_with_it(flags, has, tmp_path):
+    file = tmp_path / "cpuinfo"
+    file.write_text(CPUINFO.format("AuthenticAMD", flags))
+    assert machine.has_avx2(file) == has
+    assert not machine.has_avx2(tmp_path / "missing")
+
+
 def test_an_unknown_processor_has_the_name_of_its_kind(tmp_path):
     described = machine.describe(False, tmp_path / "missing")
     assert described == f"x86_64, glibc {LIBRARY().decode()}"

@@ -1,4 +1,4 @@
-"""Forks run their checkout's code and rules, though these are read only once for all forks."""
+"""Forks run their checkout's code and rules, though most modules are imported only once for all."""
 
 from pathlib import Path
 
@@ -7,7 +7,9 @@ from checkouts import checkout, snakemake
 PROGRAM = """
 import lightfield.core.errors
 from lightfield.core import names
-print(names.ROOT, lightfield.core.errors.__file__, hasattr(lightfield.core.errors, "added"))
+errors = lightfield.core.errors
+for said in (names.ROOT, errors.__file__, hasattr(errors, "added")):
+    print(said)
 """
 
 
@@ -16,15 +18,15 @@ def test_a_fork_runs_the_code_of_its_checkout_and_notices_changes(tmp_path, run_
     program = folder / "scripts/say.py"
     program.write_text(PROGRAM)
     module = folder / "scripts/lightfield/core/errors.py"
-    assert run_program(program).stdout.split() == [str(folder), str(module), "False"]
+    assert run_program(program).stdout.splitlines() == [str(folder), str(module), "False"]
     with module.open("a") as file:
         file.write("added = True\n")
-    assert run_program(program).stdout.split() == [str(folder), str(module), "True"]
+    assert run_program(program).stdout.splitlines() == [str(folder), str(module), "True"]
     # A file may also appear, and another one vanish.
     package = module.with_suffix("")
     package.mkdir()
     module.rename(package / "__init__.py")
-    assert run_program(program).stdout.split() == [
+    assert run_program(program).stdout.splitlines() == [
         str(folder),
         str(package / "__init__.py"),
         "True",
@@ -48,14 +50,17 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
 
 WITH_BLENDER = """
 import os, bpy
-print(bpy.app.tempdir, len(os.listdir("/proc/self/task")))
+for said in (bpy.app.tempdir, len(os.listdir("/proc/self/task"))):
+    print(said)
 """
 
 
 def test_a_fork_has_blender_without_threads_and_with_a_folder_of_its_own(tmp_path, run_program):
     program = tmp_path / "program.py"
     program.write_text(WITH_BLENDER)
-    folders, threads = zip(*(run_program(program).stdout.split() for _ in range(2)), strict=True)
+    folders, threads = zip(
+        *(run_program(program).stdout.splitlines() for _ in range(2)), strict=True
+    )
     assert threads == ("1", "1")
     assert folders[0] != folders[1]
     # A fork removes it at its end.

@@ -88,7 +88,9 @@ def test_the_installed_packages_read_a_dataset_with_their_dependencies_alone(ins
 def test_a_program_beside_the_installed_library_is_not_started_anew(installed, tmp_path):
     """Jupyter's kernel is such a program. Of ours, each starts anew in a clean environment."""
     program = installed / "kernel_launcher.py"
-    program.write_text("import os, lightfield\nprint(os.environ['PYTHONPATH'], os.getpid())\n")
+    program.write_text(
+        "import os, lightfield\nprint(os.environ['PYTHONPATH'], os.getpid(), sep='\\n')\n"
+    )
     process = subprocess.Popen(
         [sys.executable, program],
         env={"PYTHONPATH": str(installed)},
@@ -96,4 +98,4 @@ def test_a_program_beside_the_installed_library_is_not_started_anew(installed, t
         text=True,
     )
     output, _ = process.communicate()
-    assert output.split() == [str(installed), str(process.pid)]
+    assert output.splitlines() == [str(installed), str(process.pid)]

@@ -193,7 +193,7 @@ def test_every_listed_light_of_a_family_is_checked(tmp_path, monkeypatch):
     write_scene(tmp_path, f"scene: {{}}\nfamily:\n  values:\n    {json.dumps(values)[1:-1]}\n")
     family = Family(models="*.obj", values=values)
     with pytest.raises(
-        UserError, match=r"chair\.yaml:4: scene\.light: \S*missing\.hdr: cannot be read"
+        UserError, match=r"chair\.yaml:4: scene\.light: .*missing\.hdr: cannot be read"
     ):
         presence.check_lights("chair", family)
 

@@ -3,6 +3,9 @@
 Some variables act when Python starts, and some when a library is loaded. Blender reads colours,
 start-up scripts and add-ons from the user's home. So a program that finds any of these restarts
 itself in a clean environment. It keeps its process and its arguments.
+
+Libraries choose kernels by the processor, and their last digits differ. So variables of ours make
+them use the kernels that all processors with AVX2 have.
 """
 
 import os
@@ -12,6 +15,7 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
+from lightfield.core.machine import has_avx2
 from lightfield.core.terminal import report_interrupts
 
 _SCRIPTS = Path(__file__).resolve().parents[2]
@@ -54,6 +58,16 @@ _HARMLESS = {
     "PYTHONUTF8",
     "NUMBA_CACHE_DIR",
 }
+# The kernels that libraries use on any processor with AVX2.
+_AVX2_KERNELS = {
+    "OPENBLAS_CORETYPE": "Haswell",
+    # The names in numpy 1.26, and in 2.4. Numpy passes over the others, with a hidden warning.
+    "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL "
+    "AVX512_SPR X86_V4",
+    "NUMBA_CPU_NAME": "x86-64-v3",
+    # None beside those of this name.
+    "NUMBA_CPU_FEATURES": "",
+}
 
 
 def isolate() -> None:
@@ -64,14 +78,11 @@ def isolate() -> None:
     if not _is_program():
         return
     report_interrupts()
-    own_variables = {
-        "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
-        "PYDANTIC_DISABLE_PLUGINS": "__all__",
-    }
-    environment = cleaned(os.environ) | own_variables
-    if environment == os.environ | own_variables and not site.ENABLE_USER_SITE:
-        # Only libraries read these two, and none is loaded yet.
-        os.environ.update(own_variables)
+    added = own_variables()
+    environment = cleaned(os.environ) | added
+    if environment == os.environ | added and not site.ENABLE_USER_SITE:
+        # Only libraries read these, and none is loaded yet.
+        os.environ.update(added)
         return
     # -s excludes the packages in the user's home.
     os.execve(sys.executable, [sys.executable, "-s", *sys.orig_argv[1:]], environment)
@@ -96,6 +107,16 @@ def cleaned(environment: Mapping[str, str]) -> dict[str, str]:
     if folders := _harmless_folders(variables.pop("LD_LIBRARY_PATH", "")):
         variables["LD_LIBRARY_PATH"] = folders
     return variables
+
+
+def own_variables() -> dict[str, str]:
+    """Return the variables that each program sets."""
+    # Without AVX2, these kernels would end the program.
+    kernels = _AVX2_KERNELS if has_avx2() else {}
+    return kernels | {
+        "BLENDER_USER_RESOURCES": str(_folder_without_user_files()),
+        "PYDANTIC_DISABLE_PLUGINS": "__all__",
+    }
 
 
 def _harmless_folders(library_path: str) -> str:
