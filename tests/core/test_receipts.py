@@ -100,10 +100,3 @@ def test_a_job_does_not_keep_a_receipt_that_names_files_of_others():
         receipt.seal()
     with opened() as receipt:
         assert not receipt.still_holds()
-
-
-def test_a_damaged_file_that_is_missing_is_not_made_by_its_reader():
-    write_lines(RECEIPT, "made/a")
-    with pytest.raises(UserError, match="made/a: is not as its job made it"):
-        receipts.check_files([RECEIPT])
-    assert not Path("made").exists()
