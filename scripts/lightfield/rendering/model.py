@@ -33,6 +33,8 @@ from lightfield.rendering.model_references import (
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import reading_quietly
 from lightfield.rendering.render_graph import in_render
+from lightfield.rendering.second_readers import compare, reading
+from lightfield.rendering.second_readers.facts import MeshFacts
 from lightfield.stages.scene import ImportModel, ImportSettings
 
 # The options of each importer that differ from its defaults. Cameras and lamps are removed anyway.
@@ -77,6 +79,8 @@ def import_model(job: ImportModel) -> None:
     write_json(job.record, content)
     if content["left_out"]:
         print(f"note: {model}: left out: {'; '.join(content['left_out'])}")
+    if "unjudged" in content:
+        print(f"note: {model}: not compared with the file: {'; '.join(content['unjudged'])}")
     print(f"{model}: {summary(content)}")
 
 
@@ -86,7 +90,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     ``folder`` is where the .blend will be.
 
     The record has the ``fingerprint``, the files that the model was read from as
-    ``external_files``, the parts that are ``left_out``, and its ``box`` in metres.
+    ``external_files``, the parts that are ``left_out``, its ``box`` in metres, and what the second
+    reader of the format cannot judge as ``unjudged``.
 
     Raises `UserError` for a model that is broken, empty, lacks files or parts, or names files
     outside its folder.
@@ -106,6 +111,7 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if not settings.allow_missing:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
+    facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
     skipped, printed = _import(path, settings.up)
     left_out += skipped
@@ -136,10 +142,16 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _paint(material, None)
     _give_material()
     bpy.context.scene.frame_set(settings.frame)
-    box = _box(path)
+    shown = in_render(compare.shown_meshes)
+    box = _box(path, shown)
+    if facts:
+        lost = [*facts.lost, *compare.differences(facts, shown)]
+        if not settings.allow_missing:
+            _refuse_without(path, lost)
+        left_out += [*lost, *facts.unused]
     if settings.unit == "box":
         _scale_to_box(path, box)
-        box = _box(path)
+        box = _box(path, in_render(compare.shown_meshes))
         if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
             raise UserError(
                 f"{path}: Blender does not scale all its parts alike; export it without "
@@ -161,12 +173,13 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         # An earlier version left them black.
         options["grey"] = len(unread_materials)
     names = [(entry["path"], entry["sha256"]) for entry in entries]
+    unjudged = facts.unjudged if facts else []
     return {
         "fingerprint": model_fingerprint(options, names),
         "box": box.round(6).tolist(),
         "external_files": entries,
         "left_out": left_out,
-    }
+    } | ({"unjudged": unjudged} if unjudged else {})
 
 
 def _import(path: Path, up: str) -> tuple[list[str], bytes]:
@@ -447,39 +460,14 @@ def _paint(material: Any, attribute: str | None) -> None:
         tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
 
 
-def _box(path: Path) -> Box:
-    """Return the box of all meshes as a render of the current frame has them.
-
-    Raises `UserError` if there is no face, or a coordinate is not a number.
-    """
-    boxes = in_render(_boxes)
-    if not boxes:
+def _box(path: Path, meshes: Sequence[MeshFacts]) -> Box:
+    """Return the box of all meshes. Raises `UserError` if there are none, or one is not finite."""
+    if not meshes:
         raise UserError(f"{path}: has no faces to render; must have a mesh with faces")
-    corners = np.array(boxes)
+    corners = np.array([mesh.box for mesh in meshes])
     if not np.isfinite(corners).all():
         raise UserError(f"{path}: has vertices whose places are not numbers; export it again")
     return np.array([corners[:, 0].min(0), corners[:, 1].max(0)])
-
-
-def _boxes(depsgraph: Any) -> list[Box]:
-    """Return the box of each mesh with faces. Vertices without a face are not visible."""
-    boxes: list[Box] = []
-    for instance in depsgraph.object_instances:
-        if instance.object.type != "MESH" or not instance.show_self:
-            continue
-        mesh = instance.object.data
-        if not mesh.polygons:
-            continue
-        places = np.empty((len(mesh.vertices), 3), np.float32)
-        mesh.vertices.foreach_get("co", places.ravel())
-        corners = np.empty(len(mesh.loops), np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        is_used = np.zeros(len(places), bool)
-        is_used[corners] = True
-        matrix = np.array(instance.matrix_world, np.float64)
-        used_places = places[is_used] @ matrix[:3, :3].T + matrix[:3, 3]
-        boxes.append(np.array([used_places.min(0), used_places.max(0)]))
-    return boxes
 
 
 def _scale_to_box(path: Path, box: Box) -> None:

@@ -1,0 +1,200 @@
+"""What a model file says, as a second reader of its format finds it, without Blender.
+
+Lengths are in metres before `unit: box` scales the model, or as in the file if it names no unit.
+Points are in the world of Blender: right-handed, z up.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# The parts of a material that a texture may give: the names of `MaterialFacts.textures`.
+ROLES = {
+    "base colour": "Base Color",
+    "opacity": "Alpha",
+    "metallic": "Metallic",
+    "roughness": "Roughness",
+    "normal": "Normal",
+    "emission": "Emission Color",
+    "transmission": "Transmission Weight",
+}
+
+
+@dataclass(frozen=True)
+class MeshFacts:
+    """One mesh as it stands in the world. Each instance of a mesh is one more.
+
+    ``box`` (2, 3) has the least and the largest coordinates of all corners of faces. A face of n
+    corners counts as n - 2 ``triangles``. ``area`` is the sum of the faces' vector areas, which
+    does not depend on how faces are split into triangles. None is what the reader cannot judge.
+
+    ``colour`` (3,) is the mean linear colour of all corners of faces, and ``opacity`` their mean
+    alpha. They are None if the mesh has no colours or alphas of its own, beside its material.
+    """
+
+    name: str
+    box: NDArray[np.float64]
+    triangles: int | None = None
+    area: float | None = None
+    colour: NDArray[np.float64] | None = None
+    opacity: float | None = None
+
+
+@dataclass(frozen=True)
+class MaterialFacts:
+    """A material that a mesh uses.
+
+    ``colour`` is its linear base colour, ``opacity`` its alpha from 0 to 1. None if a texture gives
+    them, or if the reader cannot judge them. ``textures`` has the names of picture files, without
+    folders, by `ROLES`. The name of a picture inside the model may be "", which is any picture.
+    """
+
+    name: str
+    colour: tuple[float, float, float] | None = None
+    opacity: float | None = None
+    textures: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelFacts:
+    """What a model file says.
+
+    ``lost`` are parts that Blender does not show, so that views would be wrong: the import is
+    refused, or notes them if `allow_missing`. ``unused`` are features that the file names, and that
+    no view shows, and are always noted. ``unjudged`` is what the reader cannot judge, said once.
+    """
+
+    meshes: list[MeshFacts]
+    materials: list[MaterialFacts] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    unused: list[str] = field(default_factory=list)
+    unjudged: list[str] = field(default_factory=list)
+
+
+# Places that are not finite are refused later, by name.
+_QUIETLY = np.errstate(invalid="ignore", over="ignore")
+
+
+class Geometry:
+    """The faces of a mesh in its own coordinates, ready to be placed as often as it is shown."""
+
+    @_QUIETLY
+    def __init__(
+        self,
+        places: ArrayLike,
+        corners: ArrayLike,
+        sizes: ArrayLike,
+        colours: NDArray[np.floating[Any]] | None = None,
+        opacities: NDArray[np.floating[Any]] | None = None,
+    ) -> None:
+        """Take vertices (V, 3), the vertices of all corners (C,), and each face's corners (F,).
+
+        ``colours`` (C, 3) are linear, and ``opacities`` (C,) from 0 to 1.
+
+        Corners at the place of the next, and faces at the place of another, are not counted: no
+        pixel shows them, and importers remove them.
+        """
+        points = np.asarray(places, np.float64).reshape(-1, 3)
+        corners = np.asarray(corners, np.int64).ravel()
+        sizes = np.asarray(sizes, np.int64).ravel()
+        self._used = points[np.unique(corners)]
+        self.colour = None if colours is None else colours.mean(0, dtype=np.float64)
+        self.opacity = None if opacities is None else float(opacities.mean(dtype=np.float64))
+        corners, sizes = _without_repeated(points, corners, sizes)
+        self.triangles = int((sizes - 2).sum())
+        self._areas = _vector_areas(points, corners, sizes)
+
+    def __bool__(self) -> bool:
+        return len(self._used) > 0
+
+    @_QUIETLY
+    def placed(self, name: str, world_from_mesh: NDArray[np.float64] | None = None) -> MeshFacts:
+        """Return the mesh at a place: (4, 4), or its own coordinates."""
+        matrix = np.eye(4) if world_from_mesh is None else np.asarray(world_from_mesh, np.float64)
+        points = self._used @ matrix[:3, :3].T + matrix[:3, 3]
+        areas = self._areas @ _cofactors(matrix[:3, :3]).T
+        return MeshFacts(
+            name,
+            np.array([points.min(0), points.max(0)]),
+            self.triangles,
+            float(np.linalg.norm(areas, axis=1).sum()),
+            self.colour,
+            self.opacity,
+        )
+
+
+def upright(facts: ModelFacts) -> ModelFacts:
+    """Return the facts of a model in which y points up with z up."""
+    return replace(facts, meshes=[replace(each, box=_upright(each.box)) for each in facts.meshes])
+
+
+def _upright(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    (x, y, z), (far_x, far_y, far_z) = box
+    return np.array([(x, -far_z, y), (far_x, -z, far_y)])
+
+
+def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) that turns vector areas as ``matrix`` turns points."""
+    first, second, third = matrix
+    return np.array([np.cross(second, third), np.cross(third, first), np.cross(first, second)])
+
+
+def _next_corners(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return for each corner the index of the next corner of its face. No face is empty."""
+    ends = np.cumsum(sizes)
+    following = np.arange(1, sizes.sum() + 1)
+    following[ends - 1] = ends - sizes
+    return following
+
+
+def _without_repeated(
+    points: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return corners and sizes without repeated corners, and without repeated or empty faces."""
+    sizes = sizes[sizes > 0]
+    places = _hashes(points)[corners]
+    is_kept = places != places[_next_corners(sizes)]
+    sizes = _sums(is_kept.astype(np.int64), sizes).astype(np.int64)
+    # What is left of a face may be a line.
+    is_face = sizes > 2
+    corners, places = (each[is_kept][np.repeat(is_face, sizes)] for each in (corners, places))
+    sizes = sizes[is_face]
+    _, first = np.unique(_sums(places, sizes), return_index=True)
+    is_first = np.zeros(len(sizes), bool)
+    is_first[first] = True
+    return corners[np.repeat(is_first, sizes)], sizes[is_first]
+
+
+def _hashes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Return a number for each place in 32 bits. Equal places have equal numbers."""
+    # The sum makes -0.0 to 0.0.
+    bits = (points.astype(np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
+    number = np.zeros(len(points), np.uint64)
+    for column in bits.T:
+        # The mixing steps of SplitMix64.
+        number = number * np.uint64(0x9E3779B97F4A7C15) + column
+        number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        number ^= number >> np.uint64(31)
+    return number
+
+
+def _sums(values: NDArray[Any], sizes: NDArray[np.int64]) -> NDArray[Any]:
+    """Return the sum of the values (C, …) of each face (F, …). No face is empty."""
+    if not len(sizes):
+        return np.zeros((0, *values.shape[1:]), values.dtype)
+    sums: NDArray[Any] = np.add.reduceat(values, np.cumsum(sizes) - sizes)
+    return sums
+
+
+def _vector_areas(
+    points: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the vector area (F, 3) of each face."""
+    first = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    # From the first corner, to lose no digits far from the origin.
+    arms = points[corners] - points[corners[first]]
+    return _sums(np.cross(arms, arms[_next_corners(sizes)]), sizes) / 2
