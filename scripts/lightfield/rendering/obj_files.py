@@ -36,7 +36,7 @@ _COLOURS = (b"map_ka", b"map_kd", b"map_ke", b"map_ks")
 _LINEAR_FILES = (".exr", ".hdr")
 
 
-class _Texture(NamedTuple):
+class Texture(NamedTuple):
     """A line of a library that names a texture: its keyword, options with their words, and file."""
 
     keyword: bytes
@@ -92,7 +92,7 @@ def _copy_obj(path: Path, copy: Path, libraries: list[Path]) -> None:
     """Copy an OBJ, with a line for each of its ``libraries`` in place of its own lines."""
     with copy.open("wb") as file:
         file.writelines(b"mtllib %s\n" % _relative(each, copy) for each in libraries)
-        file.writelines(line for line in _lines(path) if not _mentioned(line))
+        file.writelines(line for line in read_lines(path) if not _mentioned(line))
 
 
 def _copy_library(path: Path, copy: Path) -> None:
@@ -101,8 +101,8 @@ def _copy_library(path: Path, copy: Path) -> None:
     In the copy, their names begin at the copy's folder.
     """
     with copy.open("wb") as file:
-        for line in _lines(path):
-            if texture := _texture(path, line):
+        for line in read_lines(path):
+            if texture := texture_of(path, line):
                 options = [b" ".join(words) for words in texture.options if _is_read(words)]
                 words = [texture.keyword, *options, _relative(texture.file, copy)]
                 line = b" ".join(words) + b"\n"
@@ -111,6 +111,11 @@ def _copy_library(path: Path, copy: Path) -> None:
 
 def _relative(path: Path, named_by: Path) -> bytes:
     return os.fsencode(os.path.relpath(path, named_by.parent))
+
+
+def libraries(path: Path) -> list[Path]:
+    """Return the libraries of an OBJ that exist."""
+    return _library_files(path, _mentions(path))
 
 
 def _library_files(path: Path, mentions: Iterable[bytes]) -> list[Path]:
@@ -129,7 +134,7 @@ def _libraries(path: Path, mentions: Iterable[bytes]) -> list[bytes]:
 
 def _mentions(path: Path) -> list[bytes]:
     """Return what follows mtllib in the lines of an OBJ."""
-    return [text for text in map(_mentioned, _lines(path)) if text]
+    return [text for text in map(_mentioned, read_lines(path)) if text]
 
 
 def _mentioned(line: bytes) -> bytes | None:
@@ -162,12 +167,12 @@ def _is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113
 
 
-def _textures(path: Path) -> Iterator[_Texture]:
+def _textures(path: Path) -> Iterator[Texture]:
     """Yield the textures that a library names."""
-    yield from filter(None, (_texture(path, line) for line in _lines(path)))
+    yield from filter(None, (texture_of(path, line) for line in read_lines(path)))
 
 
-def _texture(path: Path, line: bytes) -> _Texture | None:
+def texture_of(path: Path, line: bytes) -> Texture | None:
     """Return the texture that a line of a library names. None if it names none."""
     match = _TEXTURE.match(line)
     if not match:
@@ -178,7 +183,7 @@ def _texture(path: Path, line: bytes) -> _Texture | None:
         words, rest = _option(rest)
         options.append(words)
     file, is_escaped = _texture_file(path, rest)
-    return _Texture(keyword, options, file, is_escaped)
+    return Texture(keyword, options, file, is_escaped)
 
 
 def _option(text: bytes) -> tuple[list[bytes], bytes]:
@@ -222,7 +227,7 @@ def _colour_spaces(path: Path) -> Iterator[str]:
                 yield f"the colour space {printable(os.fsdecode(words[0]))} of {name}"
 
 
-def _lines(path: Path) -> Iterator[bytes]:
+def read_lines(path: Path) -> Iterator[bytes]:
     """Yield the lines of an OBJ or a library. A backslash at the end of a line continues it."""
     begun = b""
     with path.open("rb") as file:

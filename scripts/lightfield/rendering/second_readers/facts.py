@@ -126,6 +126,14 @@ class Geometry:
         )
 
 
+def linear_colours(colours: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return the linear colours of sRGB colours. Negative ones are 0."""
+    # Few models have colours, and this module takes long to import.
+    from lightfield.imaging.tonemap import decode_srgb
+
+    return decode_srgb(np.maximum(colours, 0))
+
+
 def upright(facts: ModelFacts) -> ModelFacts:
     """Return the facts of a model in which y points up with z up."""
     return replace(facts, meshes=[replace(each, box=_upright(each.box)) for each in facts.meshes])
@@ -145,7 +153,7 @@ def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 def _next_corners(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return for each corner the index of the next corner of its face. No face is empty."""
     ends = np.cumsum(sizes)
-    following = np.arange(1, sizes.sum() + 1)
+    following = np.arange(1, int(sizes.sum()) + 1)
     following[ends - 1] = ends - sizes
     return following
 
@@ -160,11 +168,11 @@ def _without_repeated(
     sizes = _sums(is_kept.astype(np.int64), sizes).astype(np.int64)
     # What is left of a face may be a line.
     is_face = sizes > 2
-    corners, places = (each[is_kept][np.repeat(is_face, sizes)] for each in (corners, places))
+    is_kept[is_kept] = np.repeat(is_face, sizes)
+    corners, places = corners[is_kept], places[is_kept]
     sizes = sizes[is_face]
     _, first = np.unique(_sums(places, sizes), return_index=True)
-    is_first = np.zeros(len(sizes), bool)
-    is_first[first] = True
+    is_first = np.isin(np.arange(len(sizes)), first)
     return corners[np.repeat(is_first, sizes)], sizes[is_first]
 
 
