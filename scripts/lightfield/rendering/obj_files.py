@@ -19,6 +19,7 @@ from lightfield.rendering.model_references import (
     printable,
     refuse_special,
 )
+from lightfield.rendering.second_readers.text_lines import lines_with
 
 _TEXTURE = re.compile(rb"\s*(map_\w+|bump|disp|decal|refl|norm)\s+(.*?)\s*$", re.IGNORECASE)
 # The options of a texture, and the most words that follow each.
@@ -134,7 +135,7 @@ def _libraries(path: Path, mentions: Iterable[bytes]) -> list[bytes]:
 
 def _mentions(path: Path) -> list[bytes]:
     """Return what follows mtllib in the lines of an OBJ."""
-    return [text for text in map(_mentioned, read_lines(path)) if text]
+    return [text for text in map(_mentioned, lines_with(path, b"mtllib")) if text]
 
 
 def _mentioned(line: bytes) -> bytes | None:

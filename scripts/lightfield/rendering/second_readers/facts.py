@@ -100,7 +100,9 @@ class Geometry:
         points = np.asarray(places, np.float64).reshape(-1, 3)
         corners = np.asarray(corners, np.int64).ravel()
         sizes = np.asarray(sizes, np.int64).ravel()
-        self._used = points[np.unique(corners)]
+        is_used = np.zeros(len(points), bool)
+        is_used[corners] = True
+        self._used = points[is_used]
         self.colour = None if colours is None else colours.mean(0, dtype=np.float64)
         self.opacity = None if opacities is None else float(opacities.mean(dtype=np.float64))
         corners, sizes = _without_repeated(points, corners, sizes)
@@ -202,7 +204,10 @@ def _vector_areas(
     points: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Return the vector area (F, 3) of each face."""
-    first = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    if (sizes == 3).all():
+        first, second, third = points[corners.reshape(-1, 3)].transpose(1, 0, 2)
+        return np.cross(second - first, third - first) / 2
     # From the first corner, to lose no digits far from the origin.
-    arms = points[corners] - points[corners[first]]
+    starts = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    arms = points[corners] - points[corners[starts]]
     return _sums(np.cross(arms, arms[_next_corners(sizes)]), sizes) / 2

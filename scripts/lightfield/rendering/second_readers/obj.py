@@ -99,24 +99,24 @@ class _Reader:
     def _read_faces(
         self, lines: Lines, is_face: NDArray[np.bool_], vertices_before: NDArray[np.int64]
     ) -> None:
-        numbers, sizes = lines.numbers(is_face, b"f")
+        numbers, sizes = lines.whole_numbers(is_face, b"f")
         face_of = np.repeat(np.arange(len(sizes)), sizes)
         known = vertices_before[is_face][face_of]
         # Negative numbers count back from the last vertex.
         corners = np.where(numbers < 0, known + numbers, numbers - 1)
-        is_wrong = ~((corners >= 0) & (corners < known) & (corners == np.floor(corners)))
+        is_wrong = (corners < 0) | (corners >= known)
         if is_wrong.any():
             line = np.flatnonzero(is_face)[face_of[np.argmax(is_wrong)]]
             lines.refuse(line, "has a face with a vertex that does not exist")
         starts = np.flatnonzero(lines.starting_with(b"o"))
+        ends = np.concatenate([[0], np.cumsum(sizes)])
         owners = np.searchsorted(starts, np.flatnonzero(is_face))
         for number in range(len(starts) + 1):
             if number:
                 name = lines.text(starts[number - 1])[1:].strip()
                 self.parts.append(_Part(os.fsdecode(name)))
             first, last = np.searchsorted(owners, [number, number + 1])
-            ends = np.concatenate([[0], np.cumsum(sizes)])
-            self.parts[-1].corners.append(corners[ends[first] : ends[last]].astype(np.int64))
+            self.parts[-1].corners.append(corners[ends[first] : ends[last]])
             self.parts[-1].sizes.append(sizes[first:last])
 
     def _read_materials(self, lines: Lines, is_face: NDArray[np.bool_]) -> None:

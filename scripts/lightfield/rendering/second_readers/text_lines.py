@@ -1,6 +1,7 @@
 """Reads the numbers of a long text by its lines, many lines at once."""
 
 import os
+import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,9 @@ from lightfield.rendering.model_references import printable
 
 # Bytes that are read at once.
 _PART = 1 << 24
-_NEWLINE, _BLANK, _SLASH, _HASH = b"\n /#"
+_NEWLINE, _BLANK, _SLASH, _HASH, _MINUS, _ZERO = b"\n /#-0"
+# More digits are no index of a vertex.
+_MOST_DIGITS = 18
 
 
 class Lines:
@@ -28,22 +31,30 @@ class Lines:
         ends = np.flatnonzero(self._bytes == _NEWLINE)
         self._starts = np.concatenate([[0], ends[:-1] + 1]).astype(np.int64)
         self._sizes = ends + 1 - self._starts
-        words = np.append(np.flatnonzero(self._bytes > _BLANK), len(text))
-        # The first word of each line. That of a blank line lies in another line.
-        self._words = words[np.searchsorted(words, self._starts)]
+        # The first word of each line, or the end of a blank line.
+        self._words = self._starts.copy()
+        indented = np.arange(len(self._words))
+        while len(indented := indented[self._is_indented(self._words[indented])]):
+            self._words[indented] += 1
+        self._initials = self._bytes[self._words]
+
+    def _is_indented(self, places: NDArray[np.int64]) -> NDArray[np.bool_]:
+        found = self._bytes[places]
+        is_indented: NDArray[np.bool_] = (found <= _BLANK) & (found != _NEWLINE)
+        return is_indented
 
     def __len__(self) -> int:
         return len(self._starts)
 
     def starting_with(self, word: bytes) -> NDArray[np.bool_]:
         """Return which lines (L,) have ``word`` as their first word."""
-        is_equal = self._words + len(word) < self._starts + self._sizes
-        places = self._words[is_equal]
-        for number, byte in enumerate(word):
-            is_same = self._bytes[places + number] == byte
-            is_equal[is_equal] = is_same
-            places = places[is_same]
-        is_equal[is_equal] = self._bytes[places + len(word)] <= _BLANK
+        is_equal: NDArray[np.bool_] = self._initials == word[0]
+        lines = np.flatnonzero(is_equal)
+        for number, byte in enumerate(word[1:], 1):
+            lines = lines[self._bytes[self._words[lines] + number] == byte]
+        lines = lines[self._bytes[self._words[lines] + len(word)] <= _BLANK]
+        is_equal[:] = False
+        is_equal[lines] = True
         return is_equal
 
     def text(self, line: int | np.integer[Any]) -> bytes:
@@ -56,23 +67,58 @@ class Lines:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return the numbers after the first word of lines, and how many each line has.
 
-        ``chosen`` (L,) says which lines, and ``word`` is their first word. What follows a slash in
-        a number, or # in a line, is passed over. Raises `UserError` for what is not a number.
+        ``chosen`` (L,) says which lines, and ``word`` is their first word. What follows # is passed
+        over. Raises `UserError` for what is not a number.
+        """
+        text, _, counts = self._values(chosen, word)
+        numbers = _parsed(text.tobytes())
+        if len(numbers) != counts.sum():
+            self._refuse(chosen, word)
+        return numbers, counts
+
+    def whole_numbers(
+        self, chosen: NDArray[np.bool_], word: bytes
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the whole numbers after the first word of lines, as `numbers` does.
+
+        What follows a slash in a value is passed over, too.
+        """
+        text, starts, counts = self._values(chosen, word)
+        is_negative = text[starts] == _MINUS
+        places = starts + is_negative
+        numbers = np.zeros(len(starts), np.int64)
+        left = np.arange(len(starts))
+        for _ in range(_MOST_DIGITS):
+            digits = text[places[left]] - _ZERO
+            is_digit = digits < 10
+            left = left[is_digit]
+            if not len(left):
+                break
+            numbers[left] = numbers[left] * 10 + digits[is_digit]
+            places[left] += 1
+        ends = text[places]
+        if not ((places > starts + is_negative) & ((ends <= _BLANK) | (ends == _SLASH))).all():
+            self._refuse(chosen, word)
+        return np.where(is_negative, -numbers, numbers), counts
+
+    def _values(
+        self, chosen: NDArray[np.bool_], word: bytes
+    ) -> tuple[NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
+        """Return the text after the first word of lines, where its values start, and their counts.
+
+        Each line keeps its end.
         """
         is_kept = np.repeat(chosen, self._sizes)
         for number in range(len(word)):
             is_kept[self._words[chosen] + number] = False
-        kept = self._bytes[is_kept]
-        kept = _without(kept, _HASH, kept == _NEWLINE)
-        kept = _without(kept, _SLASH, kept <= _BLANK)
-        is_word = kept > _BLANK
-        is_start = is_word & ~np.concatenate([[False], is_word[:-1]])
-        ends = np.flatnonzero(kept == _NEWLINE)
-        counts = np.diff(np.searchsorted(np.flatnonzero(is_start), ends), prepend=0)
-        numbers = _parsed(kept.tobytes())
-        if len(numbers) != counts.sum():
-            self._refuse(chosen, word)
-        return numbers, counts
+        text = self._bytes[is_kept]
+        if _HASH in text:
+            text = np.frombuffer(re.sub(rb"#[^\n]*", b"", text.tobytes()), np.uint8)
+        is_word = text > _BLANK
+        is_word[1:] &= text[:-1] <= _BLANK
+        starts = np.flatnonzero(is_word)
+        ends = np.flatnonzero(text == _NEWLINE)
+        return text, starts, np.diff(np.searchsorted(starts, ends), prepend=0)
 
     def refuse(self, line: int | np.integer[Any], reason: str) -> NoReturn:
         """Raise `UserError` about a line."""
@@ -90,6 +136,22 @@ class Lines:
 
 def read_lines(path: Path) -> Iterator[Lines]:
     """Yield the lines of a text in parts. A continued line is one line."""
+    for text, first in _parts(path):
+        yield Lines(path, text, first)
+
+
+def lines_with(path: Path, word: bytes) -> Iterator[bytes]:
+    """Yield the lines of a text that contain a word."""
+    for text, _ in _parts(path):
+        place = text.find(word)
+        while place >= 0:
+            end = text.index(b"\n", place)
+            yield text[text.rfind(b"\n", 0, place) + 1 : end]
+            place = text.find(word, end)
+
+
+def _parts(path: Path) -> Iterator[tuple[bytes, int]]:
+    """Yield whole lines, and the number of their first line."""
     first = 1
     with path.open("rb") as file:
         while text := file.read(_PART):
@@ -100,19 +162,8 @@ def read_lines(path: Path) -> Iterator[Lines]:
             count = text.count(b"\n")
             if b"\\" in text:
                 text = text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
-            yield Lines(path, text, first)
+            yield text, first
             first += count
-
-
-def _without(text: NDArray[np.uint8], mark: int, is_end: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return a text without the bytes from a mark to the next end, which is kept."""
-    is_mark = text == mark
-    if not is_mark.any():
-        return text
-    places = np.arange(len(text))
-    last_mark = np.maximum.accumulate(np.where(is_mark, places, -1))
-    last_end = np.maximum.accumulate(np.where(is_end, places, 0))
-    return text[last_mark < last_end]
 
 
 def _parsed(text: bytes) -> NDArray[np.float64]:
