@@ -3,7 +3,6 @@
 import logging
 import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -23,7 +22,15 @@ from lightfield.core.paths import case_hint
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
-from lightfield.rendering import blend_file, model_files, model_light, obj_files, ply_files
+from lightfield.rendering import (
+    blend_file,
+    model_files,
+    model_light,
+    model_paint,
+    obj_files,
+    ply_files,
+    stl_files,
+)
 from lightfield.rendering.model_references import (
     FileReference,
     printable,
@@ -54,6 +61,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 _AXES = {
     "y": {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"},
     "z": {"forward_axis": "Y", "up_axis": "Z"},
+}
+
+# What gives a mesh the colours and textures that Blender's importer does not read.
+_COMPLETE: dict[str, Callable[[Path, Any], list[str]]] = {
+    ".ply": ply_files.complete,
+    ".stl": stl_files.complete,
 }
 
 # If a model's largest side is beyond these, it is a mistake, and Blender's 32 bits cannot hold it.
@@ -113,8 +126,11 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
     facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
-    skipped, printed = _import(path, settings.up)
-    left_out += skipped
+    left_out += _import(path, settings.up)
+    if path.suffix.lower() in _COMPLETE:
+        left_out += [
+            each for mesh in bpy.data.meshes for each in _COMPLETE[path.suffix.lower()](path, mesh)
+        ]
     if path.suffix.lower() == ".fbx":
         left_out += _forget_folders()
     unread_materials = _unread_materials()
@@ -134,13 +150,12 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
-    if path.suffix.lower() == ".ply":
-        count = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
-        left_out += ply_files.faces_left_out(path, count, printed)
+    if path.suffix.lower() == ".obj":
+        model_paint.show_luminance()
     _pack(path)
     for material in unread_materials:
-        _paint(material, None)
-    _give_material()
+        model_paint.paint(material)
+    model_paint.give_material()
     bpy.context.scene.frame_set(settings.frame)
     shown = in_render(compare.shown_meshes)
     box = _box(path, shown)
@@ -182,8 +197,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     } | ({"unjudged": unjudged} if unjudged else {})
 
 
-def _import(path: Path, up: str) -> tuple[list[str], bytes]:
-    """Import a model with the importer of its suffix. Return what it skips, and what it prints.
+def _import(path: Path, up: str) -> list[str]:
+    """Import a model with the importer of its suffix. Return what it skips.
 
     Raises `UserError` if it refuses the model.
     """
@@ -203,8 +218,7 @@ def _import(path: Path, up: str) -> tuple[list[str], bytes]:
     readable = obj_files.readable(path) if family == "obj" else nullcontext(path)
     try:
         with (
-            tempfile.NamedTemporaryFile() as printed,
-            reading_quietly(path, Path(printed.name)),
+            reading_quietly(path),
             _skipped_by_gltf() as skipped,
             readable as file,
         ):
@@ -212,14 +226,13 @@ def _import(path: Path, up: str) -> tuple[list[str], bytes]:
             result = operators[family](filepath=str(file.absolute()), **options)
             if file != path:
                 _normalise_textures()
-            log = printed.read()
     except RuntimeError as error:
         raise UserError(_refusal(path, str(error))) from None
     except UnicodeError:
         raise UserError(_refusal(path, "it has a name that is not UTF-8")) from None
     if "FINISHED" not in result:
         raise UserError(_refusal(path, "it says nothing more"))
-    return skipped, log
+    return skipped
 
 
 def _normalise_textures() -> None:
@@ -419,45 +432,6 @@ def _name_caches_from(folder: Path) -> None:
 def _unread_materials() -> list[Any]:
     """Return the materials whose shader the importer of USD does not read: they have no nodes."""
     return [material for material in bpy.data.materials if not material.node_tree.nodes]
-
-
-def _give_material() -> None:
-    """Give meshes without a material one: of their own colours, or else grey."""
-    plain = None
-    coloured: dict[str, Any] = {}
-    for mesh in bpy.data.meshes:
-        if any(mesh.materials):
-            continue
-        mesh.materials.clear()
-        colours = mesh.color_attributes.active_color
-        if colours is None:
-            plain = plain or _material("plain", None)
-            mesh.materials.append(plain)
-        else:
-            if colours.name not in coloured:
-                coloured[colours.name] = _material("coloured", colours.name)
-            mesh.materials.append(coloured[colours.name])
-
-
-def _material(name: str, attribute: str | None) -> Any:
-    """Return a new matt material, grey or with the colours of an attribute."""
-    material = bpy.data.materials.new(name)
-    _paint(material, attribute)
-    return material
-
-
-def _paint(material: Any, attribute: str | None) -> None:
-    """Make a material matt, and grey or of the colours of an attribute."""
-    tree = material.node_tree
-    tree.nodes.clear()
-    shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    shader.inputs["Base Color"].default_value = (0.5, 0.5, 0.5, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
-    if attribute:
-        colours = tree.nodes.new("ShaderNodeAttribute")
-        colours.attribute_name = attribute
-        tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
 
 
 def _box(path: Path, meshes: Sequence[MeshFacts]) -> Box:

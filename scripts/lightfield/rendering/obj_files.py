@@ -76,7 +76,7 @@ def readable(path: Path) -> Iterator[Path]:
     """Yield an OBJ that Blender reads right: the file itself, or a copy if Blender misreads it."""
     mentions = _mentions(path)
     libraries = _library_files(path, mentions)
-    misread = [file for file in libraries if any(each.is_misread for each in _textures(file))]
+    misread = [file for file in libraries if _is_misread(file)]
     if not misread and all(_names(path, text) == [text] for text in mentions):
         yield path
         return
@@ -97,10 +97,11 @@ def _copy_obj(path: Path, copy: Path, libraries: list[Path]) -> None:
 
 
 def _copy_library(path: Path, copy: Path) -> None:
-    """Copy a library without the options that Blender misreads. The textures stay in their place.
+    """Copy a library without the options that Blender misreads, and with `d` in place of `Tr`.
 
-    In the copy, their names begin at the copy's folder.
+    The textures stay in their place. In the copy, their names begin at the copy's folder.
     """
+    opacities = _opacities(path)
     with copy.open("wb") as file:
         for line in read_lines(path):
             if texture := texture_of(path, line):
@@ -108,6 +109,33 @@ def _copy_library(path: Path, copy: Path) -> None:
                 words = [texture.keyword, *options, _relative(texture.file, copy)]
                 line = b" ".join(words) + b"\n"
             file.write(line)
+            name = _material_name(line)
+            if name in opacities:
+                file.write(b"d %r\n" % opacities[name])
+
+
+def _is_misread(path: Path) -> bool:
+    return any(each.is_misread for each in _textures(path)) or bool(_opacities(path))
+
+
+def _opacities(path: Path) -> dict[bytes | None, float]:
+    """Return the opacity of each material of a library that has only its opposite, `Tr`."""
+    opacities: dict[bytes | None, float] = {}
+    name, has_opacity = None, set()
+    for line in read_lines(path):
+        name = _material_name(line) or name
+        keyword, *words = line.split() or [b""]
+        if keyword == b"d":
+            has_opacity.add(name)
+        elif keyword.lower() == b"tr" and len(words) == 1 and _NUMBER.fullmatch(words[0]):
+            opacities[name] = 1 - float(words[0])
+    return {name: value for name, value in opacities.items() if name not in has_opacity}
+
+
+def _material_name(line: bytes) -> bytes | None:
+    """Return the name of the material that a line of a library begins. None if it does not."""
+    words = line.split(None, 1)
+    return words[1].strip() if words[:1] == [b"newmtl"] and len(words) == 2 else None
 
 
 def _relative(path: Path, named_by: Path) -> bytes:

@@ -11,11 +11,11 @@ from lightfield.workflow.failures import HAS_READ, MOST_MINUTES, READS
 
 
 @contextmanager
-def quiet(printed: Path = Path(os.devnull)) -> Iterator[None]:
-    """Write what Blender itself prints to standard output into the file ``printed``."""
+def quiet() -> Iterator[None]:
+    """Drop what Blender itself prints to standard output."""
     sys.stdout.flush()
     saved = os.dup(1)
-    with printed.open("wb") as file:
+    with Path(os.devnull).open("wb") as file:
         os.dup2(file.fileno(), 1)
         try:
             yield
@@ -25,8 +25,8 @@ def quiet(printed: Path = Path(os.devnull)) -> Iterator[None]:
 
 
 @contextmanager
-def reading_quietly(path: Path, printed: Path = Path(os.devnull)) -> Iterator[None]:
-    """Write what Blender prints while it reads a file into ``printed``, and limit its time.
+def reading_quietly(path: Path) -> Iterator[None]:
+    """Drop what Blender prints while it reads a file, and limit its time.
 
     The log has the name of the file before Blender begins: a crash ends the process at once.
     """
@@ -34,7 +34,7 @@ def reading_quietly(path: Path, printed: Path = Path(os.devnull)) -> Iterator[No
     # Python cannot end Blender itself, so the alarm ends the process.
     signal.alarm(60 * MOST_MINUTES)
     try:
-        with quiet(printed):
+        with quiet():
             yield
     finally:
         signal.alarm(0)

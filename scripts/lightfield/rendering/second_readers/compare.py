@@ -83,8 +83,10 @@ def _corner_colours(mesh: Any, corners: NDArray[np.int32]) -> NDArray[np.float32
 def _of_meshes(said: Sequence[MeshFacts], shown: Sequence[MeshFacts]) -> Iterator[str]:
     """Yield the meshes that differ, and the meshes of only one side.
 
-    Blender may change names, so equal meshes are found first, and then meshes of equal names.
+    A mesh of one place or one line does not count. Blender may change names, so equal meshes are
+    found first, and then meshes of equal names.
     """
+    said, shown = ([mesh for mesh in side if mesh.triangles != 0] for side in (said, shown))
     size = _size([*said, *shown])
     unlike, left = _unmatched(said, shown, size)
     by_name = {mesh.name: mesh for mesh in left}

@@ -103,9 +103,13 @@ class Geometry:
         is_used = np.zeros(len(points), bool)
         is_used[corners] = True
         self._used = points[is_used]
-        self.colour = None if colours is None else colours.mean(0, dtype=np.float64)
-        self.opacity = None if opacities is None else float(opacities.mean(dtype=np.float64))
+        has_corners = len(corners) > 0
+        self.colour = (
+            colours.mean(0, dtype=np.float64) if colours is not None and has_corners else None
+        )
+        self.opacity = float(opacities.mean()) if opacities is not None and has_corners else None
         corners, sizes = _without_repeated(points, corners, sizes)
+        self.faces = len(sizes)
         self.triangles = int((sizes - 2).sum())
         self._areas = _vector_areas(points, corners, sizes)
 

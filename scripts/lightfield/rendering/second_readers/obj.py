@@ -137,7 +137,7 @@ class _Reader:
         meshes = [
             geometry.placed(part.name)
             for part in self.parts
-            if (geometry := _geometry(part, points, linear)).triangles
+            if (geometry := _geometry(part, points, linear))
         ]
         named = [name for name in self.used_materials if name]
         used = [name for name in named if name in materials]

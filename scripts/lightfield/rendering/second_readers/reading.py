@@ -7,13 +7,17 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import UP
-from lightfield.rendering.second_readers import obj
+from lightfield.rendering.second_readers import obj, ply, stl
 from lightfield.rendering.second_readers.facts import ModelFacts, upright
 
 # Formats whose files say which axis points up, and what moves. Readers take the path and the frame.
 _MOVING: dict[str, Callable[[Path, int], ModelFacts]] = {}
 # The formats of `UP`.
-_STILL: dict[str, Callable[[Path], ModelFacts]] = {".obj": obj.read}
+_STILL: dict[str, Callable[[Path], ModelFacts]] = {
+    ".obj": obj.read,
+    ".ply": ply.read,
+    ".stl": stl.read,
+}
 
 
 def read(path: Path, up: str, frame: int) -> ModelFacts | None:

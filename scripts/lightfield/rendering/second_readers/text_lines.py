@@ -71,7 +71,7 @@ class Lines:
         over. Raises `UserError` for what is not a number.
         """
         text, _, counts = self._values(chosen, word)
-        numbers = _parsed(text.tobytes())
+        numbers = parse_numbers(text.tobytes())
         if len(numbers) != counts.sum():
             self._refuse(chosen, word)
         return numbers, counts
@@ -130,7 +130,7 @@ class Lines:
     def _refuse(self, chosen: NDArray[np.bool_], word: bytes) -> None:
         for line in np.flatnonzero(chosen):
             for text in self.text(line)[len(word) :].partition(b"#")[0].split():
-                if len(_parsed(text.partition(b"/")[0])) != 1:
+                if len(parse_numbers(text.partition(b"/")[0])) != 1:
                     self.refuse(line, "has a value that is not a number")
 
 
@@ -166,7 +166,7 @@ def _parts(path: Path) -> Iterator[tuple[bytes, int]]:
             first += count
 
 
-def _parsed(text: bytes) -> NDArray[np.float64]:
+def parse_numbers(text: bytes) -> NDArray[np.float64]:
     """Return the numbers of a text up to the first word that is none."""
     with warnings.catch_warnings():
         # This is how numpy reports a word that is no number.
