@@ -3,7 +3,7 @@
 import os
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,6 +18,7 @@ _PART = 1 << 24
 _NEWLINE, _BLANK, _SLASH, _HASH, _MINUS, _ZERO = b"\n /#-0"
 # More digits are no index of a vertex.
 _MOST_DIGITS = 18
+_INDEX = re.compile(rb"-?\d{1,18}(/.*)?")
 
 
 class Lines:
@@ -73,7 +74,7 @@ class Lines:
         text, _, counts = self._values(chosen, word)
         numbers = parse_numbers(text.tobytes())
         if len(numbers) != counts.sum():
-            self._refuse(chosen, word)
+            self._refuse(chosen, word, lambda value: len(parse_numbers(value)) == 1)
         return numbers, counts
 
     def whole_numbers(
@@ -98,7 +99,7 @@ class Lines:
             places[left] += 1
         ends = text[places]
         if not ((places > starts + is_negative) & ((ends <= _BLANK) | (ends == _SLASH))).all():
-            self._refuse(chosen, word)
+            self._refuse(chosen, word, _INDEX.fullmatch)
         return np.where(is_negative, -numbers, numbers), counts
 
     def _values(
@@ -127,11 +128,16 @@ class Lines:
             f"{self._path}: {reason} in line {self._first + line}: {text!r}; export it again"
         )
 
-    def _refuse(self, chosen: NDArray[np.bool_], word: bytes) -> None:
-        for line in np.flatnonzero(chosen):
-            for text in self.text(line)[len(word) :].partition(b"#")[0].split():
-                if len(parse_numbers(text.partition(b"/")[0])) != 1:
-                    self.refuse(line, "has a value that is not a number")
+    def _refuse(
+        self, chosen: NDArray[np.bool_], word: bytes, is_right: Callable[[bytes], object]
+    ) -> NoReturn:
+        """Raise `UserError` about the first line with a value that is wrong."""
+        line = next(
+            line
+            for line in np.flatnonzero(chosen)
+            if not all(map(is_right, self.text(line)[len(word) :].partition(b"#")[0].split()))
+        )
+        self.refuse(line, "has a value that is not a number")
 
 
 def read_lines(path: Path) -> Iterator[Lines]:
