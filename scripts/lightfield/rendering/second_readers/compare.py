@@ -1,7 +1,6 @@
 """Compares what a model file says with the scene that Blender has made of it."""
 
 from collections.abc import Iterator, Sequence
-from pathlib import PurePath
 from typing import Any
 
 import bpy
@@ -201,7 +200,12 @@ def _of_materials(materials: Sequence[MaterialFacts]) -> Iterator[str]:
 
 
 def _shows(pictures: Sequence[str], picture: str) -> bool:
-    return picture in pictures if picture else bool(pictures)
+    return _file_name(picture) in pictures if picture else bool(pictures)
+
+
+def _file_name(path: str) -> str:
+    """Return a path without its folders. Some programs write backslashes."""
+    return path.replace("\\", "/").rpartition("/")[2]
 
 
 def _input(material: Any, role: str) -> Any:
@@ -229,7 +233,7 @@ def _pictures(material: Any, role: str) -> list[str]:
     socket = _input(material, role)
     nodes = material.node_tree.nodes if socket is None else _nodes_before(socket)
     images = [node.image for node in nodes if node.bl_idname == "ShaderNodeTexImage" and node.image]
-    return [PurePath(image.filepath.replace("\\", "/")).name or image.name for image in images]
+    return [_file_name(image.filepath) or image.name for image in images]
 
 
 def _nodes_before(socket: Any) -> list[Any]:
