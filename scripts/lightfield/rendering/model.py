@@ -41,7 +41,6 @@ from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import reading_quietly
 from lightfield.rendering.render_graph import in_render
 from lightfield.rendering.second_readers import compare, reading
-from lightfield.rendering.second_readers.facts import MeshFacts
 from lightfield.stages.scene import ImportModel, ImportSettings
 
 # The options of each importer that differ from its defaults. Cameras and lamps are removed anyway.
@@ -158,7 +157,7 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     model_paint.give_material()
     bpy.context.scene.frame_set(settings.frame)
     shown = in_render(compare.shown_meshes)
-    box = _box(path, shown)
+    box = _box(path, [mesh.box for mesh in shown])
     if facts:
         lost = [*facts.lost, *compare.differences(facts, shown)]
         if not settings.allow_missing:
@@ -166,7 +165,7 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         left_out += [*lost, *facts.unused]
     if settings.unit == "box":
         _scale_to_box(path, box)
-        box = _box(path, in_render(compare.shown_meshes))
+        box = _box(path, in_render(compare.shown_boxes))
         if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
             raise UserError(
                 f"{path}: Blender does not scale all its parts alike; export it without "
@@ -434,11 +433,11 @@ def _unread_materials() -> list[Any]:
     return [material for material in bpy.data.materials if not material.node_tree.nodes]
 
 
-def _box(path: Path, meshes: Sequence[MeshFacts]) -> Box:
+def _box(path: Path, boxes: Sequence[Box]) -> Box:
     """Return the box of all meshes. Raises `UserError` if there are none, or one is not finite."""
-    if not meshes:
+    if not boxes:
         raise UserError(f"{path}: has no faces to render; must have a mesh with faces")
-    corners = np.array([mesh.box for mesh in meshes])
+    corners = np.array(boxes)
     if not np.isfinite(corners).all():
         raise UserError(f"{path}: has vertices whose places are not numbers; export it again")
     return np.array([corners[:, 0].min(0), corners[:, 1].max(0)])

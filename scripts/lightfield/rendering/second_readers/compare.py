@@ -15,6 +15,7 @@ from lightfield.rendering.second_readers.facts import (
     MaterialFacts,
     MeshFacts,
     ModelFacts,
+    box_of,
 )
 
 # Places and areas may differ by this part of the model's size. Blender computes in 32 bits.
@@ -30,16 +31,35 @@ def shown_meshes(depsgraph: Any) -> list[MeshFacts]:
     """
     geometries: dict[Any, Geometry] = {}
     meshes = []
-    for instance in depsgraph.object_instances:
-        obj = instance.object
-        if obj.type != "MESH" or not instance.show_self or not obj.data.polygons:
-            continue
+    for obj, matrix in _mesh_objects(depsgraph):
         key = obj.data.as_pointer()
         if key not in geometries:
             geometries[key] = _geometry(obj.data)
-        matrix = np.array(instance.matrix_world, np.float64)
         meshes.append(geometries[key].placed(obj.original.name, matrix))
     return meshes
+
+
+def shown_boxes(depsgraph: Any) -> list[NDArray[np.float64]]:
+    """Return the box (2, 3) of each of the `shown_meshes`."""
+    points: dict[Any, NDArray[np.float32]] = {}
+    boxes = []
+    for obj, matrix in _mesh_objects(depsgraph):
+        key = obj.data.as_pointer()
+        if key not in points:
+            places = _values(obj.data.vertices, "co", np.float32, 3).reshape(-1, 3)
+            is_used = np.zeros(len(places), bool)
+            is_used[_values(obj.data.loops, "vertex_index", np.int32)] = True
+            points[key] = places[is_used]
+        boxes.append(box_of(points[key], matrix))
+    return boxes
+
+
+def _mesh_objects(depsgraph: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
+    """Yield each object that a render shows as a mesh with faces, and its matrix (4, 4)."""
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type == "MESH" and instance.show_self and obj.data.polygons:
+            yield obj, np.array(instance.matrix_world, np.float64)
 
 
 def differences(facts: ModelFacts, shown: Sequence[MeshFacts]) -> list[str]:

@@ -120,16 +120,21 @@ class Geometry:
     def placed(self, name: str, world_from_mesh: NDArray[np.float64] | None = None) -> MeshFacts:
         """Return the mesh at a place: (4, 4), or its own coordinates."""
         matrix = np.eye(4) if world_from_mesh is None else np.asarray(world_from_mesh, np.float64)
-        points = self._used @ matrix[:3, :3].T + matrix[:3, 3]
-        areas = self._areas @ _cofactors(matrix[:3, :3]).T
+        areas = _cofactors(matrix[:3, :3]) @ self._areas
         return MeshFacts(
             name,
-            np.array([points.min(0), points.max(0)]),
+            box_of(self._used, matrix),
             self.triangles,
-            float(np.linalg.norm(areas, axis=1).sum()),
+            float(np.sqrt(np.einsum("if,if->f", areas, areas)).sum()),
             self.colour,
             self.opacity,
         )
+
+
+def box_of(points: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the box (2, 3) of points (V, 3) that a matrix (4, 4) moves."""
+    moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return np.array([moved.min(0), moved.max(0)])
 
 
 def linear_colours(colours: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -171,15 +176,17 @@ def _without_repeated(
     sizes = sizes[sizes > 0]
     places = _hashes(points)[corners]
     is_kept = places != places[_next_corners(sizes)]
-    sizes = _sums(is_kept.astype(np.int64), sizes).astype(np.int64)
     # What is left of a face may be a line.
-    is_face = sizes > 2
-    is_kept[is_kept] = np.repeat(is_face, sizes)
-    corners, places = corners[is_kept], places[is_kept]
-    sizes = sizes[is_face]
-    _, first = np.unique(_sums(places, sizes), return_index=True)
-    is_first = np.isin(np.arange(len(sizes)), first)
-    return corners[np.repeat(is_first, sizes)], sizes[is_first]
+    left = _sums(is_kept, sizes)
+    is_kept &= np.repeat(left > 2, sizes)
+    corners, places, sizes = corners[is_kept], places[is_kept], left[left > 2]
+    faces = _sums(places, sizes)
+    in_order = np.sort(faces)
+    if (in_order[1:] == in_order[:-1]).any():
+        _, first = np.unique(faces, return_index=True)
+        is_first = np.isin(np.arange(len(sizes)), first)
+        return corners[np.repeat(is_first, sizes)], sizes[is_first]
+    return corners, sizes
 
 
 def _hashes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
@@ -197,21 +204,29 @@ def _hashes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def _sums(values: NDArray[Any], sizes: NDArray[np.int64]) -> NDArray[Any]:
-    """Return the sum of the values (C, …) of each face (F, …). No face is empty."""
+    """Return the sum of the values (…, C) of each face (…, F). No face is empty."""
     if not len(sizes):
-        return np.zeros((0, *values.shape[1:]), values.dtype)
-    sums: NDArray[Any] = np.add.reduceat(values, np.cumsum(sizes) - sizes)
+        return values[..., :0]
+    kind = np.int64 if values.dtype == bool else values.dtype
+    sums: NDArray[Any] = np.add.reduceat(values, np.cumsum(sizes) - sizes, axis=-1, dtype=kind)
     return sums
 
 
 def _vector_areas(
     points: NDArray[np.float64], corners: NDArray[np.int64], sizes: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return the vector area (F, 3) of each face."""
+    """Return the vector area (3, F) of each face."""
     if (sizes == 3).all():
-        first, second, third = points[corners.reshape(-1, 3)].transpose(1, 0, 2)
-        return np.cross(second - first, third - first) / 2
+        first, second, third = (points[corners[number::3]].T for number in range(3))
+        return _cross(second - first, third - first) / 2
     # From the first corner, to lose no digits far from the origin.
     starts = np.repeat(np.cumsum(sizes) - sizes, sizes)
-    arms = points[corners] - points[corners[starts]]
-    return _sums(np.cross(arms, arms[_next_corners(sizes)]), sizes) / 2
+    arms = (points[corners] - points[corners[starts]]).T
+    return _sums(_cross(arms, arms[:, _next_corners(sizes)]), sizes) / 2
+
+
+def _cross(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cross products of the columns of two arrays (3, N)."""
+    # Ten times faster than numpy's own.
+    (a, b, c), (d, e, f) = first, second
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
