@@ -199,6 +199,8 @@ def _shown(value: Any) -> str:
 def _of_materials(materials: Sequence[MaterialFacts]) -> Iterator[str]:
     for said in materials:
         name = printable(said.name)
+        if not _is_text(said.name):
+            continue
         shown = bpy.data.materials.get(said.name)
         if shown is None:
             yield f"the material {name}, which Blender does not have"
@@ -217,6 +219,11 @@ def _of_materials(materials: Sequence[MaterialFacts]) -> Iterator[str]:
                 f"the opacity {said.opacity:.3g} of the material {name}, of which Blender makes "
                 f"{opacity:.3g}"
             )
+
+
+def _is_text(name: str) -> bool:
+    """Return whether a name can be compared. Blender changes bytes that are not UTF-8."""
+    return printable(name) == name
 
 
 def _shows(pictures: Sequence[str], picture: str) -> bool:

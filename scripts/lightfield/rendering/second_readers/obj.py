@@ -133,7 +133,8 @@ class _Reader:
     def facts(self, materials: Materials) -> ModelFacts:
         """Return what the file says, with its libraries' ``materials``."""
         points, colours = np.concatenate(self.points), np.concatenate(self.colours)
-        linear = linear_colours(colours) if len(colours) == len(points) else None
+        has_colours = len(colours) == len(points) and np.isfinite(colours).all()
+        linear = linear_colours(colours) if has_colours else None
         meshes = [
             geometry.placed(part.name)
             for part in self.parts

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.rendering.model_references import printable
 from lightfield.rendering.second_readers.facts import Geometry, ModelFacts, linear_colours
-from lightfield.rendering.second_readers.text_lines import parse_numbers
+from lightfield.rendering.second_readers.text_lines import read_lines
 
 # Blender crashes at a longer line of a header. In bytes, without the end of the line.
 _LONGEST_LINE = 65535
@@ -82,12 +82,13 @@ class _Element:
 
 @dataclass
 class Header:
-    """What the header of a PLY says. ``size`` is in bytes."""
+    """What the header of a PLY says. It has ``size`` bytes in ``lines``."""
 
     order: str = ""
     elements: list[_Element] = field(default_factory=list)
     textures: list[str] = field(default_factory=list)
     size: int = 0
+    lines: int = 0
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def read_header(path: Path) -> Header:
             if number == 1 and words != ["ply"]:
                 raise UserError(f"{path}: is not a PLY file: it does not begin with ply")
             if words == ["end_header"]:
-                header.size = file.tell()
+                header.size, header.lines = file.tell(), number
                 return header
             try:
                 _read_line(header, words, os.fsdecode(line).strip())
@@ -160,6 +161,8 @@ def _read_line(header: Header, words: list[str], line: str) -> None:
         case ["format", order, _]:
             header.order = _ORDERS[order]
         case ["element", name, count]:
+            if not count.isdecimal():
+                raise ValueError
             header.elements.append(_Element(name, int(count)))
         case ["property", "list", length, kind, name]:
             header.elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[length]))
@@ -212,47 +215,76 @@ _Values = tuple[NDArray[Any], NDArray[np.int64] | None]
 
 def _columns(path: Path, header: Header) -> dict[str, _Columns]:
     """Return the properties of each element by their names."""
-    data = np.fromfile(path, np.uint8, offset=header.size)
-    if header.order == _TEXT:
-        # The numbers of a text are read as a binary file of these numbers.
-        data = parse_numbers(data.tobytes()).view(np.uint8)
-    columns, place = {}, 0
+    rows = _TextRows(path, header) if header.order == _TEXT else _BinaryRows(path, header)
+    columns = {}
     for element in header.elements:
         try:
-            columns[element.name], place = _rows(element, data, place, header.order)
-        except (ValueError, OverflowError, struct.error):
-            what = "a value that is not a number, or " if header.order == _TEXT else ""
+            values = rows.read(element)
+        except (ValueError, IndexError, OverflowError, struct.error):
             raise UserError(
-                f"{path}: has {what}fewer values than its header promises: it may be cut short; "
-                "export it again"
+                f"{path}: has fewer values than its header promises: it may be cut short; export "
+                "it again"
             ) from None
+        columns[element.name] = {
+            each.name: _Column(column, each.type, lengths)
+            for each, (column, lengths) in zip(element.properties, values, strict=True)
+        }
     return columns
 
 
-def _rows(
-    element: _Element, data: NDArray[np.uint8], place: int, order: str
-) -> tuple[_Columns, int]:
-    """Return the properties of an element whose rows begin at a place, and where they end."""
-    stored = [_stored(each, order) for each in element.properties]
-    least = sum(np.dtype(each.length or each.type).itemsize for each in stored)
-    if element.count < 0 or element.count * least > len(data) - place:
-        raise ValueError
-    values, place = _equal_rows(element.count, stored, data, place) or _unequal_rows(
-        element.count, stored, data, place
-    )
-    return {
-        each.name: _Column(column, each.type, lengths)
-        for each, (column, lengths) in zip(element.properties, values, strict=True)
-    }, place
+class _TextRows:
+    """The rows of a text: a line each. More values than the header promises are passed over."""
+
+    def __init__(self, path: Path, header: Header) -> None:
+        parts = [
+            lines.all_numbers() for lines in read_lines(path, header.size, header.lines + 1)
+        ] or [(np.zeros(0), np.zeros(0, np.int64))]
+        self._numbers = np.concatenate([numbers for numbers, _ in parts])
+        counts = np.concatenate([counts for _, counts in parts])
+        # The first number of each row, and the end of the last.
+        self._bounds = np.concatenate([[0], np.cumsum(counts[counts > 0])])
+        self._row = 0
+
+    def read(self, element: _Element) -> list[_Values]:
+        """Return the properties of the next element."""
+        first, self._row = self._row, self._row + element.count
+        places, ends = self._bounds[first : self._row], self._bounds[first + 1 : self._row + 1]
+        if len(ends) != element.count:
+            raise ValueError
+        values: list[_Values] = []
+        for each in element.properties:
+            lengths = np.ones(element.count, np.int64)
+            if each.length:
+                lengths = self._numbers[places].astype(np.int64)
+                places = places + 1
+            column = self._numbers[_listed(places, lengths)]
+            values.append((column, lengths if each.length else None))
+            places = places + lengths
+        if (places > ends).any():
+            raise ValueError
+        return values
 
 
-def _stored(described: _Property, order: str) -> _Property:
-    """Return a property with types as they are stored."""
-    if order == _TEXT:
-        return _Property(described.name, "=f8", described.length and "=f8")
-    return _Property(
-        described.name, order + described.type, described.length and order + described.length
-    )
+class _BinaryRows:
+    """The rows of a binary file."""
+
+    def __init__(self, path: Path, header: Header) -> None:
+        self._data = np.fromfile(path, np.uint8, offset=header.size)
+        self._order = header.order
+        self._place = 0
+
+    def read(self, element: _Element) -> list[_Values]:
+        """Return the properties of the next element."""
+        stored = [
+            _Property(each.name, self._order + each.type, each.length and self._order + each.length)
+            for each in element.properties
+        ]
+        least = sum(np.dtype(each.length or each.type).itemsize for each in stored)
+        if element.count * least > len(self._data) - self._place:
+            raise ValueError
+        rows = (element.count, stored, self._data, self._place)
+        values, self._place = _equal_rows(*rows) or _unequal_rows(*rows)
+        return values
 
 
 def _equal_rows(
@@ -302,7 +334,7 @@ def _unequal_rows(
         starts.append(place)
         lengths.append(length)
         place += length * size
-    if place > len(data) or min(lengths, default=0) < 0:
+    if place > len(data):
         raise ValueError
     all_starts = np.array(starts, np.int64).reshape(count, -1)
     all_lengths = np.array(lengths, np.int64).reshape(count, -1)
@@ -323,10 +355,16 @@ def _gathered(
 ) -> NDArray[Any]:
     """Return lists of values from their places in the data, one after the other."""
     size = np.dtype(kind).itemsize
-    within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    places = np.repeat(starts, lengths) + size * within
-    values: NDArray[Any] = data[places[:, None] + np.arange(size)].view(kind)
-    return values.ravel()
+    values: NDArray[Any] = data[_listed(starts, lengths * size)].view(kind)
+    return values
+
+
+def _listed(starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the indices of lists, one list after the other."""
+    if (lengths < 0).any():
+        raise ValueError
+    ends = np.cumsum(lengths)
+    return np.arange(lengths.sum()) + np.repeat(starts - ends + lengths, lengths)
 
 
 # ---- what they mean -------------------------------------------------------------------------
@@ -361,7 +399,8 @@ def _colours(columns: _Columns) -> NDArray[np.float64] | None:
     found = _named(columns, _COLOURS)
     if not found or any(column.lengths is not None for column in found):
         return None
-    return linear_colours(np.stack([_fractions(column) for column in found], axis=1))
+    colours = np.stack([_fractions(column) for column in found], axis=1)
+    return linear_colours(colours) if np.isfinite(colours).all() else None
 
 
 def _fractions(column: _Column) -> NDArray[np.float64]:

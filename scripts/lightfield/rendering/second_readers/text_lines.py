@@ -72,10 +72,14 @@ class Lines:
         over. Raises `UserError` for what is not a number.
         """
         text, _, counts = self._values(chosen, word)
-        numbers = parse_numbers(text.tobytes())
+        numbers = _parsed(text.tobytes())
         if len(numbers) != counts.sum():
-            self._refuse(chosen, word, lambda value: len(parse_numbers(value)) == 1)
+            self._refuse(chosen, word, lambda value: len(_parsed(value)) == 1)
         return numbers, counts
+
+    def all_numbers(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the numbers of all lines, as `numbers` does."""
+        return self.numbers(np.ones(len(self), bool), b"")
 
     def whole_numbers(
         self, chosen: NDArray[np.bool_], word: bytes
@@ -140,15 +144,18 @@ class Lines:
         self.refuse(line, "has a value that is not a number")
 
 
-def read_lines(path: Path) -> Iterator[Lines]:
-    """Yield the lines of a text in parts. A continued line is one line."""
-    for text, first in _parts(path):
-        yield Lines(path, text, first)
+def read_lines(path: Path, place: int = 0, first: int = 1) -> Iterator[Lines]:
+    """Yield the lines of a text in parts. A continued line is one line.
+
+    They begin at a ``place`` in bytes, where the line has the number ``first``.
+    """
+    for text, number in _parts(path, place, first):
+        yield Lines(path, text, number)
 
 
 def lines_with(path: Path, word: bytes) -> Iterator[bytes]:
     """Yield the lines of a text that contain a word."""
-    for text, _ in _parts(path):
+    for text, _ in _parts(path, 0, 1):
         place = text.find(word)
         while place >= 0:
             end = text.index(b"\n", place)
@@ -156,10 +163,10 @@ def lines_with(path: Path, word: bytes) -> Iterator[bytes]:
             place = text.find(word, end)
 
 
-def _parts(path: Path) -> Iterator[tuple[bytes, int]]:
+def _parts(path: Path, place: int, first: int) -> Iterator[tuple[bytes, int]]:
     """Yield whole lines, and the number of their first line."""
-    first = 1
     with path.open("rb") as file:
+        file.seek(place)
         while text := file.read(_PART):
             text += file.readline()
             while text.endswith((b"\\\n", b"\\\r\n")) and (more := file.readline()):
@@ -172,7 +179,7 @@ def _parts(path: Path) -> Iterator[tuple[bytes, int]]:
             first += count
 
 
-def parse_numbers(text: bytes) -> NDArray[np.float64]:
+def _parsed(text: bytes) -> NDArray[np.float64]:
     """Return the numbers of a text up to the first word that is none."""
     with warnings.catch_warnings():
         # This is how numpy reports a word that is no number.
