@@ -188,6 +188,10 @@ STL_TEXT = (
 )
 
 
+# The square with a material, and with one place in a texture for all corners.
+RED = OBJ.partition("f ")[0] + "vt 0.5 0.5\nusemtl red\nf 1/1 2/1 3/1\nf 1/1 3/1 4/1\n"
+
+
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf", "abc", "1e999"])
 @pytest.mark.parametrize(
     ("name", "content"), [("a.obj", OBJ), ("a.ply", ply()), ("a.stl", STL_TEXT)]
@@ -256,9 +260,7 @@ def test_the_opacity_of_an_obj_is_shown(tmp_path, lines, alpha):
     Image.new("RGBA", (4, 4), (128, 128, 128, 255)).save(tmp_path / "opaque.png")
     Image.new("RGBA", (4, 4), (128, 128, 128, 64)).save(tmp_path / "clear.png")
     written(tmp_path / "a.mtl", f"newmtl red\nKd 1 0 0\n{lines}\n")
-    faces = "vt 0.5 0.5\nusemtl red\nf 1/1 2/1 3/1\nf 1/1 3/1 4/1\n"
-    obj = OBJ.partition("f ")[0] + faces
-    record = imported(written(tmp_path / "a.obj", obj))
+    record = imported(written(tmp_path / "a.obj", RED))
     assert record["left_out"] == []
     # Each of 64 samples of a pixel passes the surface or not.
     assert seen(tmp_path)[..., 3].mean() == pytest.approx(alpha, abs=0.02)
@@ -283,7 +285,8 @@ def test_a_value_of_a_material_that_blender_cannot_show_is_refused(tmp_path, lin
     [
         ("map_Ka b.png", "map_Ka"),
         ("disp b.png", "disp"),
-        ("Tf 0 1 0", "Tf"),
+        ("illum 4\nTf 0 1 0", "Tf"),
+        ("refl -type sphere b.png", "refl"),
         ("map_Kd -clamp on b.png", "-clamp on"),
         ("map_Kd -mm 0.2 3 b.png", "-mm 0.2 3"),
     ],
@@ -301,3 +304,27 @@ def test_one_number_of_a_colour_is_grey(tmp_path):
     path = written(tmp_path / "a.obj", OBJ.replace("f ", "usemtl grey\nf ", 1))
     message = refusal(path)
     assert "the base colour (0.25, 0.25, 0.25) of the material grey" in message
+
+
+@pytest.mark.parametrize(
+    ("lines", "weight"), [("", 0), ("illum 2", 0), ("illum 4", 1), ("illum 6\nNi 1.5", 1)]
+)
+def test_light_passes_only_through_surfaces_that_let_it(tmp_path, lines, weight):
+    """Some programs write a filter (Tf) for opaque materials, of which Blender makes glass."""
+    import bpy
+
+    written(tmp_path / "a.mtl", f"newmtl red\nKd 1 0 0\nTf 1 1 1\n{lines}\n")
+    assert not imported(written(tmp_path / "a.obj", RED))["left_out"]
+    shader = bpy.data.materials["red"].node_tree.nodes["Principled BSDF"]
+    assert shader.inputs["Transmission Weight"].default_value == weight
+
+
+def test_a_texture_of_normals_is_shown(tmp_path):
+    import bpy
+
+    Image.new("RGB", (4, 4), (255, 128, 128)).save(tmp_path / "b.png")
+    written(tmp_path / "a.mtl", "newmtl red\nKd 1 0 0\nnorm b.png\n")
+    assert not imported(written(tmp_path / "a.obj", RED))["left_out"]
+    tree = bpy.data.materials["red"].node_tree
+    (link,) = tree.nodes["Principled BSDF"].inputs["Normal"].links
+    assert link.from_node.bl_idname == "ShaderNodeNormalMap"

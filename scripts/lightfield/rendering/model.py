@@ -63,7 +63,7 @@ _AXES = {
 }
 
 # What gives a mesh the colours and textures that Blender's importer does not read.
-_COMPLETE: dict[str, Callable[[Path, Any], list[str]]] = {
+_COMPLETE: dict[str, Callable[[Path, Any], tuple[bool, list[str]]]] = {
     ".ply": ply_files.complete,
     ".stl": stl_files.complete,
 }
@@ -126,10 +126,10 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
     left_out += _import(path, settings.up)
-    if path.suffix.lower() in _COMPLETE:
-        left_out += [
-            each for mesh in bpy.data.meshes for each in _COMPLETE[path.suffix.lower()](path, mesh)
-        ]
+    is_mended = path.suffix.lower() == ".obj" and obj_files.corrects_materials(path)
+    for mesh in bpy.data.meshes if path.suffix.lower() in _COMPLETE else ():
+        is_mended, lost = _COMPLETE[path.suffix.lower()](path, mesh)
+        left_out += lost
     if path.suffix.lower() == ".fbx":
         left_out += _forget_folders()
     unread_materials = _unread_materials()
@@ -149,8 +149,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
-    if path.suffix.lower() == ".obj":
-        model_paint.show_luminance()
+    if path.suffix.lower() == ".obj" and model_paint.show_luminance():
+        is_mended = True
     _pack(path)
     for material in unread_materials:
         model_paint.paint(material)
@@ -186,6 +186,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if unread_materials:
         # An earlier version left them black.
         options["grey"] = len(unread_materials)
+    if is_mended:
+        # An earlier version left out colours and opacities.
+        options["mended"] = True
     names = [(entry["path"], entry["sha256"]) for entry in entries]
     unjudged = facts.unjudged if facts else []
     return {

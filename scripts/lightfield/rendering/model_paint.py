@@ -91,11 +91,12 @@ def _picture(path: Path) -> Any:
     return picture
 
 
-def show_luminance() -> None:
+def show_luminance() -> bool:
     """Let the luminance of each opaque picture of an alpha be the alpha, as in an OBJ's `map_d`.
 
-    Blender takes the alpha of the picture, which is 1.
+    Blender takes the alpha of the picture, which is 1. Return whether there is such a picture.
     """
+    is_changed = False
     for material in bpy.data.materials:
         for node in list(material.node_tree.nodes):
             for link in list(node.outputs["Alpha"].links) if _is_opaque_picture(node) else ():
@@ -103,6 +104,8 @@ def show_luminance() -> None:
                 if node.image.users > 1:
                     node.image = node.image.copy()
                 node.image.colorspace_settings.name = "Non-Color"
+                is_changed = True
+    return is_changed
 
 
 def _is_opaque_picture(node: Any) -> bool:

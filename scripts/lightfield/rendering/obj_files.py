@@ -22,6 +22,10 @@ from lightfield.rendering.model_references import (
 from lightfield.rendering.second_readers.text_lines import lines_with
 
 _TEXTURE = re.compile(rb"\s*(map_\w+|bump|disp|decal|refl|norm)\s+(.*?)\s*$", re.IGNORECASE)
+# Blender does not know the keyword of normals, and takes a texture of bumps for one.
+_NORMALS, _BUMP = b"norm", b"map_Bump"
+# The models of illumination in which light passes through surfaces.
+TRANSMITTING = ([b"4"], [b"6"], [b"7"], [b"9"])
 # The options of a texture, and the most words that follow each.
 _OPTIONS = {
     **dict.fromkeys((b"-blendu", b"-blendv", b"-boost", b"-bm", b"-cc", b"-clamp"), 1),
@@ -76,7 +80,11 @@ def readable(path: Path) -> Iterator[Path]:
     """Yield an OBJ that Blender reads right: the file itself, or a copy if Blender misreads it."""
     mentions = _mentions(path)
     libraries = _library_files(path, mentions)
-    misread = [file for file in libraries if _is_misread(file)]
+    misread = [
+        file
+        for file in libraries
+        if any(each.is_misread for each in _textures(file)) or _is_corrected(file)
+    ]
     if not misread and all(_names(path, text) == [text] for text in mentions):
         yield path
         return
@@ -97,45 +105,72 @@ def _copy_obj(path: Path, copy: Path, libraries: list[Path]) -> None:
 
 
 def _copy_library(path: Path, copy: Path) -> None:
-    """Copy a library without the options that Blender misreads, and with `d` in place of `Tr`.
+    """Copy a library so that Blender reads it right.
 
-    The textures stay in their place. In the copy, their names begin at the copy's folder.
+    It lacks the options that Blender misreads, and filters of light that passes through no surface.
+    `Tr` is `d`, and a texture of normals has Blender's keyword. The textures stay in their place.
+    In the copy, their names begin at the copy's folder.
     """
-    opacities = _opacities(path)
+    materials = _values(path)
+    name = b""
     with copy.open("wb") as file:
         for line in read_lines(path):
+            name = _material_name(line) or name
+            values = materials.get(name, {})
             if texture := texture_of(path, line):
                 options = [b" ".join(words) for words in texture.options if _is_read(words)]
-                words = [texture.keyword, *options, _relative(texture.file, copy)]
-                line = b" ".join(words) + b"\n"
+                keyword = _BUMP if texture.keyword.lower() == _NORMALS else texture.keyword
+                line = b" ".join([keyword, *options, _relative(texture.file, copy)]) + b"\n"
+            elif _is_opposite(line, values):
+                line = b"d %r\n" % (1 - float(values[b"tr"][0]))
+            elif _filters_nothing(line, values):
+                line = b""
             file.write(line)
-            name = _material_name(line)
-            if name in opacities:
-                file.write(b"d %r\n" % opacities[name])
 
 
-def _is_misread(path: Path) -> bool:
-    return any(each.is_misread for each in _textures(path)) or bool(_opacities(path))
+def corrects_materials(path: Path) -> bool:
+    """Return whether the OBJ that Blender gets has other values of materials, or normals."""
+    return any(map(_is_corrected, libraries(path)))
 
 
-def _opacities(path: Path) -> dict[bytes | None, float]:
-    """Return the opacity of each material of a library that has only its opposite, `Tr`."""
-    opacities: dict[bytes | None, float] = {}
-    name, has_opacity = None, set()
+def _is_corrected(library: Path) -> bool:
+    return any(texture.keyword.lower() == _NORMALS for texture in _textures(library)) or any(
+        _is_opposite(b"Tr", values) or _filters_nothing(b"Tf", values)
+        for values in _values(library).values()
+    )
+
+
+def _values(path: Path) -> dict[bytes, dict[bytes, list[bytes]]]:
+    """Return the words after each keyword of each material of a library, in small letters."""
+    values: dict[bytes, dict[bytes, list[bytes]]] = {}
+    name = b""
     for line in read_lines(path):
         name = _material_name(line) or name
         keyword, *words = line.split() or [b""]
-        if keyword == b"d":
-            has_opacity.add(name)
-        elif keyword.lower() == b"tr" and len(words) == 1 and _NUMBER.fullmatch(words[0]):
-            opacities[name] = 1 - float(words[0])
-    return {name: value for name, value in opacities.items() if name not in has_opacity}
+        values.setdefault(name, {})[keyword.lower()] = words
+    return values
 
 
-def _material_name(line: bytes) -> bytes | None:
-    """Return the name of the material that a line of a library begins. None if it does not."""
+def _is_opposite(line: bytes, values: dict[bytes, list[bytes]]) -> bool:
+    """Return whether a line has the only opacity of a material, by its opposite, `Tr`."""
+    words = values.get(b"tr", [])
+    is_number = len(words) == 1 and _NUMBER.fullmatch(words[0])
+    return bool(line.lower().split()[:1] == [b"tr"] and is_number and b"d" not in values)
+
+
+def _filters_nothing(line: bytes, values: dict[bytes, list[bytes]]) -> bool:
+    """Return whether a line filters light that passes through a surface through which none does.
+
+    Of such a line, Blender makes glass.
+    """
+    is_filter = line.lower().split()[:1] == [b"tf"] and b"tf" in values
+    return is_filter and values.get(b"illum", [b"2"]) not in TRANSMITTING
+
+
+def _material_name(line: bytes) -> bytes:
+    """Return the name of the material that a line of a library begins, or b""."""
     words = line.split(None, 1)
-    return words[1].strip() if words[:1] == [b"newmtl"] and len(words) == 2 else None
+    return words[1].strip() if words[:1] == [b"newmtl"] and len(words) == 2 else b""
 
 
 def _relative(path: Path, named_by: Path) -> bytes:

@@ -20,6 +20,8 @@ from lightfield.rendering.second_readers.facts import (
 
 # Places and areas may differ by this part of the model's size. Blender computes in 32 bits.
 _TOLERANCE = 1e-4
+# In bytes, Blender cuts longer names of materials.
+_LONGEST_NAME = 63
 # Colours and opacities may differ by this: a file may have 8 bits.
 _COLOUR_TOLERANCE = 0.01
 
@@ -222,8 +224,8 @@ def _of_materials(materials: Sequence[MaterialFacts]) -> Iterator[str]:
 
 
 def _is_text(name: str) -> bool:
-    """Return whether a name can be compared. Blender changes bytes that are not UTF-8."""
-    return printable(name) == name
+    """Return whether Blender has a name as it is. It cuts long ones, and changes other bytes."""
+    return printable(name) == name and len(name.encode()) < _LONGEST_NAME
 
 
 def _shows(pictures: Sequence[str], picture: str) -> bool:

@@ -19,7 +19,6 @@ _ROLES = {
     b"map_pm": "metallic",
     b"map_ns": "roughness",
     b"map_refl": "metallic",
-    b"refl": "metallic",
     b"map_bump": "normal",
     b"bump": "normal",
     b"norm": "normal",
@@ -32,9 +31,11 @@ _UNUSED = {
     b"map_disp": "displacement (map_disp)",
     b"decal": "decals (decal)",
     b"map_aat": "anti-aliasing of textures (map_aat)",
-    b"tf": "a filter of transmitted light (Tf)",
+    b"map_pc": "a clear coat by a texture (map_Pc)",
+    b"map_pcr": "a clear coat by a texture (map_Pcr)",
+    b"map_aniso": "anisotropy by a texture (map_aniso)",
+    b"refl": "a picture that is mirrored (refl), which becomes a texture of metal",
     b"sharpness": "sharpness of reflections (sharpness)",
-    b"map_ps": "sheen by a texture (map_Ps)",
 }
 
 
@@ -62,6 +63,11 @@ class _Material:
             return _number(self.words[b"d"])
         transparency = _number(self.words.get(b"tr", [b"0"]))
         return None if transparency is None else 1 - transparency
+
+    def filters_colours(self) -> bool:
+        """Return whether light of other colours passes through it. Otherwise `Tf` is left out."""
+        is_glass = self.words.get(b"illum") in obj_files.TRANSMITTING
+        return is_glass and len(set(self.words.get(b"tf", []))) > 1
 
     def colour(self) -> tuple[float, float, float] | None:
         """Return the base colour of a material without a picture of it. One number is grey."""
@@ -134,6 +140,8 @@ class Materials:
         for keyword, title in _UNUSED.items():
             if keyword in material.words or keyword in material.textures:
                 yield f"{title} of the material {_text(name)}"
+        if material.filters_colours():
+            yield f"the colours of the filter of light (Tf) of the material {_text(name)}"
         for texture in material.textures.values():
             for option, *words in texture.options:
                 if _IGNORED_OPTIONS.get(option, words) != words:

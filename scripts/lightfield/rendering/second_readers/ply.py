@@ -51,7 +51,7 @@ _COLOURS = (
 _UVS = (("s", "t"), ("texture_u", "texture_v"), ("u", "v"))
 _CORNERS = ("vertex_indices", "vertex_index")
 _TEXTURES = ("texnumber", "texture_index")
-_KNOWN_ELEMENTS = ("vertex", "face", "edge", "tristrips")
+_KNOWN_ELEMENTS = ("vertex", "face", "tristrips")
 
 
 class _Property(NamedTuple):
