@@ -43,29 +43,6 @@ def ply(vertex="", face="", of_vertices=("",) * 4, of_faces=("",) * 2, comment="
 
 # ---- colours of vertices and faces ----------------------------------------------------------
 
-# Properties of vertices and of faces, with the colour that each vertex and face has.
-COLOURED = {
-    "vertices": (properties("uchar", "red", "green", "blue"), "", "255 128 0"),
-    "diffuse": (
-        properties("uchar", "diffuse_red", "diffuse_green", "diffuse_blue"),
-        "",
-        "255 128 0",
-    ),
-    "r g b": (properties("uchar", "r", "g", "b"), "", "255 128 0"),
-    "16 bits": (properties("ushort", "r", "g", "b"), "", "65535 32896 0"),
-    "faces": ("", properties("uchar", "red", "green", "blue"), "255 128 0"),
-    "faces, float": ("", properties("float", "red", "green", "blue"), "1 0.50196 0"),
-}
-
-
-@pytest.mark.parametrize("case", COLOURED)
-def test_the_colours_of_a_ply_are_shown(tmp_path, case):
-    vertex, face, colour = COLOURED[case]
-    text = ply(vertex, face, (colour if vertex else "",) * 4, (colour if face else "",) * 2)
-    record = imported(written(tmp_path / "a.ply", text))
-    assert record["left_out"] == []
-    np.testing.assert_allclose(seen(tmp_path)[2, 2], (1, MIDDLE, 0, 1), atol=1e-3)
-
 
 def test_each_face_of_a_ply_has_its_own_colour(tmp_path):
     """The lower right triangle is red, and the upper left one is blue."""
@@ -75,12 +52,6 @@ def test_each_face_of_a_ply_has_its_own_colour(tmp_path):
     picture = seen(tmp_path)
     np.testing.assert_allclose(picture[6, 6], (1, 0, 0, 1), atol=1e-3)
     np.testing.assert_allclose(picture[1, 1], (0, 0, 1, 1), atol=1e-3)
-
-
-def test_the_alpha_of_vertices_is_noted(tmp_path):
-    vertex = properties("uchar", "red", "green", "blue", "alpha")
-    path = written(tmp_path / "a.ply", ply(vertex, of_vertices=("255 128 0 128",) * 4))
-    assert imported(path)["left_out"] == ["the alpha of vertices"]
 
 
 def stl(head, *attributes):
@@ -266,65 +237,8 @@ def test_the_opacity_of_an_obj_is_shown(tmp_path, lines, alpha):
     assert seen(tmp_path)[..., 3].mean() == pytest.approx(alpha, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("lines", "named"),
-    [
-        ("Kd spectral a.rfl", "Kd spectral a.rfl"),
-        ("Kd 0.1 nan 1", "Kd 0.1 nan 1"),
-        ("d -halo 0.5", "d -halo 0.5"),
-    ],
-)
-def test_a_value_of_a_material_that_blender_cannot_show_is_refused(tmp_path, lines, named):
-    written(tmp_path / "a.mtl", f"newmtl red\n{lines}\n")
-    path = written(tmp_path / "a.obj", OBJ.replace("f ", "usemtl red\nf ", 1))
-    assert f"{named} of the material red" in refusal(path)
-
-
-@pytest.mark.parametrize(
-    ("lines", "noted"),
-    [
-        ("map_Ka b.png", "map_Ka"),
-        ("disp b.png", "disp"),
-        ("illum 4\nTf 0 1 0", "Tf"),
-        ("refl -type sphere b.png", "refl"),
-        ("map_Kd -clamp on b.png", "-clamp on"),
-        ("map_Kd -mm 0.2 3 b.png", "-mm 0.2 3"),
-    ],
-)
-def test_a_feature_of_a_material_that_no_view_shows_is_noted(tmp_path, lines, noted):
-    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "b.png")
-    written(tmp_path / "a.mtl", f"newmtl red\n{lines}\n")
-    path = written(tmp_path / "a.obj", OBJ.replace("f ", "usemtl red\nf ", 1))
-    (left_out,) = imported(path)["left_out"]
-    assert noted in left_out
-
-
 def test_one_number_of_a_colour_is_grey(tmp_path):
     written(tmp_path / "a.mtl", "newmtl grey\nKd 0.25\n")
     path = written(tmp_path / "a.obj", OBJ.replace("f ", "usemtl grey\nf ", 1))
     message = refusal(path)
     assert "the base colour (0.25, 0.25, 0.25) of the material grey" in message
-
-
-@pytest.mark.parametrize(
-    ("lines", "weight"), [("", 0), ("illum 2", 0), ("illum 4", 1), ("illum 6\nNi 1.5", 1)]
-)
-def test_light_passes_only_through_surfaces_that_let_it(tmp_path, lines, weight):
-    """Some programs write a filter (Tf) for opaque materials, of which Blender makes glass."""
-    import bpy
-
-    written(tmp_path / "a.mtl", f"newmtl red\nKd 1 0 0\nTf 1 1 1\n{lines}\n")
-    assert not imported(written(tmp_path / "a.obj", RED))["left_out"]
-    shader = bpy.data.materials["red"].node_tree.nodes["Principled BSDF"]
-    assert shader.inputs["Transmission Weight"].default_value == weight
-
-
-def test_a_texture_of_normals_is_shown(tmp_path):
-    import bpy
-
-    Image.new("RGB", (4, 4), (255, 128, 128)).save(tmp_path / "b.png")
-    written(tmp_path / "a.mtl", "newmtl red\nKd 1 0 0\nnorm b.png\n")
-    assert not imported(written(tmp_path / "a.obj", RED))["left_out"]
-    tree = bpy.data.materials["red"].node_tree
-    (link,) = tree.nodes["Principled BSDF"].inputs["Normal"].links
-    assert link.from_node.bl_idname == "ShaderNodeNormalMap"
