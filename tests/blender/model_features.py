@@ -309,10 +309,7 @@ def binary_ply(order: str, name: str) -> bytes:
     return head.encode() + struct.pack(f"{order}12d", *places) + faces
 
 
-STRIP = ply(faces=()).replace("element face 0\nproperty list uchar int vertex_indices\n", "")
-STRIP = STRIP.replace(
-    "end_header", "element tristrips 1\nproperty list int int vertex_indices\nend_header"
-)
+STRIP = ply(faces=("4 0 1 3 2",)).replace("element face", "element tristrips")
 COLOURS = ("red", "green", "blue")
 PLY = [
     Row(
