@@ -186,6 +186,17 @@ def test_a_face_of_a_ply_that_blender_drops_is_refused(tmp_path):
     assert "2 triangles, of which Blender shows 1" in refusal(written(tmp_path / "a.ply", text))
 
 
+@pytest.mark.parametrize("suffix", ["obj", "ply"])
+def test_a_model_that_is_too_far_for_32_bits_is_refused(tmp_path, suffix):
+    """As scans have it that are placed on a map."""
+    content = (OBJ if suffix == "obj" else ply()).replace("1 1 0", "500000.33 5000000.77 0")
+    content = content.replace("0 0 0", "500000.03 5000000.07 0")
+    content = content.replace("1 0 0", "500000.63 5000000.07 0")
+    content = content.replace("0 1 0", "500000.03 5000000.77 0")
+    message = refusal(written(tmp_path / f"a.{suffix}", content), unit="box")
+    assert "move it to the origin" in message
+
+
 def test_an_obj_has_all_that_its_objects_hold(tmp_path):
     """Negative numbers, comments, continued lines, slashes, and faces with many corners."""
     text = (

@@ -20,6 +20,8 @@ from lightfield.rendering.second_readers.facts import (
 
 # Places and areas may differ by this part of the model's size. Blender computes in 32 bits.
 _TOLERANCE = 1e-4
+# At this many times its size from the origin, 32 bits give a model steps.
+_FAR = 100
 # In bytes, Blender cuts longer names of materials.
 _LONGEST_NAME = 63
 # Colours and opacities may differ by this: a file may have 8 bits.
@@ -159,7 +161,9 @@ def _unmatched(
 def _unlike(said: MeshFacts, shown: MeshFacts, size: float) -> Iterator[str]:
     """Yield in which figures a mesh of the file differs from a mesh of Blender."""
     if not np.abs(said.box - shown.box).max() <= _TOLERANCE * size:
-        yield f"it reaches {_corners(said)}, and Blender shows {_corners(shown)}"
+        is_far = np.abs(said.box).max() > _FAR * size
+        reason = " in its 32 bits; move it to the origin" if is_far else ""
+        yield f"it reaches {_corners(said)}, and Blender shows {_corners(shown)}{reason}"
     if said.triangles not in (None, shown.triangles):
         yield f"it has {said.triangles} triangles, of which Blender shows {shown.triangles}"
     elif not _have_equal_areas(said.area, shown.area, size):
@@ -177,7 +181,7 @@ def _have_equal_areas(said: float | None, shown: float | None, size: float) -> b
 
 
 def _corners(mesh: MeshFacts) -> str:
-    low, high = ("(" + ", ".join(f"{value:.6g}" for value in corner) + ")" for corner in mesh.box)
+    low, high = ("(" + ", ".join(f"{value:.8g}" for value in corner) + ")" for corner in mesh.box)
     return f"from {low} to {high}"
 
 

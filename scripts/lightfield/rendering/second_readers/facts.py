@@ -100,6 +100,10 @@ class Geometry:
         points = np.asarray(places, np.float64).reshape(-1, 3)
         corners = np.asarray(corners, np.int64).ravel()
         sizes = np.asarray(sizes, np.int64).ravel()
+        if len(corners) < len(points):
+            # One of many objects of a file, whose vertices stand in one list.
+            used, corners = np.unique(corners, return_inverse=True)
+            points = points[used]
         is_used = np.zeros(len(points), bool)
         is_used[corners] = True
         self._used = points[is_used]
