@@ -24,12 +24,11 @@ from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import (
     blend_file,
+    model_completion,
     model_files,
     model_light,
     model_paint,
     obj_files,
-    ply_files,
-    stl_files,
 )
 from lightfield.rendering.model_references import (
     FileReference,
@@ -60,12 +59,6 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 _AXES = {
     "y": {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"},
     "z": {"forward_axis": "Y", "up_axis": "Z"},
-}
-
-# What gives a mesh the colours and textures that Blender's importer does not read.
-_COMPLETE: dict[str, Callable[[Path, Any], tuple[bool, list[str]]]] = {
-    ".ply": ply_files.complete,
-    ".stl": stl_files.complete,
 }
 
 # If a model's largest side is beyond these, it is a mistake, and Blender's 32 bits cannot hold it.
@@ -126,10 +119,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
     left_out += _import(path, settings.up)
-    is_mended = path.suffix.lower() == ".obj" and obj_files.corrects_materials(path)
-    for mesh in bpy.data.meshes if path.suffix.lower() in _COMPLETE else ():
-        is_mended, lost = _COMPLETE[path.suffix.lower()](path, mesh)
-        left_out += lost
+    is_mended, lost = model_completion.complete(path)
+    left_out += lost
     if path.suffix.lower() == ".fbx":
         left_out += _forget_folders()
     unread_materials = _unread_materials()
@@ -149,8 +140,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
-    if path.suffix.lower() == ".obj" and model_paint.show_luminance():
-        is_mended = True
+    if path.suffix.lower() == ".obj":
+        is_mended = model_paint.show_luminance() or obj_files.corrects_materials(path)
     _pack(path)
     for material in unread_materials:
         model_paint.paint(material)
