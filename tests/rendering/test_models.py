@@ -296,7 +296,7 @@ def "a" (
         ("a.glb", GLB, {"a b.bin", "c.png"}),
         ("a.obj", "# a\nmtllib my own.mtl\nv 0 0 0\n", {"my own.mtl"}),
         ("a.usda", USDA, {"deeper/layer.usda", "deeper/bark.jpg", "other.usd", "tex/wood.png"}),
-        ("a.ply", "ply\n", set()),
+        ("a.ply", "ply\ncomment TextureFile my tex.png\nend_header\n", {"my tex.png"}),
     ],
 )
 def test_a_model_names_other_files(tmp_path, name, content, expected):

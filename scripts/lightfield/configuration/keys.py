@@ -51,7 +51,7 @@ VERSIONS = {
     # Views of models in softboxes, for the same reason.
     "softboxes": 1,
     # The import of models, if it refuses other models. Views keep their keys.
-    "import": 2,
+    "import": 3,
     # The choice of spread test views. Views keep their keys.
     "spread": 1,
 }

@@ -203,6 +203,21 @@ def is_readable(path: Path | str) -> bool:
     return pixels is not None and all(_HARMLESS_WARNINGS.search(line) for line in warnings)
 
 
+def is_transparent(path: Path | str) -> bool:
+    """Return whether a picture of any format has an alpha below 1. False for no picture."""
+    import OpenImageIO as oiio
+
+    file = oiio.ImageInput.open(str(path))
+    if not file:
+        oiio.geterror()
+        return False
+    channel = file.spec().alpha_channel
+    alphas = None if channel < 0 else file.read_image(0, 0, channel, channel + 1, oiio.FLOAT)
+    file.geterror()
+    file.close()
+    return alphas is not None and bool((alphas < 1).any())
+
+
 def read_header(path: Path | str) -> Header:
     """Read only the header. Raises `UserError` for a file that is not an image."""
     if header := _plain_exr_header(path):

@@ -3,7 +3,6 @@
 import logging
 import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -23,7 +22,14 @@ from lightfield.core.paths import case_hint
 from lightfield.core.settings import FARTHEST
 from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
-from lightfield.rendering import blend_file, model_files, model_light, obj_files, ply_files
+from lightfield.rendering import (
+    blend_file,
+    model_completion,
+    model_files,
+    model_light,
+    model_paint,
+    obj_files,
+)
 from lightfield.rendering.model_references import (
     FileReference,
     printable,
@@ -33,6 +39,7 @@ from lightfield.rendering.model_references import (
 from lightfield.rendering.pruning import objects_of_used_collections
 from lightfield.rendering.quiet import reading_quietly
 from lightfield.rendering.render_graph import in_render
+from lightfield.rendering.second_readers import compare, reading
 from lightfield.stages.scene import ImportModel, ImportSettings
 
 # The options of each importer that differ from its defaults. Cameras and lamps are removed anyway.
@@ -77,6 +84,8 @@ def import_model(job: ImportModel) -> None:
     write_json(job.record, content)
     if content["left_out"]:
         print(f"note: {model}: left out: {'; '.join(content['left_out'])}")
+    if "unjudged" in content:
+        print(f"note: {model}: not compared with the file: {'; '.join(content['unjudged'])}")
     print(f"{model}: {summary(content)}")
 
 
@@ -86,7 +95,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     ``folder`` is where the .blend will be.
 
     The record has the ``fingerprint``, the files that the model was read from as
-    ``external_files``, the parts that are ``left_out``, and its ``box`` in metres.
+    ``external_files``, the parts that are ``left_out``, its ``box`` in metres, and what the second
+    reader of the format cannot judge as ``unjudged``.
 
     Raises `UserError` for a model that is broken, empty, lacks files or parts, or names files
     outside its folder.
@@ -106,9 +116,11 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if not settings.allow_missing:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
+    facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
-    skipped, printed = _import(path, settings.up)
-    left_out += skipped
+    left_out += _import(path, settings.up)
+    is_mended, lost = model_completion.complete(path)
+    left_out += lost
     if path.suffix.lower() == ".fbx":
         left_out += _forget_folders()
     unread_materials = _unread_materials()
@@ -128,18 +140,23 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         _refuse_without(path, left_out)
         _refuse_unread(path, unread_textures)
     left_out += [f"{file} is missing" for file in _missing(files)] + unread_textures
-    if path.suffix.lower() == ".ply":
-        count = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
-        left_out += ply_files.faces_left_out(path, count, printed)
+    if path.suffix.lower() == ".obj":
+        is_mended = model_paint.show_luminance() or obj_files.corrects_materials(path)
     _pack(path)
     for material in unread_materials:
-        _paint(material, None)
-    _give_material()
+        model_paint.paint(material)
+    model_paint.give_material()
     bpy.context.scene.frame_set(settings.frame)
-    box = _box(path)
+    shown = in_render(compare.shown_meshes)
+    box = _box(path, [mesh.box for mesh in shown])
+    if facts:
+        lost = [*facts.lost, *compare.differences(facts, shown)]
+        if not settings.allow_missing:
+            _refuse_without(path, lost)
+        left_out += [*lost, *facts.unused]
     if settings.unit == "box":
         _scale_to_box(path, box)
-        box = _box(path)
+        box = _box(path, in_render(compare.shown_boxes))
         if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
             raise UserError(
                 f"{path}: Blender does not scale all its parts alike; export it without "
@@ -160,17 +177,21 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if unread_materials:
         # An earlier version left them black.
         options["grey"] = len(unread_materials)
+    if is_mended:
+        # An earlier version left out colours and opacities.
+        options["mended"] = True
     names = [(entry["path"], entry["sha256"]) for entry in entries]
+    unjudged = facts.unjudged if facts else []
     return {
         "fingerprint": model_fingerprint(options, names),
         "box": box.round(6).tolist(),
         "external_files": entries,
         "left_out": left_out,
-    }
+    } | ({"unjudged": unjudged} if unjudged else {})
 
 
-def _import(path: Path, up: str) -> tuple[list[str], bytes]:
-    """Import a model with the importer of its suffix. Return what it skips, and what it prints.
+def _import(path: Path, up: str) -> list[str]:
+    """Import a model with the importer of its suffix. Return what it skips.
 
     Raises `UserError` if it refuses the model.
     """
@@ -190,8 +211,7 @@ def _import(path: Path, up: str) -> tuple[list[str], bytes]:
     readable = obj_files.readable(path) if family == "obj" else nullcontext(path)
     try:
         with (
-            tempfile.NamedTemporaryFile() as printed,
-            reading_quietly(path, Path(printed.name)),
+            reading_quietly(path),
             _skipped_by_gltf() as skipped,
             readable as file,
         ):
@@ -199,14 +219,13 @@ def _import(path: Path, up: str) -> tuple[list[str], bytes]:
             result = operators[family](filepath=str(file.absolute()), **options)
             if file != path:
                 _normalise_textures()
-            log = printed.read()
     except RuntimeError as error:
         raise UserError(_refusal(path, str(error))) from None
     except UnicodeError:
         raise UserError(_refusal(path, "it has a name that is not UTF-8")) from None
     if "FINISHED" not in result:
         raise UserError(_refusal(path, "it says nothing more"))
-    return skipped, log
+    return skipped
 
 
 def _normalise_textures() -> None:
@@ -408,78 +427,14 @@ def _unread_materials() -> list[Any]:
     return [material for material in bpy.data.materials if not material.node_tree.nodes]
 
 
-def _give_material() -> None:
-    """Give meshes without a material one: of their own colours, or else grey."""
-    plain = None
-    coloured: dict[str, Any] = {}
-    for mesh in bpy.data.meshes:
-        if any(mesh.materials):
-            continue
-        mesh.materials.clear()
-        colours = mesh.color_attributes.active_color
-        if colours is None:
-            plain = plain or _material("plain", None)
-            mesh.materials.append(plain)
-        else:
-            if colours.name not in coloured:
-                coloured[colours.name] = _material("coloured", colours.name)
-            mesh.materials.append(coloured[colours.name])
-
-
-def _material(name: str, attribute: str | None) -> Any:
-    """Return a new matt material, grey or with the colours of an attribute."""
-    material = bpy.data.materials.new(name)
-    _paint(material, attribute)
-    return material
-
-
-def _paint(material: Any, attribute: str | None) -> None:
-    """Make a material matt, and grey or of the colours of an attribute."""
-    tree = material.node_tree
-    tree.nodes.clear()
-    shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    shader.inputs["Base Color"].default_value = (0.5, 0.5, 0.5, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
-    if attribute:
-        colours = tree.nodes.new("ShaderNodeAttribute")
-        colours.attribute_name = attribute
-        tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
-
-
-def _box(path: Path) -> Box:
-    """Return the box of all meshes as a render of the current frame has them.
-
-    Raises `UserError` if there is no face, or a coordinate is not a number.
-    """
-    boxes = in_render(_boxes)
+def _box(path: Path, boxes: Sequence[Box]) -> Box:
+    """Return the box of all meshes. Raises `UserError` if there are none, or one is not finite."""
     if not boxes:
         raise UserError(f"{path}: has no faces to render; must have a mesh with faces")
     corners = np.array(boxes)
     if not np.isfinite(corners).all():
         raise UserError(f"{path}: has vertices whose places are not numbers; export it again")
     return np.array([corners[:, 0].min(0), corners[:, 1].max(0)])
-
-
-def _boxes(depsgraph: Any) -> list[Box]:
-    """Return the box of each mesh with faces. Vertices without a face are not visible."""
-    boxes: list[Box] = []
-    for instance in depsgraph.object_instances:
-        if instance.object.type != "MESH" or not instance.show_self:
-            continue
-        mesh = instance.object.data
-        if not mesh.polygons:
-            continue
-        places = np.empty((len(mesh.vertices), 3), np.float32)
-        mesh.vertices.foreach_get("co", places.ravel())
-        corners = np.empty(len(mesh.loops), np.int32)
-        mesh.loops.foreach_get("vertex_index", corners)
-        is_used = np.zeros(len(places), bool)
-        is_used[corners] = True
-        matrix = np.array(instance.matrix_world, np.float64)
-        used_places = places[is_used] @ matrix[:3, :3].T + matrix[:3, 3]
-        boxes.append(np.array([used_places.min(0), used_places.max(0)]))
-    return boxes
 
 
 def _scale_to_box(path: Path, box: Box) -> None:

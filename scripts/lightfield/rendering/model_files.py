@@ -2,8 +2,6 @@
 
 import json
 import os
-import re
-import struct
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,8 +25,6 @@ def check(path: Path) -> None:
         raise UserError(f"{path}: is empty; must be a model")
     with path.open("rb") as file:
         head = file.read(84)
-        file.seek(max(0, size - 4096))
-        tail = file.read()
     match path.suffix.lower():
         case ".glb" | ".gltf" if not _begins_as_gltf(head):
             raise UserError(
@@ -40,19 +36,6 @@ def check(path: Path) -> None:
                 f"{path}: hides the node {hidden} by KHR_node_visibility, but Blender would show "
                 "it; export the model without hidden nodes"
             )
-        case ".stl" if head.lstrip().startswith(b"solid") and b"facet" in head + tail:
-            # A text may have several solids, each with its own end.
-            if not re.search(rb"endsolid[^\r\n]*\s*$", tail):
-                raise UserError(f"{path}: is cut short; an STL text ends with endsolid")
-        case ".stl":
-            # A head of 80 bytes, the number of triangles, and 50 bytes for each.
-            expected = 84 + 50 * struct.unpack("<I", head[80:])[0] if len(head) == 84 else 84
-            if size < expected or expected == 84:
-                raise UserError(f"{path}: is cut short, or not an STL file: it has {size} bytes")
-        case ".ply":
-            least = ply_files.least_bytes(path)
-            if size < least:
-                raise UserError(f"{path}: is cut short: it has {size} bytes of at least {least}")
         case ".fbx":
             fbx_files.check(path)
         case ".usdz" if not zipfile.is_zipfile(path):
@@ -76,6 +59,8 @@ def survey(path: Path) -> Survey:
             return Survey(list(_of_gltf(path)), [])
         case ".obj":
             return obj_files.survey(path)
+        case ".ply":
+            return ply_files.survey(path)
         case ".usd" | ".usda" | ".usdc" | ".usdz":
             return usd_files.survey(path)
         case ".fbx":

@@ -19,8 +19,13 @@ from lightfield.rendering.model_references import (
     printable,
     refuse_special,
 )
+from lightfield.rendering.second_readers.text_lines import lines_with
 
 _TEXTURE = re.compile(rb"\s*(map_\w+|bump|disp|decal|refl|norm)\s+(.*?)\s*$", re.IGNORECASE)
+# Blender does not know the keyword of normals, and takes a texture of bumps for one.
+_NORMALS, _BUMP = b"norm", b"map_Bump"
+# The models of illumination in which light passes through surfaces.
+TRANSMITTING = ([b"4"], [b"6"], [b"7"], [b"9"])
 # The options of a texture, and the most words that follow each.
 _OPTIONS = {
     **dict.fromkeys((b"-blendu", b"-blendv", b"-boost", b"-bm", b"-cc", b"-clamp"), 1),
@@ -36,7 +41,7 @@ _COLOURS = (b"map_ka", b"map_kd", b"map_ke", b"map_ks")
 _LINEAR_FILES = (".exr", ".hdr")
 
 
-class _Texture(NamedTuple):
+class Texture(NamedTuple):
     """A line of a library that names a texture: its keyword, options with their words, and file."""
 
     keyword: bytes
@@ -75,7 +80,11 @@ def readable(path: Path) -> Iterator[Path]:
     """Yield an OBJ that Blender reads right: the file itself, or a copy if Blender misreads it."""
     mentions = _mentions(path)
     libraries = _library_files(path, mentions)
-    misread = [file for file in libraries if any(each.is_misread for each in _textures(file))]
+    misread = [
+        file
+        for file in libraries
+        if any(each.is_misread for each in _textures(file)) or _is_corrected(file)
+    ]
     if not misread and all(_names(path, text) == [text] for text in mentions):
         yield path
         return
@@ -92,25 +101,85 @@ def _copy_obj(path: Path, copy: Path, libraries: list[Path]) -> None:
     """Copy an OBJ, with a line for each of its ``libraries`` in place of its own lines."""
     with copy.open("wb") as file:
         file.writelines(b"mtllib %s\n" % _relative(each, copy) for each in libraries)
-        file.writelines(line for line in _lines(path) if not _mentioned(line))
+        file.writelines(line for line in read_lines(path) if not _mentioned(line))
 
 
 def _copy_library(path: Path, copy: Path) -> None:
-    """Copy a library without the options that Blender misreads. The textures stay in their place.
+    """Copy a library so that Blender reads it right.
 
+    It lacks the options that Blender misreads, and filters of light that passes through no surface.
+    `Tr` is `d`, and a texture of normals has Blender's keyword. The textures stay in their place.
     In the copy, their names begin at the copy's folder.
     """
+    materials = _values(path)
+    name = b""
     with copy.open("wb") as file:
-        for line in _lines(path):
-            if texture := _texture(path, line):
+        for line in read_lines(path):
+            name = _material_name(line) or name
+            values = materials.get(name, {})
+            if texture := texture_of(path, line):
                 options = [b" ".join(words) for words in texture.options if _is_read(words)]
-                words = [texture.keyword, *options, _relative(texture.file, copy)]
-                line = b" ".join(words) + b"\n"
+                keyword = _BUMP if texture.keyword.lower() == _NORMALS else texture.keyword
+                line = b" ".join([keyword, *options, _relative(texture.file, copy)]) + b"\n"
+            elif _is_opposite(line, values):
+                line = b"d %r\n" % (1 - float(values[b"tr"][0]))
+            elif _filters_nothing(line, values):
+                line = b""
             file.write(line)
+
+
+def corrects_materials(path: Path) -> bool:
+    """Return whether the OBJ that Blender gets has other values of materials, or normals."""
+    return any(map(_is_corrected, libraries(path)))
+
+
+def _is_corrected(library: Path) -> bool:
+    return any(texture.keyword.lower() == _NORMALS for texture in _textures(library)) or any(
+        _is_opposite(b"Tr", values) or _filters_nothing(b"Tf", values)
+        for values in _values(library).values()
+    )
+
+
+def _values(path: Path) -> dict[bytes, dict[bytes, list[bytes]]]:
+    """Return the words after each keyword of each material of a library, in small letters."""
+    values: dict[bytes, dict[bytes, list[bytes]]] = {}
+    name = b""
+    for line in read_lines(path):
+        name = _material_name(line) or name
+        keyword, *words = line.split() or [b""]
+        values.setdefault(name, {})[keyword.lower()] = words
+    return values
+
+
+def _is_opposite(line: bytes, values: dict[bytes, list[bytes]]) -> bool:
+    """Return whether a line has the only opacity of a material, by its opposite, `Tr`."""
+    words = values.get(b"tr", [])
+    is_number = len(words) == 1 and _NUMBER.fullmatch(words[0])
+    return bool(line.lower().split()[:1] == [b"tr"] and is_number and b"d" not in values)
+
+
+def _filters_nothing(line: bytes, values: dict[bytes, list[bytes]]) -> bool:
+    """Return whether a line filters light that passes through a surface through which none does.
+
+    Of such a line, Blender makes glass.
+    """
+    is_filter = line.lower().split()[:1] == [b"tf"] and b"tf" in values
+    return is_filter and values.get(b"illum", [b"2"]) not in TRANSMITTING
+
+
+def _material_name(line: bytes) -> bytes:
+    """Return the name of the material that a line of a library begins, or b""."""
+    words = line.split(None, 1)
+    return words[1].strip() if words[:1] == [b"newmtl"] and len(words) == 2 else b""
 
 
 def _relative(path: Path, named_by: Path) -> bytes:
     return os.fsencode(os.path.relpath(path, named_by.parent))
+
+
+def libraries(path: Path) -> list[Path]:
+    """Return the libraries of an OBJ that exist."""
+    return _library_files(path, _mentions(path))
 
 
 def _library_files(path: Path, mentions: Iterable[bytes]) -> list[Path]:
@@ -129,7 +198,7 @@ def _libraries(path: Path, mentions: Iterable[bytes]) -> list[bytes]:
 
 def _mentions(path: Path) -> list[bytes]:
     """Return what follows mtllib in the lines of an OBJ."""
-    return [text for text in map(_mentioned, _lines(path)) if text]
+    return [text for text in map(_mentioned, lines_with(path, b"mtllib")) if text]
 
 
 def _mentioned(line: bytes) -> bytes | None:
@@ -162,12 +231,12 @@ def _is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113
 
 
-def _textures(path: Path) -> Iterator[_Texture]:
+def _textures(path: Path) -> Iterator[Texture]:
     """Yield the textures that a library names."""
-    yield from filter(None, (_texture(path, line) for line in _lines(path)))
+    yield from filter(None, (texture_of(path, line) for line in read_lines(path)))
 
 
-def _texture(path: Path, line: bytes) -> _Texture | None:
+def texture_of(path: Path, line: bytes) -> Texture | None:
     """Return the texture that a line of a library names. None if it names none."""
     match = _TEXTURE.match(line)
     if not match:
@@ -178,7 +247,7 @@ def _texture(path: Path, line: bytes) -> _Texture | None:
         words, rest = _option(rest)
         options.append(words)
     file, is_escaped = _texture_file(path, rest)
-    return _Texture(keyword, options, file, is_escaped)
+    return Texture(keyword, options, file, is_escaped)
 
 
 def _option(text: bytes) -> tuple[list[bytes], bytes]:
@@ -222,7 +291,7 @@ def _colour_spaces(path: Path) -> Iterator[str]:
                 yield f"the colour space {printable(os.fsdecode(words[0]))} of {name}"
 
 
-def _lines(path: Path) -> Iterator[bytes]:
+def read_lines(path: Path) -> Iterator[bytes]:
     """Yield the lines of an OBJ or a library. A backslash at the end of a line continues it."""
     begun = b""
     with path.open("rb") as file:
