@@ -14,7 +14,7 @@ from pathlib import Path
 import bookkeeping
 import forks
 import pytest
-from bookkeeping import CUBOID
+from bookkeeping import CUBOID, LATTICE
 from checkouts import assert_same_bytes, checkout, jobs_on, snakemake
 from faults import flip
 
@@ -149,5 +149,16 @@ def test_the_next_run_mends_a_view_that_an_export_refused(folder, smoke):
     assert result.returncode == 1
     assert f"{view}: is not as its job made it" in result.stderr
     result = snakemake(folder, "--cores", "2", "smoke", *ALSO)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert_same_bytes(smoke, folder, CUBOID)
+
+
+def test_a_receipt_in_the_place_of_another_counts_as_missing(folder, smoke):
+    """Nothing says of a dataset what a job has noted about another."""
+    receipt, other = (f"work/receipts/{rig}/validate.jsonl" for rig in (CUBOID, LATTICE))
+    (folder / receipt).write_bytes((folder / other).read_bytes())
+    plan = snakemake(folder, "--dry-run", "--logger", "jobs", "--", "smoke").stderr
+    assert receipt in {path for job in jobs_on(plan) for path in job["output"]}
+    result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
     assert_same_bytes(smoke, folder, CUBOID)
