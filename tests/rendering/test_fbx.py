@@ -172,7 +172,9 @@ def as_bytes(nodes, start=27):
         for value in properties:
             match value:
                 case list():
-                    kind, form = (b"d", "d") if isinstance(value[0], float) else (b"i", "i")
+                    is_long = max(value) > 2**31
+                    number = (b"l", "q") if is_long else (b"i", "i")
+                    kind, form = (b"d", "d") if isinstance(value[0], float) else number
                     data = struct.pack(f"<{len(value)}{form}", *value)
                     encoded += kind + struct.pack("<3I", len(value), 0, len(data)) + data
                 case bytes():
@@ -182,6 +184,8 @@ def as_bytes(nodes, start=27):
                     encoded += b"S" + struct.pack("<I", len(text)) + text
                 case int():
                     encoded += b"L" + struct.pack("<q", value)
+                case float():
+                    encoded += b"D" + struct.pack("<d", value)
         head = 13 + len(name)
         inner = start + len(content) + head + len(encoded)
         body = as_bytes(children, inner) + bytes(13) if children else b""
@@ -317,3 +321,162 @@ def test_a_deep_tree_of_objects_is_imported(tmp_path):
     nodes[2][2][0] = ("C", ["OO", 2, 1099], [])
     record = imported(written(tmp_path / "a.fbx", nodes, "bytes"))
     np.testing.assert_allclose(np.ptp(record["box"], axis=0).max(), 1, atol=1e-5)
+
+
+# ---- what the file says is what the scene holds ---------------------------------------------
+
+SECOND = 46186158000
+PLACES = [0.0, 0, 0, 100, 0, 0, 0, 100, 0]
+
+
+def properties(**values):
+    """Return the properties of an object by name. _ stands for a blank."""
+    rows = []
+    for name, value in values.items():
+        numbers = [*value] if isinstance(value, tuple) else [value]
+        rows.append(("P", [name.replace("_", " "), "", "", "A", *numbers], []))
+    return ("Properties70", [], rows)
+
+
+def triangle(*objects, joins=(), model=(), geometry=()):
+    """Return the nodes of a triangle of 1 m, with more objects and connections."""
+    shape = [("Vertices", [PLACES], []), ("PolygonVertexIndex", [[0, 1, -3]], []), *geometry]
+    own = [
+        ("Geometry", [1, "a\0\1Geometry", "Mesh"], shape),
+        ("Model", [2, "triangle\0\1Model", "Mesh"], [properties(**dict(model))]),
+    ]
+    connections = [("OO", 2, 0), ("OO", 1, 2), *joins]
+    axes = properties(UpAxis=1, FrontAxis=2, CoordAxis=0, UnitScaleFactor=1.0)
+    return [
+        ("FBXHeaderExtension", [], [("FBXVersion", [7400], [])]),
+        ("GlobalSettings", [], [axes]),
+        ("Objects", [], [*own, *objects]),
+        ("Connections", [], [("C", [*join], []) for join in connections]),
+    ]
+
+
+def moving(times, values, model=(), layers=1):
+    """Return a triangle that turns about z, in one or more layers of an animation."""
+    objects = [("AnimationStack", [10, "walk\0\1AnimStack", ""], [])]
+    joins = []
+    for number in range(layers):
+        layer, node, curve = (20 + 10 * number + each for each in range(3))
+        keys = [("KeyTime", [[int(time * SECOND) for time in times]], [])]
+        keys += [
+            ("KeyValueFloat", [[float(value) for value in values]], []),
+            # All keys are linear.
+            ("KeyAttrFlags", [[4]], []),
+            ("KeyAttrDataFloat", [[0.0, 0.0, 0.0, 0.0]], []),
+            ("KeyAttrRefCount", [[len(times)]], []),
+        ]
+        objects += [
+            ("AnimationLayer", [layer, f"layer{number}\0\1AnimLayer", ""], []),
+            ("AnimationCurveNode", [node, "R\0\1AnimCurveNode", ""], []),
+            ("AnimationCurve", [curve, "\0\1AnimCurve", ""], keys),
+        ]
+        joins += [("OO", layer, 10), ("OO", node, layer), ("OP", node, 2, "Lcl Rotation")]
+        joins.append(("OP", curve, node, "d|Z"))
+    return triangle(*objects, joins=joins, model=model)
+
+
+def morphing(shapes):
+    """Return a triangle with a channel of ``shapes`` shapes."""
+    objects = [
+        ("Deformer", [30, "d\0\1Deformer", "BlendShape"], []),
+        ("Deformer", [31, "smile\0\1SubDeformer", "BlendShapeChannel"], []),
+    ]
+    joins = [("OO", 30, 1), ("OO", 31, 30)]
+    for number in range(shapes):
+        content = [("Indexes", [[0]], []), ("Vertices", [[0.0, 0, 9]], [])]
+        objects.append(("Geometry", [40 + number, "s\0\1Geometry", "Shape"], content))
+        joins.append(("OO", 40 + number, 31))
+    weights = [50.0 * (number + 1) for number in range(shapes)]
+    objects[1][2].append(("FullWeights", [weights], []))
+    return triangle(*objects, joins=joins)
+
+
+PIVOT = [("RotationPivot", (50.0, 0.0, 0.0))]
+MISREAD = {
+    "vertex cache": (
+        triangle(
+            ("Deformer", [30, "waves\0\1Deformer", "VertexCacheDeformer"], []),
+            joins=[("OO", 30, 1)],
+        ),
+        "the vertex cache waves",
+    ),
+    "in-between": (morphing(2), "the shapes between the ends of smile"),
+    "layers": (
+        moving((0, 1), (0, 90), layers=2),
+        "the layers layer0, layer1 of the animation walk",
+    ),
+    "pivot": (
+        moving((0, 1), (0, 90), model=PIVOT),
+        "the pivot of triangle between the keys of its animation",
+    ),
+    "subdivision": (
+        triangle(
+            geometry=[
+                ("Smoothness", [2], []),
+                ("PreviewDivisionLevels", [2], []),
+                ("RenderDivisionLevels", [2], []),
+            ]
+        ),
+        "the subdivision of the mesh triangle",
+    ),
+}
+
+
+@KINDS
+@pytest.mark.parametrize("case", MISREAD)
+def test_what_blender_misreads_is_named(tmp_path, kind, case):
+    nodes, named = MISREAD[case]
+    path = written(tmp_path / "a.fbx", nodes, kind)
+    message = refusal(path)
+    assert f"left out: {named}; " in message and "allow_missing: true" in message
+    assert imported(path, allow_missing=True)["left_out"] == [named]
+
+
+@KINDS
+def test_what_blender_reads_is_not_refused(tmp_path, kind):
+    """One layer, one shape of a channel, and a pivot whose keys stand at each frame."""
+    for name, nodes in {
+        "still": triangle(model=PIVOT),
+        "one layer": moving((0, 1), (0, 90)),
+        "one shape": morphing(1),
+        "close keys": moving([i / 30 for i in range(31)], range(31), model=PIVOT),
+    }.items():
+        record = imported(written(tmp_path / f"{name}.fbx", nodes, kind))
+        assert record["left_out"] == []
+        assert ("unjudged" in record) == (name in ("one layer", "close keys"))
+
+
+def test_a_place_that_is_no_number_is_refused(tmp_path):
+    text = written(tmp_path / "a.fbx", triangle(), "text").read_text()
+    path = tmp_path / "b.fbx"
+    path.write_text(text.replace(",100,", ",1.#INF,", 1))
+    assert "places are not numbers" in refusal(path)
+
+
+@KINDS
+def test_connections_of_properties_are_passed_over(tmp_path, kind):
+    nodes = triangle(joins=[("PP", 2, "Lcl Translation", 2, "Lcl Scaling")])
+    assert imported(written(tmp_path / "a.fbx", nodes, kind))["left_out"] == []
+
+
+@KINDS
+def test_further_animations_are_noted(tmp_path, kind):
+    nodes = moving((0, 1), (0, 90))
+    nodes[2][2].append(("AnimationStack", [11, "run\0\1AnimStack", ""], []))
+    (noted,) = imported(written(tmp_path / "a.fbx", nodes, kind))["left_out"]
+    assert noted == "the animations run: only one moves the model"
+
+
+@KINDS
+def test_pivots_and_places_of_an_object_at_rest_are_shown(tmp_path, kind):
+    """A quarter turn about (0.5, 0, 0), and a scale of 2 in x."""
+    model = [*PIVOT, ("Lcl_Rotation", (0.0, 0.0, 90.0)), ("Lcl_Scaling", (2.0, 1.0, 1.0))]
+    path = written(tmp_path / "a.fbx", triangle(model=model), kind)
+    record = imported(path, unit="metres")
+    # y is up: (2 x - 0.5, y) becomes (0.5 - y, 2 x - 0.5), which is x and z here.
+    np.testing.assert_allclose(record["box"], [[-0.5, 0, -0.5], [0.5, 0, 1.5]], atol=1e-5)
+    assert record["left_out"] == [] and "unjudged" not in record

@@ -4,7 +4,8 @@ import logging
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,14 @@ from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import (
     blend_file,
+    gltf_copies,
     model_completion,
     model_files,
     model_light,
     model_paint,
+    model_volumes,
     obj_files,
+    usd_copies,
 )
 from lightfield.rendering.model_references import (
     FileReference,
@@ -116,9 +120,13 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if not settings.allow_missing:
         _refuse_missing(path, [reference.path for reference in references])
         _refuse_without(path, left_out)
-    facts = reading.read(path, settings.up, settings.frame)
     blend_file.new_scene()
-    left_out += _import(path, settings.up)
+    skipped, is_corrected = _import(path, settings.up, settings.frame)
+    # After the import, because Blender says more of a broken file.
+    facts = reading.read(path, settings.up, settings.frame)
+    left_out += skipped
+    if path.suffix.lower() in (".glb", ".gltf"):
+        model_volumes.follow_gltf()
     is_mended, lost = model_completion.complete(path)
     left_out += lost
     if path.suffix.lower() == ".fbx":
@@ -177,6 +185,12 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     if unread_materials:
         # An earlier version left them black.
         options["grey"] = len(unread_materials)
+    if is_corrected:
+        # An earlier version showed what Blender makes of the file itself.
+        options["corrected"] = 1
+    if model_volumes.volumes():
+        # An earlier version gave them other densities.
+        options["volumes"] = len(model_volumes.volumes())
     if is_mended:
         # An earlier version left out colours and opacities.
         options["mended"] = True
@@ -190,8 +204,10 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
     } | ({"unjudged": unjudged} if unjudged else {})
 
 
-def _import(path: Path, up: str) -> list[str]:
-    """Import a model with the importer of its suffix. Return what it skips.
+def _import(path: Path, up: str, frame: int) -> tuple[list[str], bool]:
+    """Import a model with the importer of its suffix.
+
+    Return what it skips, and whether it read a corrected copy of a glTF or a USD.
 
     Raises `UserError` if it refuses the model.
     """
@@ -208,7 +224,12 @@ def _import(path: Path, up: str) -> list[str]:
         "stl": bpy.ops.wm.stl_import,
         "usd": bpy.ops.wm.usd_import,
     }
-    readable = obj_files.readable(path) if family == "obj" else nullcontext(path)
+    readers: dict[str, Callable[[Path], AbstractContextManager[Path]]] = {
+        "gltf": gltf_copies.readable,
+        "obj": obj_files.readable,
+        "usd": partial(usd_copies.readable, frame=frame),
+    }
+    readable = readers.get(family, nullcontext)(path)
     try:
         with (
             reading_quietly(path),
@@ -217,7 +238,7 @@ def _import(path: Path, up: str) -> list[str]:
         ):
             # Blender would take a path with // before it for one from the .blend.
             result = operators[family](filepath=str(file.absolute()), **options)
-            if file != path:
+            if file != path and family == "obj":
                 _normalise_textures()
     except RuntimeError as error:
         raise UserError(_refusal(path, str(error))) from None
@@ -225,7 +246,7 @@ def _import(path: Path, up: str) -> list[str]:
         raise UserError(_refusal(path, "it has a name that is not UTF-8")) from None
     if "FINISHED" not in result:
         raise UserError(_refusal(path, "it says nothing more"))
-    return skipped
+    return skipped, file != path and family != "obj"
 
 
 def _normalise_textures() -> None:
@@ -454,6 +475,7 @@ def _scale_to_box(path: Path, box: Box) -> None:
         if obj.parent is None and obj != model and obj not in instanced:
             obj.parent = model
     model.matrix_world = Matrix.Scale(1 / side, 4) @ Matrix.Translation(-box.mean(0))
+    model_volumes.scale(1 / side)
     bpy.context.view_layer.update()
 
 

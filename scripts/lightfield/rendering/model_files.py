@@ -1,17 +1,16 @@
 """Finds the files that a model file names, without Blender, which does not list them."""
 
 import json
-import os
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.rendering import fbx_files, obj_files, ply_files, usd_files
 from lightfield.rendering.model_references import FileReference, Survey
+from lightfield.rendering.second_readers.gltf_data import file_of, is_data
 
 
 def check(path: Path) -> None:
@@ -105,10 +104,8 @@ def _of_gltf(path: Path) -> Iterator[FileReference]:
     except (TypeError, AttributeError) as error:
         raise UserError(f"{path}: is cut short, or not a glTF file: {error}") from None
     for address in addresses:
-        # Blender takes other data addresses for paths.
-        if not (address.startswith("data:") and ";base64," in address):
-            name = unquote(address.replace("\\", "/"))
-            yield FileReference(path, address, Path(os.path.normpath(path.parent / name)))
+        if not is_data(address):
+            yield FileReference(path, address, file_of(path, address))
 
 
 def compressions(path: Path) -> list[str]:

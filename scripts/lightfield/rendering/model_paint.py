@@ -10,34 +10,30 @@ from numpy.typing import NDArray
 
 from lightfield.imaging.images import is_transparent
 
+# The opacities of a USD's mesh without material.
+_OPACITY = "displayOpacity"
+
 
 def give_material() -> None:
     """Give meshes without a material one: of their own colours, or else grey."""
-    plain = None
-    coloured: dict[str, Any] = {}
+    given: dict[tuple[str | None, bool], Any] = {}
     for mesh in bpy.data.meshes:
         if any(mesh.materials):
             continue
         mesh.materials.clear()
         colours = mesh.color_attributes.active_color
-        if colours is None:
-            plain = plain or _material("plain", None)
-            mesh.materials.append(plain)
-        else:
-            if colours.name not in coloured:
-                coloured[colours.name] = _material("coloured", colours.name)
-            mesh.materials.append(coloured[colours.name])
+        key = (colours and colours.name, _OPACITY in mesh.attributes)
+        if key not in given:
+            given[key] = bpy.data.materials.new("coloured" if colours else "plain")
+            paint(given[key], *key)
+        mesh.materials.append(given[key])
 
 
-def _material(name: str, attribute: str | None) -> Any:
-    """Return a new matt material, grey or with the colours of an attribute."""
-    material = bpy.data.materials.new(name)
-    paint(material, attribute)
-    return material
+def paint(material: Any, attribute: str | None = None, has_opacity: bool = False) -> Any:
+    """Make a material matt, and grey or of the colours of an attribute. Return its shader.
 
-
-def paint(material: Any, attribute: str | None = None) -> Any:
-    """Make a material matt, and grey or of the colours of an attribute. Return its shader."""
+    Its opacity may be the opacity of a mesh in USD.
+    """
     tree = material.node_tree
     tree.nodes.clear()
     shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
@@ -48,6 +44,10 @@ def paint(material: Any, attribute: str | None = None) -> Any:
         colours = tree.nodes.new("ShaderNodeAttribute")
         colours.attribute_name = attribute
         tree.links.new(colours.outputs["Color"], shader.inputs["Base Color"])
+    if has_opacity:
+        opacity = tree.nodes.new("ShaderNodeAttribute")
+        opacity.attribute_name = _OPACITY
+        tree.links.new(opacity.outputs["Fac"], shader.inputs["Alpha"])
     return shader
 
 

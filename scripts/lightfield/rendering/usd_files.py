@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.rendering.model_references import FileReference, Survey
@@ -39,7 +40,7 @@ def openusd() -> SimpleNamespace:
     # Only for this import: the folder has other packages, such as OpenImageIO, in other versions.
     sys.path.append(str(folder))
     try:
-        names = ("Ar", "Sdf", "Usd", "UsdGeom", "UsdUtils", "Vt")
+        names = ("Ar", "Gf", "Sdf", "Usd", "UsdGeom", "UsdShade", "UsdSkel", "UsdUtils", "Vt")
         return SimpleNamespace(**{name: importlib.import_module(f"pxr.{name}") for name in names})
     finally:
         sys.path.remove(str(folder))
@@ -194,3 +195,36 @@ def _fault(mesh: Any) -> str | None:
     exist = not len(corners) or (corners.min() >= 0 and corners.max() < places)
     fits = counts.sum() == len(corners) and exist
     return None if fits else "faces with corners that do not exist"
+
+
+def array_of(attribute: Any, time: Any) -> NDArray[Any]:
+    """Return the values of an attribute at a time: no values if it has none, or is no array."""
+    value = attribute.Get(time)
+    return np.array(value if hasattr(value, "__len__") else ())
+
+
+def all_prims(stage: Any) -> list[Any]:
+    """Return all prims of a stage, also the prims of instances."""
+    usd = openusd().Usd
+    return list(usd.PrimRange(stage.GetPseudoRoot(), usd.TraverseInstanceProxies()))
+
+
+def preview_surface(material: Any) -> Any:
+    """Return the UsdPreviewSurface of a material. None if it has another shader, or none."""
+    shader, _, _ = material.ComputeSurfaceSource()
+    is_preview = shader and shader.GetIdAttr().Get() == "UsdPreviewSurface"
+    return shader if is_preview else None
+
+
+def producer(entry: Any) -> Any:
+    """Return the attribute that gives an input's value: its own, or a shader's output.
+
+    None if nothing gives it a value.
+    """
+    if not entry:
+        return None
+    shade = openusd().UsdShade
+    for attribute in shade.Utils.GetValueProducingAttributes(entry):
+        if shade.Output.IsOutput(attribute) or attribute.HasAuthoredValue():
+            return attribute
+    return None

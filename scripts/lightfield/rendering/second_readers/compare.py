@@ -68,7 +68,8 @@ def _mesh_objects(depsgraph: Any) -> Iterator[tuple[Any, NDArray[np.float64]]]:
 
 def differences(facts: ModelFacts, shown: Sequence[MeshFacts]) -> list[str]:
     """Return what a file says and the open scene does not show, in words, mesh by mesh."""
-    return [*_of_meshes(facts.meshes, shown), *_of_materials(facts.materials)]
+    meshes = [] if facts.meshes is None else _of_meshes(facts.meshes, shown)
+    return [*meshes, *_of_materials(facts.materials)]
 
 
 def _geometry(mesh: Any) -> Geometry:
@@ -149,7 +150,7 @@ def _unmatched(
     unlike = []
     for mesh in said:
         # A distance of infinite order is the largest difference of a coordinate.
-        near = boxes.query_ball_point(mesh.box.ravel(), _TOLERANCE * size, p=np.inf)
+        near = boxes.query_ball_point(mesh.box.ravel(), _reach(mesh, size), p=np.inf)
         alike = [i for i in near if i in free and not any(_unlike(mesh, free[i], size))]
         if alike:
             del free[next((i for i in alike if free[i].name == mesh.name), alike[0])]
@@ -160,7 +161,7 @@ def _unmatched(
 
 def _unlike(said: MeshFacts, shown: MeshFacts, size: float) -> Iterator[str]:
     """Yield in which figures a mesh of the file differs from a mesh of Blender."""
-    if not np.abs(said.box - shown.box).max() <= _TOLERANCE * size:
+    if not np.abs(said.box - shown.box).max() <= _reach(said, size):
         is_far = np.abs(said.box).max() > _FAR * size
         reason = " in its 32 bits; move it to the origin" if is_far else ""
         yield f"it reaches {_corners(said)}, and Blender shows {_corners(shown)}{reason}"
@@ -172,6 +173,11 @@ def _unlike(said: MeshFacts, shown: MeshFacts, size: float) -> Iterator[str]:
         yield f"its colours are {_colour(said.colour)} on average, and {_shown(shown.colour)}"
     if said.opacity is not None and not _alike(said.opacity, shown.opacity):
         yield f"its opacity is {said.opacity:.3g} on average, and {_shown(shown.opacity)}"
+
+
+def _reach(said: MeshFacts, size: float) -> float:
+    """Return by how much each coordinate of a mesh's box may differ."""
+    return _TOLERANCE * size + said.slack
 
 
 def _have_equal_areas(said: float | None, shown: float | None, size: float) -> bool:

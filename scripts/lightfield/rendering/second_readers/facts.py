@@ -33,6 +33,8 @@ class MeshFacts:
 
     ``colour`` (3,) is the mean linear colour of all corners of faces, and ``opacity`` their mean
     alpha. They are None if the mesh has no colours or alphas of its own, beside its material.
+
+    Blender's box may be smaller on each side by ``slack``, because it shows curves as flat faces.
     """
 
     name: str
@@ -41,6 +43,7 @@ class MeshFacts:
     area: float | None = None
     colour: NDArray[np.float64] | None = None
     opacity: float | None = None
+    slack: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,14 +63,14 @@ class MaterialFacts:
 
 @dataclass(frozen=True)
 class ModelFacts:
-    """What a model file says.
+    """What a model file says. ``meshes`` is None if the reader cannot judge them.
 
     ``lost`` are parts that Blender does not show, so that views would be wrong: the import is
     refused, or notes them if `allow_missing`. ``unused`` are features that the file names, and that
     no view shows, and are always noted. ``unjudged`` is what the reader cannot judge, said once.
     """
 
-    meshes: list[MeshFacts]
+    meshes: list[MeshFacts] | None
     materials: list[MaterialFacts] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
     unused: list[str] = field(default_factory=list)
@@ -151,7 +154,8 @@ def linear_colours(colours: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 def upright(facts: ModelFacts) -> ModelFacts:
     """Return the facts of a model in which y points up with z up."""
-    return replace(facts, meshes=[replace(each, box=_upright(each.box)) for each in facts.meshes])
+    meshes = facts.meshes or []
+    return replace(facts, meshes=[replace(each, box=_upright(each.box)) for each in meshes])
 
 
 def _upright(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,11 +7,15 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import UP
-from lightfield.rendering.second_readers import obj, ply, stl
+from lightfield.rendering.second_readers import fbx, gltf, obj, ply, stl, usd
 from lightfield.rendering.second_readers.facts import ModelFacts, upright
 
 # Formats whose files say which axis points up, and what moves. Readers take the path and the frame.
-_MOVING: dict[str, Callable[[Path, int], ModelFacts]] = {}
+_MOVING: dict[str, Callable[[Path, int], ModelFacts]] = {
+    ".fbx": fbx.read,
+    **dict.fromkeys((".glb", ".gltf"), gltf.read),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), usd.read),
+}
 # The formats of `UP`.
 _STILL: dict[str, Callable[[Path], ModelFacts]] = {
     ".obj": obj.read,
@@ -34,6 +38,6 @@ def read(path: Path, up: str, frame: int) -> ModelFacts | None:
             facts = upright(facts)
     else:
         return None
-    if not all(np.isfinite(mesh.box).all() for mesh in facts.meshes):
+    if not all(np.isfinite(mesh.box).all() for mesh in facts.meshes or ()):
         raise UserError(f"{path}: has vertices whose places are not numbers; export it again")
     return facts
