@@ -98,6 +98,16 @@ def noted(folder):
     }
 
 
+def is_note(name):
+    """Return whether a file notes what a job has made."""
+    return receipts.is_receipt(name)
+
+
+def note_of(job):
+    """Return the output of a planned job that notes the others. None for a job without one."""
+    return next(filter(is_note, job["output"]), None)
+
+
 def _receipts(folder):
     """Return the receipts of a build's finished jobs, by their paths from its folder."""
     paths = sorted(Path(folder, NOTES).rglob(f"*{receipts.SUFFIX}"))

@@ -14,7 +14,7 @@ from pathlib import Path
 import bookkeeping
 import forks
 import pytest
-from bookkeeping import CUBOID, LATTICE
+from bookkeeping import CUBOID, PLANE
 from checkouts import assert_same_bytes, checkout, jobs_on, snakemake
 from faults import flip
 
@@ -47,23 +47,18 @@ def jobs(folder):
     ).stderr
     first = {}
     for job in jobs_on(plan):
-        if any(path.endswith(".jsonl") for path in job["output"]) and job["command"]:
+        if bookkeeping.note_of(job) and job["command"]:
             first.setdefault(job["rule"], job)
     assert {"render", "reproject", "export", "validate", "checksums", "pack"} <= first.keys()
     return first
 
 
-def receipt_of(job):
-    (receipt,) = (path for path in job["output"] if path.endswith(".jsonl"))
-    return receipt
-
-
 def files_read(folder, job):
     """Return a view that stands for the job's receipts of views, and each other file it reads."""
     noted = bookkeeping.noted(folder)
-    inputs = noted[receipt_of(job)].inputs
-    views = [path for name in inputs if name.endswith(".jsonl") for path in noted[name].files]
-    files = [name for name in inputs if not name.endswith(".jsonl")]
+    inputs = noted[bookkeeping.note_of(job)].inputs
+    views = [path for name in inputs if bookkeeping.is_note(name) for path in noted[name].files]
+    files = [name for name in inputs if not bookkeeping.is_note(name)]
     # The last view shows whether the program compares all of them.
     return [path for path in [*views[-1:], *files] if (folder / path).is_file()]
 
@@ -90,7 +85,7 @@ def flip_in_secret(path):
 
 def run(folder, job, python):
     """Run the command of a job whose receipt is gone. Return its status and its log."""
-    bookkeeping.forget(folder, receipt_of(job))
+    bookkeeping.forget(folder, bookkeeping.note_of(job))
     path = f"{python.parent}:{Path(sys.executable).parent}:{os.environ['PATH']}"
     command = ["bash", "-c", job["command"]]
     result = subprocess.run(command, cwd=folder, env=os.environ | {"PATH": path}, check=False)
@@ -102,18 +97,18 @@ def outcomes(folder, jobs, python_of):
     wrong = []
     for rule, job in jobs.items():
         for name in files_read(folder, job):
-            before = bookkeeping.noted(folder)[receipt_of(job)]
+            before = bookkeeping.noted(folder)[bookkeeping.note_of(job)]
             with ExitStack() as stack:
-                for path in {receipt_of(job), name, *before.files}:
+                for path in {bookkeeping.note_of(job), name, *before.files}:
                     stack.enter_context(kept(folder, path))
                 status, log = run(folder, job, python_of(folder / name))
                 refused = f"{name}: is not as its job made it" in log or (
                     f"{name}: has changed" in log
                 )
                 if status:
-                    is_right = refused and receipt_of(job) not in bookkeeping.noted(folder)
+                    is_right = refused and bookkeeping.note_of(job) not in bookkeeping.noted(folder)
                 else:
-                    after = bookkeeping.noted(folder)[receipt_of(job)]
+                    after = bookkeeping.noted(folder)[bookkeeping.note_of(job)]
                     is_right = rule in TIMED or after.files == before.files
             if not is_right:
                 last_line = log.strip().splitlines()[-1:]
@@ -155,10 +150,10 @@ def test_the_next_run_mends_a_view_that_an_export_refused(folder, smoke):
 
 def test_a_receipt_in_the_place_of_another_counts_as_missing(folder, smoke):
     """Nothing says of a dataset what a job has noted about another."""
-    receipt, other = (f"work/receipts/{rig}/validate.jsonl" for rig in (CUBOID, LATTICE))
+    receipt, other = bookkeeping.KINDS["receipt of a file"]
     (folder / receipt).write_bytes((folder / other).read_bytes())
     plan = snakemake(folder, "--dry-run", "--logger", "jobs", "--", "smoke").stderr
     assert receipt in {path for job in jobs_on(plan) for path in job["output"]}
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
-    assert_same_bytes(smoke, folder, CUBOID)
+    assert_same_bytes(smoke, folder, PLANE)
