@@ -140,6 +140,22 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
         files += [helpers[name] for name in helpers.keys() & modules if helpers[name] not in files]
 
 
+# How Python and NumPy open a file, but for writing.
+OPENS = re.compile(r"\.(?:read_bytes|read_text)\(|(?<!tarfile)\.open\((?!\"[wax])|\bnp\.load\(")
+READERS = (
+    *("reading", "reprojection", "validation", "export", "synthesis"),
+    *("measurement", "report"),
+)
+# Templates of the package, and a file whose bytes are compared right before.
+MAY_OPEN = {LIBRARY / "report/page.py", LIBRARY / "reprojection/lens_map.py"}
+
+
+def test_no_reader_of_datasets_passes_by_the_comparison_with_receipts():
+    """`core.files.open_file`, and all that calls it, compares what a job reads."""
+    files = [file for room in READERS for file in (LIBRARY / room).rglob("*.py")]
+    assert not [file for file in {*files} - MAY_OPEN if OPENS.search(file.read_text())]
+
+
 # A figure that is divided by a unit, or that has digits and a unit behind them.
 UNITS = re.compile(
     r"\{[^{}\n]*/ ?(?:1e[369]|3600|60|1024)[^{}\n]*:[^{}\n]*\}"

@@ -5,6 +5,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from io import StringIO
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 from lightfield.configuration.config_file import Energy
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import read_text, write_json
 from lightfield.core.names import FILE
 from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
@@ -112,8 +113,7 @@ def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, StageCost]:
 
 def job_times(path: Path) -> tuple[float, float, int]:
     """Return a job's wall and processor time in seconds, and its memory in bytes, from its TSV."""
-    with path.open(encoding="utf-8", newline="") as file:
-        row = next(csv.DictReader(file, delimiter="\t"))
+    row = next(csv.DictReader(StringIO(read_text(path)), delimiter="\t"))
     wall = float(row["s"])
     cpu = wall if row["cpu_time"] == "NA" else float(row["cpu_time"])
     memory = 0 if row["max_rss"] == "NA" else round(float(row["max_rss"]) * 2**20)
