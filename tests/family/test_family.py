@@ -299,7 +299,8 @@ def test_another_light_of_the_softboxes_builds_only_families_in_softboxes_again(
 
 # ---- files that change while members are built ------------------------------------------------
 
-FACE = "v 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nf 1/1 2/1 3/1\n"
+# It is seen from all sides.
+FACE = "v 0 0 0\nv 1 0.5 0\nv 0 0.5 1\nvt 0 0\nf 1/1 2/1 3/1\n"
 RING = {"type": "ring", "count": 2, "size": 3}
 RING["camera"] = {"lens": "rectilinear", "fov": 50, "resolution": [8, 8]}
 
@@ -326,19 +327,21 @@ def build_of(settings):
 
 
 @pytest.mark.slow
-def test_a_model_that_changes_after_its_import_is_built_again(face, tmp_path, monkeypatch):
+def test_a_model_that_changes_after_its_import_fails_its_batch(face, tmp_path, monkeypatch):
     path = tmp_path / "face.obj"
     render = RenderShard.run
 
     def change_and_render(job):
-        path.write_text(FACE.replace("1 0 0", "2 0 0"))
+        path.write_text(FACE.replace("v 1", "v 2"))
         render(job)
 
     monkeypatch.setattr(RenderShard, "run", change_and_render)
     build = build_of(face())
-    assert build.build("cpu", 1)["state"] == "valid"
+    with pytest.raises(UserError, match=r"face\.obj: has changed while this job read it"):
+        build.build("cpu", 1)
     assert not build.is_finished()
-    path.write_text(FACE)
+    monkeypatch.undo()
+    assert build.build("cpu", 1)["state"] == "valid"
     assert build.is_finished()
 
 
@@ -550,7 +553,7 @@ def finished_batch(tmp_path_factory, run_batch):
     folder = tmp_path_factory.mktemp("batch")
     with contextlib.chdir(folder):
         Path("face.obj").write_text(FACE)
-        Path("side.obj").write_text(FACE.replace("0 0 1", "0 1 1"))
+        Path("side.obj").write_text(FACE.replace("0.5 1", "1 1"))
         run_batch(batch_settings(**SPLIT))
     return folder
 
@@ -644,7 +647,7 @@ def test_a_limit_of_file_sizes_ends_a_batch_in_one_line_and_the_next_run_goes_on
 
 @pytest.mark.slow
 def test_a_changed_model_builds_its_member_again(run_batch, batch):
-    Path("side.obj").write_text(FACE.replace("0 0 1", "0 2 1"))
+    Path("side.obj").write_text(FACE.replace("0.5 1", "2 1"))
     assert verdict(batch).outdated == ["side.obj"]
     run_batch(batch)
     assert begun() == ["face", "side", "side"]
@@ -718,12 +721,12 @@ def test_a_failed_member_is_tried_again_whenever_its_batch_starts(run_batch, bat
 @pytest.mark.slow
 def test_a_model_that_changes_while_its_batch_runs_is_named(run_batch, batch, monkeypatch):
     """The batch is then not finished: the next run builds the member again."""
-    Path("face.obj").write_text(FACE.replace("1 0 0", "2 0 0"))
+    Path("face.obj").write_text(FACE.replace("v 1", "v 2"))
 
     def build_and_change(job, *_):
         for member in job.settings.members:
             MemberBuild(job.settings, member).build("cpu", 1)
-        Path("face.obj").write_text(FACE.replace("1 0 0", "3 0 0"))
+        Path("face.obj").write_text(FACE.replace("v 1", "v 3"))
         return 0
 
     monkeypatch.setattr(family_batch, "_work", build_and_change)

@@ -599,7 +599,7 @@ def note_inputs(paths: Iterable[str | Path]) -> None:
     """Note files that the job at work is about to read, if the job has a receipt."""
     if receipt := current():
         for path in paths:
-            receipt.add_input(os.path.relpath(path))
+            receipt.add_input(path)
 
 
 def note_shared_inputs(paths: Iterable[str | Path]) -> None:
