@@ -17,6 +17,8 @@ from lightfield.configuration.keys import VERSIONS as VIEW_VERSIONS
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.settings import checked
 from lightfield.geometry import frames
+from lightfield.geometry.rigs.poses import LARGEST_FILE
+from lightfield.imaging.images import HALF_MAX
 from lightfield.reading.dataset import Dataset, View
 from lightfield.stages.registry import VERSIONS as STAGE_VERSIONS
 
@@ -198,9 +200,12 @@ def test_the_page_of_changes_has_each_version_of_stages_and_of_views():
 
 def test_the_page_of_limits_has_the_numbers_of_the_code():
     text = (DOCS / "reference/limits.md").read_text()
-    for name, number in [
-        ("views of a dataset", frames.MOST_VIEWS),
-        ("views of a scene YAML, frames of a sequence", scene_yaml.MOST_VIEWS),
-        ("samples along a side of a pixel in a reprojection", reprojections.MOST_SAMPLES),
+    both = f"{scene_yaml.MOST_VIEWS:,}, {scene_yaml.MOST_FRAMES:,}"
+    for name, limit in [
+        ("views of a dataset", f"{frames.MOST_VIEWS:,}"),
+        ("views of a scene YAML, frames of a sequence", both),
+        ("samples along a side of a pixel in a reprojection", f"{reprojections.MOST_SAMPLES}"),
+        ("light in a file", f"{HALF_MAX:,.0f}"),
+        ("a file of poses", f"{LARGEST_FILE / 1e6:.0f} MB"),
     ]:
-        assert f"| {name} | {number:,}" in text
+        assert f"| {name} | {limit} |" in text
