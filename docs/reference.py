@@ -29,10 +29,8 @@ from lightfield.configuration import (
     scene_source,
     scene_yaml,
 )
-from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.json_schema import Generator
-from lightfield.core import flags
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.core.names import ROOT
@@ -43,14 +41,9 @@ from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
-from lightfield.stages import checks, measurement, publishing, report
-from lightfield.stages import exports as export_stages
-from lightfield.stages import family as family_stages
-from lightfield.stages import rig as rig_stages
-from lightfield.stages import scene as scene_stages
-from lightfield.stages.registry import BY_NAME
 
 PROGRAMS = ROOT / "scripts"
+LIBRARY = PROGRAMS / "lightfield"
 NOTE = "<!-- Written by docs/reference.py. Change the models or the programs instead. -->"
 
 
@@ -125,12 +118,6 @@ KEY_PAGES: dict[str, Page] = {
             Section("report", scene_yaml.Report),
             Section("publish", publication.Publication),
             Section("publish: a creator", publication.Creator),
-            # The other programs' settings files fill a page of their own.
-            Section(
-                "The settings file of import_model.py",
-                scene_stages.ImportSettings,
-                scene_source.ModelOptions,
-            ),
         ],
     ),
     "family-keys.md": Page(
@@ -142,11 +129,6 @@ KEY_PAGES: dict[str, Page] = {
             Section("family: values", family.Draw),
             Section("family: corpus", corpus.CorpusOptions),
             Section("family: corpus: splits", corpus.Shares),
-            # The settings files of its jobs.
-            Section("The settings file of build_members.py", family_stages.BatchSettings),
-            Section("The settings file of build_members.py: members", family.Member),
-            Section("The settings file of count_members.py", family_stages.CountSettings),
-            Section("The settings file of corpus.py", family_stages.CorpusSettings),
         ],
     ),
     "render-keys.md": Page(
@@ -234,104 +216,58 @@ KEY_PAGES: dict[str, Page] = {
         "of all frames. [Train on a sequence](../how-to/train-on-a-sequence.md) shows how.",
         [Section(name, exports.settings_of(name)) for name in SEQUENCE_EXPORTS],
     ),
-    "job-keys.md": Page(
-        "The keys of the programs' settings files",
-        "A settings file is a JSON with everything that one job takes from the scene YAML and "
-        "config.yaml. Snakemake writes these files in its plan, and the programs read them with "
-        "`--settings`. You can also write one by hand.",
-        [
-            Section("build_scene.py", scene_stages.BuildSettings),
-            Section("make_lightfield.py", LightfieldSettings),
-            Section("free_places.py", rig_stages.FreePlacesSettings),
-            Section("surface.py", export_stages.MeshSettings),
-            Section("reproject.py and lens_map.py", reprojections.Reprojection),
-            Section("export.py and export_instant_ngp.py", exports.ExportSettings[exports.Export]),
-            Section("validate.py", checks.ValidationSettings),
-            Section("validate_sequence.py", checks.SequenceValidationSettings),
-            Section("package.py and publish.py", publishing.PackSettings),
-            Section("package.py and publish.py: scene", scene_yaml.Credits),
-            Section("report_figures.py", report.FiguresSettings),
-            Section("report_html.py", report.PageSettings),
-            Section("report_html.py: measurements", report.MeasurementFile),
-        ],
-    ),
-    "measurement-keys.md": Page(
-        "The keys of the settings files of measurements",
-        "These programs measure or estimate something. They read a "
-        "[settings file](job-keys.md) like the other programs.",
-        [
-            Section("evaluate.py", measurement.EvaluationSettings),
-            Section("evaluate_surface.py", measurement.SurfaceSettings),
-            Section("synthesis_quality.py", measurement.SynthesisSettings),
-            Section("costs.py", measurement.CostSettings),
-            Section("costs.py: full_size", measurement.FullSize),
-            Section("probe.py", measurement.ProbeSettings),
-            Section("calibrate.py", measurement.CalibrationSettings),
-            Section("error_vs_time.py", measurement.ErrorVsTimeSettings),
-            Section("gpu_check.py", measurement.GpuCheckSettings),
-        ],
-    ),
 }
 
-# The pages of the programs' settings files.
-JOB_PAGES = ("job-keys.md", "measurement-keys.md")
-
-# The programs of each page, in the order of the pages.
-PROGRAM_PAGES = {
-    "programs-scene.md": (
-        "Programs that prepare a scene",
-        "These programs build or check a scene, and place its cameras.",
-        [
-            "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
-            "make_lightfield", "free_places", "check_cameras", "import_views",
-        ],
-    ),
-    "programs-family.md": (
-        "Programs that build families",
-        "These programs build the members of families of scenes, collect them, and count them.",
-        ["build_members", "corpus", "count_members"],
-    ),
-    "programs-render.md": (
-        "Programs that render",
-        "These programs render views, or find out how to render them.",
-        ["check_device", "probe", "calibrate", "render_shard"],
-    ),
-    "programs-reproject.md": (
-        "Programs that reproject",
-        "These programs make views through another lens from finished views.",
-        ["lens_map", "reproject"],
-    ),
-    "programs-export.md": (
-        "Programs that export",
-        "These programs write finished views in other formats, and compute more from them.",
-        ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
-    ),
-    "programs-publish.md": (
-        "Programs that publish and fetch",
-        "These programs pack finished datasets, or copy them from a storage.",
-        ["publish_checksums", "package", "publish", "take_dataset"],
-    ),
-    "programs-check.md": (
-        "Programs that check",
-        "These programs check files, or show the progress of a build.",
-        ["validate", "validate_sequence", "verify", "diff", "status"],
-    ),
-    "programs-report.md": (
-        "Programs that report",
-        "These programs make pictures, pages, tables and schemas.",
-        [
-            "report_figures", "report_html", "report_index", "costs", "schema",
-        ],
-    ),
-    "programs-measure.md": (
-        "Programs that measure",
-        "These programs measure error, quality, and time.",
-        [
-            "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time",
-            "plan", "gpu_check",
-        ],
-    ),
+# The programs, by what they are for.
+PROGRAM_GROUPS = {
+    "Prepare a scene": [
+        "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
+        "make_lightfield", "free_places", "check_cameras", "import_views",
+    ],
+    "Build a family": ["build_members", "corpus", "count_members"],
+    "Render": ["check_device", "probe", "calibrate", "render_shard"],
+    "Reproject": ["lens_map", "reproject"],
+    "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
+    "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
+    "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
+    "Report": ["report_figures", "report_html", "report_index", "costs", "schema"],
+    "Measure": [
+        "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
+    ],
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Part:
+    """A function or a class of the library that people use in Python.
+
+    The page shows all public members of a class, or only ``members``.
+    """
+
+    file: str
+    name: str
+    members: tuple[str, ...] = ()
+
+
+# The reader's interface, in the order of its page.
+API = [
+    Part("reading/opening.py", "open_dataset"),
+    Part("reading/opening.py", "open_corpus"),
+    Part("reading/dataset.py", "Dataset"),
+    Part("reading/dataset.py", "Views"),
+    Part("reading/dataset.py", "View"),
+    Part(
+        "formats/lightfield.py",
+        "LightField",
+        ("content", "views", "path", "lens", "depth", "world_from_cameras", "light_groups"),
+    ),
+    Part(
+        "geometry/lenses/base.py",
+        "Lens",
+        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays"),
+    ),
+    Part("core/errors.py", "UserError"),
+]
 
 
 def schema_of(model: type[BaseModel]) -> dict[str, Any]:
@@ -349,17 +285,11 @@ def link_targets() -> dict[str, str]:
     targets = {
         schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
         for file, page in KEY_PAGES.items()
-        if file not in JOB_PAGES
         for section in page.sections
-    }
-    jobs = {
-        schema_of(section.model)["title"]: f"{file}#{slug(section.title)}"
-        for file in JOB_PAGES
-        for section in KEY_PAGES[file].sections
     }
     # A scene YAML's `rigs` may be any of these.
     any_rig = {schema_of(model)["title"]: "rig-type-keys.md" for model in RIG_MODELS}
-    return jobs | targets | any_rig | {"CameraSettings": "camera-keys.md"}
+    return targets | any_rig | {"CameraSettings": "camera-keys.md"}
 
 
 class Table:
@@ -524,11 +454,6 @@ def escaped(text: str) -> str:
     return "`".join(parts).replace("|", r"\|")
 
 
-def code(text: str) -> str:
-    """Return text as code in a table. Not all readers of Markdown agree on a bar in backticks."""
-    return f"<code>{text.replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"
-
-
 def page_of_keys(page: Page, table: Table) -> str:
     """Return a page of keys."""
     lines = [f"# {page.title}", "", NOTE, "", page.text, ""]
@@ -548,70 +473,130 @@ def page_of_keys(page: Page, table: Table) -> str:
     return "\n".join(lines)
 
 
-def section_of_program(name: str) -> list[str]:
-    """Return the lines about one program."""
-    file = PROGRAMS / f"{name}.py"
-    text = (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").strip()
-    parser = flags.parser_of(BY_NAME[name], text)
-    lines = [f"## {file.name}", ""]
-    for paragraph in text.split("\n\n"):
-        is_code = paragraph.startswith(" ")
-        lines += ["```", paragraph, "```", ""] if is_code else [escaped(paragraph), ""]
-    lines += ["| argument | value | default | meaning |", "| --- | --- | --- | --- |"]
-    # argparse itself names the first two groups, in other words in each version.
-    for number, group in enumerate(parser._action_groups):
-        rows = [row_of(action) for action in group._group_actions if action.dest != "help"]
-        if rows and number > 1:
-            lines.append(f"| *{escaped(group.title or '')}* | | | |")
-        lines += rows
-    return [*lines, ""]
-
-
-def row_of(action: argparse.Action) -> str:
-    """Return the row of one argument."""
-    flags = ", ".join(f"`{flag}`" for flag in action.option_strings)
-    is_required = action.required and action.nargs not in ("?", "*")
-    default = "required" if is_required else "–"
-    given = re.search(r" \(default: (\S+)\)$", action.help or "")
-    if given and not is_required:
-        default = f"`{given[1]}`"
-    values = action.choices if action.choices is not None else []
-    metavar = action.metavar if action.metavar is not None else action.dest.upper()
-    placeholder = metavar if isinstance(metavar, str) else " ".join(metavar)
-    value_text = ", ".join(f"`{choice}`" for choice in values) or code(placeholder)
-    if action.nargs == 0:
-        value_text = "–"
-    elif action.nargs in ("+", "*"):
-        value_text += " …"
-    meaning = escaped((action.help or "").replace("%%", "%"))
-    if not meaning:
-        raise AssertionError(f"{flags or action.dest}: has no help text")
-    return f"| {flags or f'`{action.dest}`'} | {value_text} | {default} | {meaning} |"
-
-
-def page_of_programs(title: str, text: str, names: list[str]) -> str:
-    """Return a page of programs."""
-    lines = [f"# {title}", "", NOTE, ""]
-    lines += [
-        f"{text} Snakemake runs them. To run one by hand: `python scripts/NAME.py`.",
-        "",
-    ]
-    for name in names:
-        lines += section_of_program(name)
+def page_of_programs() -> str:
+    """Return the page with a table of the programs."""
+    lines = ["# Which program does what?", "", NOTE, "", PROGRAMS_TEXT, ""]
+    for group, names in PROGRAM_GROUPS.items():
+        lines += [f"## {group}", "", "| program in `scripts/` | what it does |", "| --- | --- |"]
+        for name in names:
+            file = PROGRAMS / f"{name}.py"
+            text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+            lines.append(f"| `{file.name}` | {escaped(text.partition(chr(10))[0])} |")
+        lines.append("")
     return "\n".join(lines)
+
+
+PROGRAMS_TEXT = """\
+Each program in `scripts/` is one step of a build, and Snakemake runs it. You can also run it by
+hand. Its help has its flags, its files and examples:
+
+```
+python scripts/reproject.py --help
+```
+
+Many programs read a *settings file* (`--settings`): a JSON with what the job takes from the scene
+YAML. Its keys have the names that they have in the YAML, and the program's help lists them. A run
+writes the file of each of its jobs to `work/<scene>/<rig>/settings/`, so you can copy one.
+[Settings files](../explanation/settings-files.md) has an example."""
+
+
+class Interface:
+    """Writes the page of the library's interface from its source."""
+
+    def __init__(self) -> None:
+        self.lines = ["# What does the Python library offer?", "", NOTE, "", API_TEXT, ""]
+
+    def page(self) -> str:
+        """Return the page."""
+        for part in API:
+            tree = ast.parse((LIBRARY / part.file).read_text(encoding="utf-8"))
+            (node,) = (each for each in tree.body if getattr(each, "name", "") == part.name)
+            assert isinstance(node, ast.FunctionDef | ast.ClassDef)
+            title = _call(node) if isinstance(node, ast.FunctionDef) else node.name
+            self.lines += [f"## {title}", "", *_docstring(node), ""]
+            if isinstance(node, ast.ClassDef):
+                self._members(node, part.members)
+        return "\n".join(self.lines)
+
+    def _members(self, node: ast.ClassDef, chosen: tuple[str, ...]) -> None:
+        """Add the table of a class's attributes and methods."""
+        rows = {name: row for child in node.body for name, row in _row_of_member(child, node)}
+        shown = chosen or [name for name in rows if not name.startswith("_")]
+        if shown:
+            self.lines += ["| member | type | meaning |", "| --- | --- | --- |"]
+            self.lines += [*(rows[name] for name in shown), ""]
+
+
+API_TEXT = """\
+`open_dataset` and `open_corpus` open finished datasets, and return objects with pixels, rays and
+projections. [Read a dataset in Python](../how-to/read-a-dataset.md) has examples. Positions and
+depth are in metres, angles in radians, pixels from the image's top left corner. A `float array` is
+float32 if it holds pixels, and float64 if it holds rays, positions or matrices."""
+
+# The names of types in the source, as the page shows them.
+TYPES = {
+    "Array": "array",
+    "Floats": "float array",
+    "Doubles": "float array",
+    "Bools": "array of bool",
+    "npt.NDArray[np.bool_]": "array of bool",
+    "ArrayLike": "array",
+    "npt.ArrayLike": "array",
+    "npt.DTypeLike": "dtype",
+    "str | os.PathLike[str]": "path",
+    "Path | str": "path",
+    "Camera": "view of lightfield.json",
+    "Pair": "two floats",
+    "Pair | None": "two floats or None",
+}
+
+
+def _type(annotation: ast.expr | None) -> str:
+    """Return a type as the page shows it."""
+    text = ast.unparse(annotation).strip("'") if annotation else ""
+    for name, plain in TYPES.items():
+        text = re.sub(rf"(?<![\w.]){re.escape(name)}(?![\w\[])", plain, text)
+    return text.replace("'", "").replace(" | ", " or ")
+
+
+def _call(node: ast.FunctionDef) -> str:
+    """Return how a function is called: its name and its parameters."""
+    parameters = [argument.arg for argument in node.args.args if argument.arg != "self"]
+    return f"{node.name}({', '.join(parameters)})"
+
+
+def _docstring(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
+    """Return the lines of a docstring as Markdown."""
+    text = ast.get_docstring(node)
+    if not text:
+        raise AssertionError(f"{node.name}: has no docstring")
+    return text.replace("``", "`").split("\n")
+
+
+def _row_of_member(node: ast.stmt, owner: ast.ClassDef) -> Iterator[tuple[str, str]]:
+    """Yield the name and the row of an attribute or a method."""
+    if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+        name = node.target.id
+        meaning = f"see the text on `{owner.name}`"
+        yield name, f"| `{name}` | {escaped(_type(node.annotation))} | {meaning} |"
+    elif isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+        decorators = [ast.unparse(each) for each in node.decorator_list]
+        is_property = any(each.endswith("property") for each in decorators)
+        call = node.name if is_property else _call(node)
+        meaning = escaped(" ".join(_docstring(node)))
+        yield node.name, f"| `{call}` | {escaped(_type(node.returns))} | {meaning} |"
 
 
 def reference() -> dict[str, str]:
     """Return the pages' texts, by the names of their files."""
-    listed = sorted(name for _, _, names in PROGRAM_PAGES.values() for name in names)
+    listed = sorted(name for names in PROGRAM_GROUPS.values() for name in names)
     existing = sorted(file.stem for file in PROGRAMS.glob("*.py"))
     if listed != existing:
         different = ", ".join(sorted({*listed} ^ {*existing}))
-        raise AssertionError(f"PROGRAM_PAGES: differs from scripts/: {different}")
+        raise AssertionError(f"PROGRAM_GROUPS: differs from scripts/: {different}")
     table = Table(link_targets())
     texts = {file: page_of_keys(page, table) for file, page in KEY_PAGES.items()}
-    programs = {file: page_of_programs(*content) for file, content in PROGRAM_PAGES.items()}
-    return texts | programs
+    return texts | {"programs.md": page_of_programs(), "api.md": Interface().page()}
 
 
 def main() -> None:

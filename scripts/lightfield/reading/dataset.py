@@ -35,7 +35,8 @@ Bools = NDArray[np.bool_]
 class View:
     """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
 
-    A property reads its file each time, so keep the arrays that you need again.
+    ``dataset`` is the dataset of its frame. ``camera`` is its entry in lightfield.json. A property
+    reads its file each time, so keep the arrays that you need again.
     """
 
     dataset: "Dataset"
@@ -46,6 +47,7 @@ class View:
 
     @property
     def name(self) -> str:
+        """The name, such as view_0000f."""
         return self.camera.name
 
     @property
@@ -65,6 +67,7 @@ class View:
 
     @property
     def lens(self) -> Lens:
+        """The lens, which all views of the dataset share."""
         return self.dataset.lens
 
     @property
@@ -225,6 +228,7 @@ class Views(Sequence[View]):
 class Dataset:
     """The views of one rig, or of one of its ``reprojection``s: each has a lens and poses.
 
+    - ``files``: the files of the dataset, in a folder, a package or shards.
     - ``folders``: the folder of each frame of a sequence. Without a sequence, the dataset's own.
     - ``times``: the time of each frame: 0 for the first, 1 for the last.
     - ``member``: in a corpus, what corpus.json says of the scene, such as ``name`` and ``split``.
@@ -245,6 +249,7 @@ class Dataset:
 
     @property
     def lens(self) -> Lens:
+        """The lens of all views."""
         return self.lightfield.lens
 
     @property
