@@ -102,7 +102,8 @@ def read(path: str | Path) -> Receipt | None:
         text = read_bytes(path)
         # One text of JSON is read faster than many.
         header, *lines = json.loads(b"[%s]" % b",".join(text.splitlines()))
-        if header["job"] != job_of(path):
+        # Receipts of before 29 November 2026 name no job.
+        if header.get("job", job_of(path)) != job_of(path):
             return None
         outputs, history = _sorted(lines)
         return Receipt(
