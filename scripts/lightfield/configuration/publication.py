@@ -5,8 +5,7 @@ those that NeurIPS asks for since 2026.
 """
 
 import datetime
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -50,14 +49,8 @@ Text = Annotated[
 ]
 
 
-# The advice about keys that only RO-Crate and DataCite had.
-_LEFT_OUT = "no published file has it: leave it out, and tell the repository when you upload"
-
-
 class Creator(Settings):
     """A person or an organization that made a dataset."""
-
-    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(("affiliation", "ror"), _LEFT_OUT)
 
     name: Text = Field(description="Full name.")
     type: Literal["person", "organization"] = Field(
@@ -91,10 +84,6 @@ class Publication(Settings):
     `publisher`, `date`, `limitations`, `biases`, `personal_information`, `use_cases` and
     `social_impact`.
     """
-
-    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("publisher_url", "publisher_ror", "contact"), _LEFT_OUT
-    )
 
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
         None, description="People and organizations that made the dataset."
