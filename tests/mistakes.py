@@ -619,10 +619,8 @@ EXPLAINED = [
     (
         "publish",
         {"creators": [{"name": "Ada Lovelace"}], "date": "2026-11-30"},
-        "publish: is missing url, publisher, limitations, biases, personal_information, use_cases, "
-        "social_impact, licence; description: is missing, and publish needs it",
+        "publish.licence: is missing; must be a short name from https://spdx.org/licenses",
     ),
-    ("publish", PUBLISH, "description: is missing, and publish needs it"),
     (
         "publish",
         PUBLISH | {"date": "soon"},

@@ -65,8 +65,8 @@ class Creator(Settings):
     )
 
 
-# Without a licence here, the scene's licence counts.
-_REQUIRED = (
+# What repositories and their readers ask for.
+_EXPECTED = (
     "creators",
     "url",
     "publisher",
@@ -80,9 +80,9 @@ _REQUIRED = (
 
 
 class Publication(Settings):
-    """Facts about a dataset that only its author knows. Publishing requires `creators`, `url`,
-    `publisher`, `date`, `limitations`, `biases`, `personal_information`, `use_cases` and
-    `social_impact`.
+    """Facts about a dataset that only its author knows. Publishing requires a licence, here or of
+    the scene. It warns of these missing keys: `creators`, `url`, `publisher`, `date`,
+    `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
     """
 
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
@@ -148,5 +148,5 @@ class Publication(Settings):
 
     @property
     def missing_keys(self) -> list[str]:
-        """The keys that publishing requires and that have no value."""
-        return [name for name in _REQUIRED if getattr(self, name) is None]
+        """The keys without a value that repositories ask for."""
+        return [name for name in _EXPECTED if getattr(self, name) is None]
