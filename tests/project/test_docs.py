@@ -1,4 +1,4 @@
-"""The documents: working links, pages of readable length, and a true reference."""
+"""The documents: working links, pages that begin with their answer, and a true reference."""
 
 import os
 import re
@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 KINDS = ("tutorials", "how-to", "reference", "explanation")
-MOST_LINES = 149
 
 CODE_BLOCK = re.compile(r"^(```+).*?^\1$", re.M | re.S)
 CODE = re.compile(r"`[^`]*`")
@@ -62,18 +61,13 @@ def test_every_link_leads_to_a_file_and_a_heading(page):
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page.is_relative_to(DOCS)], ids=name_of)
-def test_a_page_is_short_and_begins_with_a_paragraph(page):
+def test_a_page_begins_with_a_paragraph(page):
     text = page.read_text()
-    assert text.count("\n") <= MOST_LINES
     assert text.startswith("# ")
     rest = re.sub(r"<!--.*?-->", "", text.partition("\n")[2]).strip()
     first_paragraph = rest.partition("\n\n")[0]
     assert not first_paragraph.startswith(("#", "|", "```", "-", "!", "1."))
     assert len(first_paragraph.split()) > 5
-
-
-def test_the_readme_fits_on_three_screens():
-    assert (ROOT / "README.md").read_text().count("\n") <= 120
 
 
 def test_every_page_is_of_one_kind_and_can_be_reached():
