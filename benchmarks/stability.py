@@ -27,9 +27,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import numpy as np
-from mpmath import asin, atan, atan2, cos, hypot, mpf, pi, sin, tan
+
+try:
+    import mpmath
+    from mpmath import asin, atan, atan2, cos, hypot, mpf, pi, sin, tan
+except ModuleNotFoundError:
+    sys.exit("error: mpmath is missing: set it up with `make .venv/complete-for-tests`")
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 

@@ -242,24 +242,6 @@ def _write(path, receipt):
     Path(path).write_text("".join(lines))
 
 
-def write_as_older_version(folder, dataset, stage, views):
-    """Note a shard's files as versions before receipts did, and remove its receipt."""
-    path = Path(folder, shard(dataset, stage, views))
-    log = Path(folder, "work", dataset, stage, f"{views}.sums.jsonl")
-    log.parent.mkdir(parents=True, exist_ok=True)
-    lines = [
-        {
-            "file": str(Path(name).relative_to(f"results/{dataset}")),
-            "key": output.key,
-            "bytes": output.stamp.bytes,
-            "sha256": output.stamp.sha256,
-        }
-        for name, output in receipts.read(path).outputs.items()
-    ]
-    log.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    path.unlink()
-
-
 # ---- notes of a simulated build -------------------------------------------------------------
 
 

@@ -85,10 +85,6 @@ def test_a_page_is_short_and_begins_with_a_paragraph(page):
     assert len(first_paragraph.split()) > 5
 
 
-def test_the_readme_fits_on_three_screens():
-    assert (ROOT / "README.md").read_text().count("\n") <= 120
-
-
 def test_every_page_is_of_one_kind_and_can_be_reached():
     pages = {page.relative_to(DOCS) for page in DOCS.rglob("*.md")} - {Path("index.md")}
     assert {page.parts[0] for page in pages} == set(KINDS)

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import subprocess
 import sys
 from pathlib import Path
 
@@ -119,3 +120,14 @@ def test_the_program_fails_if_a_case_exceeds_its_bound(
     with pytest.raises(UserError, match=r"1 of 3 cases.*made → up"):
         stability.main()
     assert "Outside its bound: made → up" in (tmp_path / "stability.md").read_text()
+
+
+def test_without_mpmath_it_says_which_command_to_run() -> None:
+    folder = Path(stability.__file__).parent
+    program = f"import sys; sys.path.insert(0, {str(folder)!r}); sys.modules['mpmath'] = None"
+    command = [sys.executable, "-c", f"{program}; import stability"]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: mpmath is missing")
+    assert "make .venv/complete-for-tests" in result.stderr
+    assert "Traceback" not in result.stderr

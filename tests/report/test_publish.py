@@ -297,6 +297,37 @@ def test_the_card_has_the_front_matter_of_hugging_face(folder, tmp_path, licence
     assert "Ada Lovelace" in text
 
 
+TEXTS = ["description", *(f"publish.{key}" for key in PUBLISH if key != "derived_from")]
+
+
+@pytest.mark.parametrize("missing", [TEXTS, ["publish.biases", "publish.publisher"], []])
+def test_missing_texts_are_warned_of_and_left_out(folder, tmp_path, capsys, missing):
+    texts = {key: text for key, text in PUBLISH.items() if f"publish.{key}" not in missing}
+    scene = {key: SCENE[key] for key in ("description", "licence") if key not in missing}
+    output = tmp_path / NAME
+    publish(folder, NAME, Credits.model_validate(scene | {"publish": texts}), output, None)
+    warnings = re.findall("warning: published without (.*), which", capsys.readouterr().err)
+    assert [sorted(warning.split(", ")) for warning in warnings] == (
+        [sorted(missing)] if missing else []
+    )
+    content = read_json(output / "croissant.json")
+    keys = {
+        "description": "description",
+        "publish.creators": "creator",
+        "publish.url": "url",
+        "publish.publisher": "publisher",
+        "publish.date": "datePublished",
+        "publish.biases": "rai:dataBiases",
+        "publish.limitations": "rai:dataLimitations",
+    }
+    assert {key for key in keys if keys[key] not in content} == keys.keys() & {*missing}
+    assert content["license"].endswith("/CC-BY-4.0.html")
+    readme = (output / "README.md").read_text()
+    assert not re.search("(^|: )None$", readme, re.M)
+    assert ("## Limits and use" in readme) == (missing != TEXTS)
+    assert ("Biases: One room." in readme) == ("publish.biases" not in missing)
+
+
 HOSTILE = '"><script>alert(1)</script>\n\n<img src=x onerror=alert(1)>\n\n```\n\n<b>'
 
 

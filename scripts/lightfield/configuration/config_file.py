@@ -2,9 +2,9 @@
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Set
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, model_validator
 
@@ -87,11 +87,6 @@ class Preset(Settings):
 class Energy(Settings):
     """The power from which report/costs.json computes energy."""
 
-    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("price_per_kwh", "currency"),
-        "leave it out, and multiply energy_kwh in report/costs.json by your price",
-    )
-
     watts: float = Field(
         65,
         ge=0,
@@ -112,20 +107,8 @@ class Energy(Settings):
         return os.cpu_count() or 1 if self.cores == "auto" else self.cores
 
 
-_SHARDS_ARE_AUTOMATIC = (
-    "leave it out, or set views_per_shard to the number of views that one render job makes"
-)
-
-
 class Configuration(Settings):
     """Which scenes to build, at which quality, and into which folders."""
-
-    removed_keys: ClassVar[Mapping[str, str]] = {
-        "most_shards": _SHARDS_ARE_AUTOMATIC,
-        "shard_minutes": _SHARDS_ARE_AUTOMATIC,
-        "accept_blend": "leave it out; to take an edited .blend, delete "
-        "configs/scenes/<scene>.lock.json",
-    }
 
     scenes: Names = Field(
         description="Scenes to build: names of files in configs/scenes/, without .yaml. A single "
@@ -184,8 +167,7 @@ class Configuration(Settings):
     )
     energy: Energy = Field(
         Energy(),
-        description="Power and price of electricity, from which the energy and costs of a dataset "
-        "are computed.",
+        description="Power of the machine, from which the energy of a dataset is computed.",
     )
 
     @model_validator(mode="after")

@@ -5,8 +5,7 @@ those that NeurIPS asks for since 2026.
 """
 
 import datetime
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -50,14 +49,8 @@ Text = Annotated[
 ]
 
 
-# The advice about keys that only RO-Crate and DataCite had.
-_LEFT_OUT = "no published file has it: leave it out, and tell the repository when you upload"
-
-
 class Creator(Settings):
     """A person or an organization that made a dataset."""
-
-    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(("affiliation", "ror"), _LEFT_OUT)
 
     name: Text = Field(description="Full name.")
     type: Literal["person", "organization"] = Field(
@@ -72,8 +65,8 @@ class Creator(Settings):
     )
 
 
-# Without a licence here, the scene's licence counts.
-_REQUIRED = (
+# What repositories and their readers ask for.
+_EXPECTED = (
     "creators",
     "url",
     "publisher",
@@ -87,14 +80,10 @@ _REQUIRED = (
 
 
 class Publication(Settings):
-    """Facts about a dataset that only its author knows. Publishing requires `creators`, `url`,
-    `publisher`, `date`, `limitations`, `biases`, `personal_information`, `use_cases` and
-    `social_impact`.
+    """Facts about a dataset that only its author knows. Publishing requires a licence, here or of
+    the scene. It warns of these missing keys: `creators`, `url`, `publisher`, `date`,
+    `limitations`, `biases`, `personal_information`, `use_cases` and `social_impact`.
     """
-
-    removed_keys: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("publisher_url", "publisher_ror", "contact"), _LEFT_OUT
-    )
 
     creators: Annotated[list[Creator], Field(min_length=1)] | None = Field(
         None, description="People and organizations that made the dataset."
@@ -159,5 +148,5 @@ class Publication(Settings):
 
     @property
     def missing_keys(self) -> list[str]:
-        """The keys that publishing requires and that have no value."""
-        return [name for name in _REQUIRED if getattr(self, name) is None]
+        """The keys without a value that repositories ask for."""
+        return [name for name in _EXPECTED if getattr(self, name) is None]

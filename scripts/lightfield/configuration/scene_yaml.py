@@ -141,20 +141,21 @@ class Credits(Settings):
         is_short_name = self.licence and re.fullmatch(SPDX, self.licence)
         return self.licence if is_short_name else None
 
+    @property
+    def missing_texts(self) -> list[str]:
+        """The keys without a value that a published dataset should have."""
+        keys = [] if self.description else ["description"]
+        if self.publish:
+            keys += [f"publish.{key}" for key in self.publish.missing_keys]
+        return keys
+
     @model_validator(mode="after")
     def _can_be_published(self) -> Self:
-        if self.publish is None:
-            return self
-        missing = self.publish.missing_keys
-        if self.data_licence is None:
-            missing.append("licence")
-        problems = []
-        if missing:
-            problems.append(f"publish: is missing {', '.join(missing)}")
-        if not self.description:
-            problems.append("description: is missing, and publish needs it")
-        if problems:
-            raise ValueError("; ".join(problems))
+        if self.publish and self.data_licence is None:
+            raise ValueError(
+                "publish.licence: is missing; must be a short name from https://spdx.org/licenses, "
+                "unless the scene's licence is one"
+            )
         return self
 
 

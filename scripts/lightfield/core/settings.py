@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -41,9 +41,6 @@ class Settings(BaseModel):
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
-    # Keys of earlier versions, with what to do instead.
-    removed_keys: ClassVar[Mapping[str, str]] = {}
-
     @model_validator(mode="wrap")
     @classmethod
     def _check_keys(cls, content: Any, check_values: ModelWrapValidatorHandler[Self]) -> Self:
@@ -74,8 +71,6 @@ class Settings(BaseModel):
     def _problem(cls, key: Any, value: Any) -> str | None:
         """Return what is wrong with a key, whatever its value. Or None."""
         allowed_keys = cls.model_fields
-        if key in cls.removed_keys:
-            return f"is no longer a key; {cls.removed_keys[key]}"
         if key not in allowed_keys:
             hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
             return f"unknown key{hint}"

@@ -8,7 +8,7 @@ and for the provenance.
 from collections.abc import Mapping
 from typing import Any
 
-from lightfield.configuration.publication import Creator
+from lightfield.configuration.publication import Creator, Publication
 from lightfield.report.published import Published
 from lightfield.report.shards import INDEX
 
@@ -77,7 +77,7 @@ FORMATS = {
 
 
 def describe(published: Published) -> dict[str, Any]:
-    """Return the content of croissant.json."""
+    """Return the content of croissant.json. Facts that the author has not given are left out."""
     publication = published.publication
     content: dict[str, Any] = {
         "@context": _CONTEXT,
@@ -91,7 +91,7 @@ def describe(published: Published) -> dict[str, Any]:
         "url": publication.url,
         "license": published.licence_url,
         "creator": [_creator(creator) for creator in published.creators],
-        "publisher": {"@type": "sc:Organization", "name": publication.publisher},
+        "publisher": _publisher(publication),
         "datePublished": publication.date,
         "version": publication.version,
         "keywords": publication.keywords,
@@ -109,7 +109,13 @@ def describe(published: Published) -> dict[str, Any]:
         "@type": "prov:Activity",
         "prov:label": _generation(published),
     }
-    return content
+    return {key: value for key, value in content.items() if value not in (None, "", [])}
+
+
+def _publisher(publication: Publication) -> dict[str, str] | None:
+    if publication.publisher is None:
+        return None
+    return {"@type": "sc:Organization", "name": publication.publisher}
 
 
 def _creator(creator: Creator) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from lightfield.configuration.publication import Publication
 from lightfield.core.names import VIEWS
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW, PASSES
@@ -77,9 +78,21 @@ def describe(published: Published) -> str:
         first_shard=next(iter(published.shards.values()))[0]["file"],
         fields=published.fields,
         meanings={name: _meaning(name, published.lightfield) for name in published.fields},
-        publish=published.publication,
+        limits=_limits(published.publication),
         citation=published.citation,
     )
+
+
+def _limits(publication: Publication) -> dict[str, str]:
+    """Return what the author says about the limits and the use of the dataset, by titles."""
+    texts = {
+        "Limitations": publication.limitations,
+        "Biases": publication.biases,
+        "Personal information": publication.personal_information,
+        "Use cases": publication.use_cases,
+        "Social impact": publication.social_impact,
+    }
+    return {title: text for title, text in texts.items() if text}
 
 
 def _meaning(field: str, lightfield: LightField) -> str:

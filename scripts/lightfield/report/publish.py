@@ -3,6 +3,7 @@
 Equal datasets and settings give equal bytes, because the date is the author's.
 """
 
+import sys
 from pathlib import Path
 
 from lightfield.configuration.publication import CARD, CROISSANT
@@ -43,12 +44,18 @@ def publish(
     """Write the shards and the descriptions of the dataset in ``folder`` to ``output``.
 
     A shard has at most ``most`` bytes, or `shards.SHARD_BYTES`. ``rig`` is the type of the rig.
-    Raises `UserError` if the dataset is not finished, or if the scene YAML does not say how to
-    publish it.
+    Warns of texts that the scene YAML lacks, which the descriptions then lack, too. Raises
+    `UserError` if the dataset is not finished, or if the scene YAML has no key ``publish``.
     """
     if scene.publish is None:
         raise UserError(
             "publish: is missing in the scene YAML: see docs/how-to/publish-a-dataset.md"
+        )
+    if missing_texts := scene.missing_texts:
+        print(
+            f"warning: published without {', '.join(missing_texts)}, which repositories ask for; "
+            "write them into the scene YAML",
+            file=sys.stderr,
         )
     card = package.card(folder, name, scene, rig)
     folders = sorted({path.parent for path in files_below(folder) if path.name == SUMS})

@@ -12,13 +12,9 @@ from typing import Any
 
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_json_lines, sha256
-from lightfield.core.receipts import FOLDER, OpenReceipt
+from lightfield.core.files import read_json, sha256
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.imaging import images
-
-# Versions before receipts logged the finished files of a shard in files with this suffix.
-_OLD_SUFFIX = ".sums.jsonl"
 
 
 def is_finished(file: Path, key: str) -> bool:
@@ -29,7 +25,7 @@ def is_finished(file: Path, key: str) -> bool:
     if not os.path.lexists(file):
         # Asking the other shards takes long if there are thousands.
         return False
-    if not receipt.knows(file) and _is_of_older_version(file, key, receipt):
+    if not receipt.knows(file) and _is_published(file, key):
         receipt.adopt(file, key)
     return receipt.is_finished(file, key)
 
@@ -56,32 +52,15 @@ def _has_key(file: Path, key: str) -> bool:
         return False
 
 
-def _is_of_older_version(file: Path, key: str, receipt: OpenReceipt) -> bool:
-    """Return whether a version before receipts made a file, and noted its key and its sum."""
-    if not file.is_file():
-        # A link to nowhere, or a folder.
+def _is_published(file: Path, key: str) -> bool:
+    """Return whether a file has the key, and its dataset's published sums list its bytes.
+
+    So the files of a dataset that was copied without its receipts are not made again.
+    """
+    # Not for a link to nowhere, or a folder.
+    if not file.is_file() or not _has_key(file, key):
         return False
-    digest = sha256(file)
-    if (file.name, key, digest) in _old_notes(_old_folder(receipt)):
-        return True
-    return _has_key(file, key) and digest in _published_sums(_dataset_of(file))
-
-
-def _old_folder(receipt: OpenReceipt) -> Path:
-    """Return the folder in which older versions noted the files of a shard, or of a member."""
-    inside = receipt.path.relative_to(receipt.work / FOLDER)
-    return receipt.work / inside.parent
-
-
-@lru_cache(maxsize=1)
-def _old_notes(folder: Path) -> set[tuple[str, str, str]]:
-    """Return name, key and SHA-256 of the files that older versions noted in a folder."""
-    notes = set()
-    for log in folder.rglob(f"*{_OLD_SUFFIX}"):
-        for line in read_json_lines(log):
-            if all(isinstance(line.get(name), str) for name in ("file", "key", "sha256")):
-                notes.add((Path(line["file"]).name, line["key"], line["sha256"]))
-    return notes
+    return sha256(file) in _published_sums(_dataset_of(file))
 
 
 def _dataset_of(file: Path) -> Path | None:
