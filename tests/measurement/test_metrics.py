@@ -8,6 +8,7 @@ from skimage.metrics import structural_similarity
 
 from lightfield.geometry import lenses
 from lightfield.measurement import metrics
+from lightfield.measurement.effort import Line, fit, interpolated
 from lightfield.measurement.picture_difference import (
     TO_YCBCR,
     depth_error,
@@ -185,9 +186,9 @@ def test_biases_of_neighbouring_views_correlate(sign, correlation):
 
 def test_interpolation_is_a_power_law_between_points_only():
     points = [(4, 1 / 4), (1, 1), (16, 1 / 16)]
-    assert metrics.interpolated(2, points) == pytest.approx(1 / 2)
-    assert metrics.interpolated(16, points) == pytest.approx(1 / 16)
-    assert metrics.interpolated(0.5, points) is metrics.interpolated(17, points) is None
+    assert interpolated(2, points) == pytest.approx(1 / 2)
+    assert interpolated(16, points) == pytest.approx(1 / 16)
+    assert interpolated(0.5, points) is interpolated(17, points) is None
 
 
 def test_depth_counts_misses():
@@ -198,23 +199,23 @@ def test_depth_counts_misses():
 
 def test_a_power_law_is_fitted_with_its_slopes_standard_error():
     x = [1, 2, 4, 8, 16]
-    line = metrics.fit(x, [3 / value for value in x])
+    line = fit(x, [3 / value for value in x])
     assert (line.slope, line.factor) == (pytest.approx(-1), pytest.approx(3))
     assert line.at(32) == pytest.approx(3 / 32)
     assert line.inverse(3 / 32) == pytest.approx(32)
     # A denoiser's error may hardly fall. Then no number of samples is enough.
-    assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == metrics.Line(0, 0, 1.0).inverse(1) == 1e300
+    assert Line(-1e-9, 0, 1.0).inverse(0.1) == Line(0, 0, 1.0).inverse(1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
     # Its import takes most of a second, in each process of the tests.
     from scipy.stats import linregress
 
     wanted = linregress(np.log(x), np.log(y))
-    line = metrics.fit(x, y)
+    line = fit(x, y)
     assert line.slope == pytest.approx(wanted.slope)
     assert line.slope_error == pytest.approx(wanted.stderr)
-    assert metrics.fit(x, [0.1] * 5) == metrics.Line(0, 0, 0.1)
-    assert metrics.fit([5, 5, 5], [1, 2, 3]) is None
-    assert metrics.fit([0, 1, 2], [1, 2, 3]) is metrics.fit([1, 2, 3], [1, 2, 0]) is None
+    assert fit(x, [0.1] * 5) == Line(0, 0, 0.1)
+    assert fit([5, 5, 5], [1, 2, 3]) is None
+    assert fit([0, 1, 2], [1, 2, 3]) is fit([1, 2, 3], [1, 2, 0]) is None
 
 
 def test_the_pareto_front_holds_the_points_that_none_beats():

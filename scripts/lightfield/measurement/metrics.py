@@ -31,7 +31,6 @@ error.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -259,48 +258,6 @@ def developed(colour: NDArray[Any], reference: Reference) -> Array:
     """Return the sRGB image in [0, 1] as reports show it: exposed and tone-mapped."""
     mapped = tone_map(np.ascontiguousarray(colour, np.float32), reference.exposure, WHITE)
     return np.where(reference.mask[..., np.newaxis], encode_srgb(mapped), 0.0)
-
-
-@dataclass(frozen=True)
-class Line:
-    """A power law y = factor · x^slope, fitted in logarithms, and the slope's standard error."""
-
-    slope: float
-    slope_error: float
-    factor: float
-
-    def at(self, x: float) -> float:
-        """Return y at x."""
-        return float(self.factor * x**self.slope)
-
-    def inverse(self, y: float) -> float:
-        """Return x at y. At most 1e300, as for a line that hardly falls or rises."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = np.log10(y / self.factor) / np.float64(self.slope)
-        return float(10 ** np.fmin(exponent, 300.0))
-
-
-def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
-    """Fit a power law by least squares of the logarithms.
-
-    Return None for fewer than three different x, or if a number is not above 0.
-    """
-    if len(set(x)) < 3 or min(*x, *y) <= 0:
-        return None
-    if min(y) == max(y):
-        # The fit would be level except for rounding.
-        return Line(0.0, 0.0, float(y[0]))
-    (slope, intercept), covariance = np.polyfit(np.log(x), np.log(y), 1, cov=True)
-    return Line(float(slope), math.sqrt(covariance[0, 0]), float(np.exp(intercept)))
-
-
-def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
-    """Return y at x by power laws between points (x, y), in any order. None outside of them."""
-    points = sorted(points)
-    for (x0, y0), (x1, y1) in pairwise(points):
-        if x0 <= x <= x1 and x1 > x0 and min(y0, y1) > 0:
-            return float(y0 * (y1 / y0) ** (math.log(x / x0) / math.log(x1 / x0)))
-    return None
 
 
 def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0) -> list[int]:
