@@ -16,7 +16,7 @@ from checkouts import checkout, snakemake
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
 
-from lightfield.core import disk_space, files, leftovers
+from lightfield.core import disk_space, files, leftovers, locks
 from lightfield.core.errors import UserError
 
 Usage = namedtuple("Usage", "free")
@@ -314,7 +314,7 @@ def test_a_temporary_folder_needs_no_locks(tmp_path, monkeypatch):
     def flock(*_):
         raise OSError(errno.EBADF, "Bad file descriptor")
 
-    monkeypatch.setattr(leftovers.fcntl, "flock", flock)
+    monkeypatch.setattr(locks.fcntl, "flock", flock)
     monkeypatch.setattr(leftovers, "FOLDER_AGE", -1)
     with leftovers.temporary_folder(tmp_path) as folder:
         monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))

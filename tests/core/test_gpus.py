@@ -19,6 +19,7 @@ from lightfield.core.gpus import CUDA, HIP, Gpu
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 
+ME = subprocess.run(["id", "-un"], capture_output=True, text=True, check=True).stdout.strip()
 FAKE = [Gpu(CUDA, "GPU-a"), Gpu(CUDA, "GPU-b")]
 
 WAITER = """
@@ -48,7 +49,10 @@ def test_no_two_processes_take_the_same_gpu(tmp_path):
     assert [first, second] == FAKE
     with waiter(tmp_path, "GPU-a", "GPU-b") as third, waiter(tmp_path, "GPU-a", "GPU-b") as fourth:
         for process in (third, fourth):
-            assert process.stderr.readline() == "waiting for one of 2 GPUs: others render\n"
+            # The user learns whom to ask.
+            holder = f"process {os.getpid()} of {ME}"
+            waiting = f"waiting for one of 2 GPUs: others render ({holder}, {holder})\n"
+            assert process.stderr.readline() == waiting
         other.close()
         lock.close()
         assert {third.stdout.readline(), fourth.stdout.readline()} == {"GPU-a\n", "GPU-b\n"}
@@ -191,7 +195,8 @@ def test_two_processes_do_not_share_the_only_gpu_of_a_machine(machine, tmp_path)
         assert first.stdout.readline() == "GPU-1\n"
         # The second process, whose environment names the same GPU, waits for the first to end.
         with user(tmp_path, **{CUDA: "0"}) as second:
-            assert second.stderr.readline() == "waiting for the GPU: others render\n"
+            holder = f"process {first.pid} of {ME}"
+            assert second.stderr.readline() == f"waiting for the GPU: others render ({holder})\n"
             first.kill()
             assert second.stdout.readline() == "GPU-1\n"
 

@@ -14,7 +14,8 @@ from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.geometry import lenses
-from lightfield.measurement.calibration import Candidate, Search, effort_for
+from lightfield.measurement.calibration import Candidate, Search
+from lightfield.measurement.effort import effort_for, effort_within
 from lightfield.planning.cost import cost
 from lightfield.planning.sampling import PLAIN
 from lightfield.workflow.loading import scene_datasets
@@ -259,6 +260,18 @@ def test_effort_is_interpolated_between_the_nearest_points():
     assert effort_for(0.9, points) == 1
     # An error far below the reference's own may be measured as below 0.
     assert 1 < effort_for(0.4, [(1, 0.8), (2, -0.001)]) < 2
+
+
+def test_effort_beyond_the_points_is_extrapolated_only_on_request():
+    points = [(2, 0.8), (4, 0.4)]
+    assert effort_within(0.1, points) is None
+    assert effort_within(0.4, points) == pytest.approx(4)
+    assert effort_within(1.6, points) == effort_for(1.6, points) == 2
+    assert effort_for(1.6, points, before=True) == pytest.approx(1)
+
+
+def test_a_denoised_error_that_rises_again_counts_where_it_was_first_reached():
+    assert effort_within(0.4, [(1, 0.8), (2, 0.4), (4, 0.5), (8, 0.3)]) == pytest.approx(2)
 
 
 @pytest.mark.slow

@@ -8,6 +8,15 @@ from skimage.metrics import structural_similarity
 
 from lightfield.geometry import lenses
 from lightfield.measurement import metrics
+from lightfield.measurement.effort import Line, fit, interpolated
+from lightfield.measurement.picture_difference import (
+    TO_YCBCR,
+    depth_error,
+    iv_psnr,
+    solid_angles,
+    ssim_map,
+    ws_psnr,
+)
 
 SIZE = 64
 MASK = np.hypot(*(np.mgrid[:SIZE, :SIZE] + 0.5 - SIZE / 2)) < SIZE / 2
@@ -132,7 +141,7 @@ def test_pictures_of_any_size_have_a_structural_similarity(shape):
     """Source: Wang et al. 2004, equation 13, without any variance."""
     truth = np.full((*shape, 3), 0.5)
     shown = np.full((*shape, 3), 0.25)
-    similarity = metrics.ssim_map(truth, shown)
+    similarity = ssim_map(truth, shown)
     assert similarity.shape == truth.shape
     expected = (2 * 0.5 * 0.25 + 0.01**2) / (0.5**2 + 0.25**2 + 0.01**2)
     np.testing.assert_allclose(similarity, expected, rtol=1e-9)
@@ -177,36 +186,36 @@ def test_biases_of_neighbouring_views_correlate(sign, correlation):
 
 def test_interpolation_is_a_power_law_between_points_only():
     points = [(4, 1 / 4), (1, 1), (16, 1 / 16)]
-    assert metrics.interpolated(2, points) == pytest.approx(1 / 2)
-    assert metrics.interpolated(16, points) == pytest.approx(1 / 16)
-    assert metrics.interpolated(0.5, points) is metrics.interpolated(17, points) is None
+    assert interpolated(2, points) == pytest.approx(1 / 2)
+    assert interpolated(16, points) == pytest.approx(1 / 16)
+    assert interpolated(0.5, points) is interpolated(17, points) is None
 
 
 def test_depth_counts_misses():
     truth = np.array([1.0, 2.0, np.inf, np.inf, 4.0, 1.0])
     depth = np.array([1.1, 2.0, np.inf, 7.0, np.inf, 9.0])
-    assert metrics.depth_error(depth, truth) == pytest.approx((0.1 + 0 + 0 + 1 + 1 + 1) / 6)
+    assert depth_error(depth, truth) == pytest.approx((0.1 + 0 + 0 + 1 + 1 + 1) / 6)
 
 
 def test_a_power_law_is_fitted_with_its_slopes_standard_error():
     x = [1, 2, 4, 8, 16]
-    line = metrics.fit(x, [3 / value for value in x])
+    line = fit(x, [3 / value for value in x])
     assert (line.slope, line.factor) == (pytest.approx(-1), pytest.approx(3))
     assert line.at(32) == pytest.approx(3 / 32)
     assert line.inverse(3 / 32) == pytest.approx(32)
     # A denoiser's error may hardly fall. Then no number of samples is enough.
-    assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == metrics.Line(0, 0, 1.0).inverse(1) == 1e300
+    assert Line(-1e-9, 0, 1.0).inverse(0.1) == Line(0, 0, 1.0).inverse(1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
     # Its import takes most of a second, in each process of the tests.
     from scipy.stats import linregress
 
     wanted = linregress(np.log(x), np.log(y))
-    line = metrics.fit(x, y)
+    line = fit(x, y)
     assert line.slope == pytest.approx(wanted.slope)
     assert line.slope_error == pytest.approx(wanted.stderr)
-    assert metrics.fit(x, [0.1] * 5) == metrics.Line(0, 0, 0.1)
-    assert metrics.fit([5, 5, 5], [1, 2, 3]) is None
-    assert metrics.fit([0, 1, 2], [1, 2, 3]) is metrics.fit([1, 2, 3], [1, 2, 0]) is None
+    assert fit(x, [0.1] * 5) == Line(0, 0, 0.1)
+    assert fit([5, 5, 5], [1, 2, 3]) is None
+    assert fit([0, 1, 2], [1, 2, 3]) is fit([1, 2, 3], [1, 2, 0]) is None
 
 
 def test_the_pareto_front_holds_the_points_that_none_beats():
@@ -235,13 +244,13 @@ def test_independent_errors_disagree_fully_and_common_ones_not_at_all():
 
 def test_pixels_have_the_solid_angles_of_their_lens():
     panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [256, 128]})
-    angles = metrics.solid_angles(panorama)
+    angles = solid_angles(panorama)
     assert angles.sum() == pytest.approx(4 * np.pi, rel=1e-3)
     latitude = (np.arange(128) + 0.5 - 64) * np.pi / 128
     expected = np.cos(latitude) / np.cos(latitude).max()
     np.testing.assert_allclose(angles[:, 0] / angles.max(), expected, atol=1e-3)
     fisheye = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [200, 200]})
-    angles = metrics.solid_angles(fisheye)
+    angles = solid_angles(fisheye)
     assert angles.sum() == pytest.approx(2 * np.pi, rel=0.02)
     # sin θ / θ at 60 degrees from the axis.
     expected = np.sin(np.pi / 3) / (np.pi / 3)
@@ -251,19 +260,17 @@ def test_pixels_have_the_solid_angles_of_their_lens():
 def test_ws_psnr_weights_by_solid_angle():
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     truth = np.full((32, 64, 3), 0.5)
-    angles = metrics.solid_angles(lens)
+    angles = solid_angles(lens)
     pole, equator = truth.copy(), truth.copy()
     pole[:2] += 0.1
     equator[15:17] += 0.1
     everywhere = truth + 0.1
-    assert metrics.ws_psnr(truth, everywhere, angles) == pytest.approx(20)
+    assert ws_psnr(truth, everywhere, angles) == pytest.approx(20)
     # A sixteenth of the rows has 1 − sin(90° · 14/16) of a hemisphere's height at a pole.
     part = (1 - np.sin(np.pi / 2 * 14 / 16)) / 2
-    assert metrics.ws_psnr(truth, pole, angles) == pytest.approx(20 - 10 * np.log10(part), abs=0.05)
+    assert ws_psnr(truth, pole, angles) == pytest.approx(20 - 10 * np.log10(part), abs=0.05)
     part = np.sin(np.pi / 32)
-    assert metrics.ws_psnr(truth, equator, angles) == pytest.approx(
-        20 - 10 * np.log10(part), abs=0.05
-    )
+    assert ws_psnr(truth, equator, angles) == pytest.approx(20 - 10 * np.log10(part), abs=0.05)
 
 
 def test_iv_psnr_forgives_exactly_two_pixels_and_a_hundredth():
@@ -273,7 +280,7 @@ def test_iv_psnr_forgives_exactly_two_pixels_and_a_hundredth():
     counted[4:-4, 4:-4] = True
 
     def measured(shown):
-        return metrics.iv_psnr(truth, shown, counted)
+        return iv_psnr(truth, shown, counted)
 
     assert measured(truth) == 100
     assert measured(np.roll(truth, (2, -1), (0, 1))) > 50
@@ -283,7 +290,7 @@ def test_iv_psnr_forgives_exactly_two_pixels_and_a_hundredth():
     grey = np.full((40, 40, 3), 0.5)
     luma = -10 * np.log10(0.02**2)
     expected = (4 * luma + 2 * 100) / 6
-    assert metrics.iv_psnr(grey, grey + 0.03, counted) == pytest.approx(expected, abs=0.01)
+    assert iv_psnr(grey, grey + 0.03, counted) == pytest.approx(expected, abs=0.01)
 
 
 def patterns(width, height):
@@ -299,7 +306,7 @@ def patterns(width, height):
 # Printed by QMIV 3.0 for these pictures at 10 bits: WS-PSNR of Y, Cb and Cr, and IV-PSNR.
 QMIV = {
     "rectilinear": ((30.514, 29.882, 27.432), 35.699),
-    # Without its factor π / 2 (see `metrics.iv_psnr`).
+    # Without its factor π / 2 (see `iv_psnr`).
     "equirectangular": ((31.671, 30.994, 29.701), 42.387 - 10 * np.log10(np.pi / 2)),
 }
 
@@ -311,14 +318,13 @@ def test_ws_psnr_and_iv_psnr_are_those_of_qmiv(name):
     weights = np.ones((height, width))
     if name == "equirectangular":
         lens = lenses.from_camera({"lens": name, "resolution": [width, height]})
-        weights = metrics.solid_angles(lens)
-    ws_psnr, iv_psnr = QMIV[name]
-    for component, expected in enumerate(ws_psnr):
+        weights = solid_angles(lens)
+    of_pixels, of_shifts = QMIV[name]
+    for component, expected in enumerate(of_pixels):
         true_component, shown_component = (
-            (picture @ metrics.TO_YCBCR.T)[..., component : component + 1]
-            for picture in (truth, shown)
+            (picture @ TO_YCBCR.T)[..., component : component + 1] for picture in (truth, shown)
         )
-        measured = metrics.ws_psnr(true_component, shown_component, weights)
+        measured = ws_psnr(true_component, shown_component, weights)
         assert measured == pytest.approx(expected, abs=0.01)
     counted = np.ones((height, width), bool)
-    assert metrics.iv_psnr(truth, shown, counted, weights) == pytest.approx(iv_psnr, abs=0.02)
+    assert iv_psnr(truth, shown, counted, weights) == pytest.approx(of_shifts, abs=0.02)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 from conftest import SCRIPTS
 
+from lightfield.core import locks
 from lightfield.core.errors import UserError
 from lightfield.workflow import run_lock
 
@@ -50,9 +51,9 @@ def test_a_live_run_is_named_and_a_killed_one_frees_its_lock(run, tmp_path):
 def test_only_the_own_run_is_to_be_killed(run, tmp_path, monkeypatch):
     with pytest.raises(UserError, match=rf"\(kill {run.pid}\)"):
         run_lock.take([tmp_path / "scene"])
-    me = run_lock.pwd.getpwuid(os.getuid()).pw_name
+    me = locks.pwd.getpwuid(os.getuid()).pw_name
     # To another user, the same run is a colleague's.
-    monkeypatch.setattr(run_lock.pwd, "getpwuid", lambda _: SimpleNamespace(pw_name="ada"))
+    monkeypatch.setattr(locks.pwd, "getpwuid", lambda _: SimpleNamespace(pw_name="ada"))
     with pytest.raises(UserError, match=f"or ask {me} to end it") as refusal:
         run_lock.take([tmp_path / "scene"])
     assert "kill" not in str(refusal.value)
@@ -67,6 +68,6 @@ def test_a_file_system_without_locks_gets_a_warning(tmp_path, monkeypatch, capsy
     def refuse(*_):
         raise OSError(38, "Function not implemented")
 
-    monkeypatch.setattr(run_lock.fcntl, "flock", refuse)
+    monkeypatch.setattr(locks.fcntl, "flock", refuse)
     run_lock.take([tmp_path / "scene"])
     assert "cannot be locked: Function not implemented" in capsys.readouterr().err

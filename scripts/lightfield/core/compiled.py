@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
-from lightfield.core.files import locked_folder
+from lightfield.core.locks import locked_folder
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """Reads, writes and moves files. A file that this module writes is complete or absent."""
 
 import csv
-import fcntl
 import hashlib
 import json
 import os
@@ -9,7 +8,7 @@ import shutil
 import stat
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -320,41 +319,6 @@ def broken(path: Path) -> str | None:
         return f"cannot be read: {read_problem(error)}"
     except UserError as error:
         return str(error).removeprefix(f"{path}: ")
-
-
-def is_locked(path: Path, flags: int) -> bool:
-    """Return whether a process holds the lock of a file or folder, opened with ``flags``.
-
-    Raises OSError if it cannot be opened.
-    """
-    file = os.open(path, flags)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return False
-    except OSError:
-        return True
-    finally:
-        os.close(file)
-
-
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Hold the lock of ``path``, which several processes may change at the same time."""
-    with path.with_name(f".{path.name}.lock").open("ab") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
-@contextmanager
-def locked_folder(folder: Path | str) -> Iterator[None]:
-    """Hold the lock of a folder. Do nothing on network file systems that cannot lock folders."""
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(lock)
 
 
 def absolute_path(path: Path) -> Path:

@@ -1,19 +1,18 @@
 """Gives each process a GPU that no other process renders on at the same time."""
 
-import fcntl
 import os
 import re
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from lightfield.core.errors import OutsideError
+from lightfield.core.locks import tell_waiting, try_lock
 
 # These environment variables tell CUDA, OptiX and HIP which GPUs a process sees.
 CUDA = "CUDA_VISIBLE_DEVICES"
@@ -101,21 +100,21 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
     empty. They lie in ``folder``, by default the machine's folder of temporary files.
     """
     folder = folder or Path(tempfile.gettempdir())
-    waited = False
+    has_told = False
     while True:
-        for gpu in gpus:
-            name = re.sub(r"\W", "_", f"{gpu.variable}-{gpu.id}")
-            path = folder / f"plenoforge-{name}.lock"
-            lock = os.fdopen(_open_lock(path), "rb")
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return gpu, lock
-            except BlockingIOError:
-                lock.close()
-        if not waited:
-            awaited = "the GPU" if len(gpus) == 1 else f"one of {len(gpus)} GPUs"
-            print(f"waiting for {awaited}: others render", file=sys.stderr, flush=True)
-        waited = True
+        with ExitStack() as stack:
+            taken: list[BinaryIO] = []
+            for gpu in gpus:
+                name = re.sub(r"\W", "_", f"{gpu.variable}-{gpu.id}")
+                path = folder / f"plenoforge-{name}.lock"
+                lock = os.fdopen(_open_lock(path), "rb")
+                if try_lock(lock):
+                    return gpu, lock
+                taken.append(stack.enter_context(lock))
+            if not has_told:
+                awaited = "the GPU" if len(gpus) == 1 else f"one of {len(gpus)} GPUs"
+                tell_waiting(f"{awaited}: others render", taken)
+            has_told = True
         time.sleep(0.5)
 
 

@@ -1,6 +1,5 @@
 """Removes what killed processes leave behind: temporary folders, and half-written files."""
 
-import fcntl
 import os
 import re
 import shutil
@@ -11,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lightfield.core.disk_space import SHARED_MEMORY
-from lightfield.core.files import is_locked
+from lightfield.core.locks import locked_folder, try_lock
 from lightfield.core.paths import files_below
 
 # No user's folder may have this prefix: it would be removed.
@@ -33,17 +32,10 @@ def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
     """Yield a temporary folder in ``parent``, or in the machine's folder of temporary files.
 
     The folder is removed at the end. If this process is killed, `remove` does it later. A lock
-    shows that the process lives. A process number would not, because containers have their own.
+    shows that the process lives. Where folders cannot be locked, `remove` leaves the folder.
     """
-    with tempfile.TemporaryDirectory(prefix=PREFIX, dir=parent) as name:
-        lock = os.open(name, os.O_RDONLY)
-        try:
-            # Some network file systems cannot lock folders. There `remove` leaves the folder.
-            with suppress(OSError):
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            yield Path(name)
-        finally:
-            os.close(lock)
+    with tempfile.TemporaryDirectory(prefix=PREFIX, dir=parent) as name, locked_folder(name):
+        yield Path(name)
 
 
 def remove(folders: Iterable[Path] = ()) -> list[Path]:
@@ -92,6 +84,12 @@ def _is_old(path: Path, age: float) -> bool:
 def _is_in_use(folder: Path) -> bool:
     """Return whether the process that made a temporary folder lives. Links always count as used."""
     try:
-        return is_locked(folder, os.O_RDONLY | os.O_NOFOLLOW)
+        file = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:
         return True
+    try:
+        return not try_lock(file)
+    except OSError:
+        return True
+    finally:
+        os.close(file)

@@ -17,7 +17,6 @@ lines. Paths are relative to the folder in which the workflow runs.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -46,6 +45,7 @@ from lightfield.core.files import (
     unreadable,
     writing,
 )
+from lightfield.core.locks import lock
 from lightfield.core.paths import is_normal
 from lightfield.core.read_files import ReadFiles, changed_since_plan
 
@@ -575,10 +575,7 @@ def _locked(part: Path) -> IO[bytes]:
         with writing(part):
             file = part.open("ab")
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            print("waiting for a process of another run that makes the same files", flush=True)
-            fcntl.flock(file, fcntl.LOCK_EX)
+            lock(file, "a process of another run that makes the same files")
         except OSError as error:
             print(f"warning: {part}: cannot be locked: {error.strerror}", file=sys.stderr)
         # The process that held the lock may have removed the file.

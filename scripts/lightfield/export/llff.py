@@ -13,9 +13,10 @@ import numpy as np
 
 from lightfield.core.files import write_bytes
 from lightfield.export import cameras
-from lightfield.export.source import Floats, SeenSurface, pixel_indices
+from lightfield.export.source import Floats, SeenSurface
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.visibility import pixel_indices
 
 # The bounds leave out this percentage of the nearest and of the farthest points.
 _OUTLIERS = 0.1

@@ -14,6 +14,7 @@ from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.visibility import ONE_SURFACE, lies_on, pixel_indices
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
@@ -21,9 +22,9 @@ from lightfield.imaging.look import Look
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Two distances belong to the same surface if they differ by less than this part. One belongs to a
-# pixel's centre, the other to a point anywhere in the pixel.
-SAME_SURFACE = 0.01
+# A view sees a point that lies on its surface within this part of the distance. The surface is at a
+# pixel's centre, and the point is anywhere in the pixel.
+_ON_SURFACE = 0.01
 
 
 @dataclass(frozen=True)
@@ -251,7 +252,7 @@ class SeenSurface:
             below[:-1] = world[1:] - world[:-1]
             normal = np.cross(below, right)
             near = np.maximum(np.linalg.norm(right, axis=-1), np.linalg.norm(below, axis=-1))
-            normal[~(near < 0.1 * self.distance)] = np.nan
+            normal[~(near < ONE_SURFACE * self.distance)] = np.nan
             normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
             normal *= -np.sign((normal * world).sum(axis=-1, keepdims=True))
         hits = np.isfinite(self.distance[part]) & (self.distance[part] > 0)
@@ -263,20 +264,7 @@ class SeenSurface:
         expected = np.linalg.norm(local, axis=1)
         column, row, inside = pixel_indices(self.lens, local)
         distance = np.where(inside, self.distance[row, column], np.nan)
-        with np.errstate(invalid="ignore"):
-            same: Bools = np.abs(distance - expected) < SAME_SURFACE * expected
-        return same
-
-
-def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Bools]:
-    """Return the column and row (n,), (n,) of each ray's pixel, and which rays are in the frame.
-
-    ``rays`` (n, 3) may have any length. Outside the frame column and row are 0.
-    """
-    pixels = lens.pixels(rays)
-    inside = lens.in_frame(pixels)
-    column, row = np.where(inside, np.floor(pixels).T, 0).astype(np.intp)
-    return column, row, inside
+        return lies_on(distance, expected, part=_ON_SURFACE)
 
 
 class DepthMaps:

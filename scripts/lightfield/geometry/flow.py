@@ -9,15 +9,15 @@ from lightfield.core.errors import UserError
 from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.visibility import ONE_SURFACE, nothing_hides
 
-# A point is hidden if the other view sees a surface that is nearer by more than this part.
-HIDDEN = 0.01
+# A point is hidden if the other view's surface is nearer by more than this part of its distance.
+# The other view has depth only at its pixels' centres, and not at the point.
+_HIDDEN = 0.01
 # Two cameras are equally near if their distances differ by less than this part.
 _AS_NEAR = 1e-6
 # A surface is followed if its way there and back ends within this many pixels.
 _RETURNS = 0.5
-# The pixels around a point belong to one surface if their distances differ by less than this part.
-SAME_SURFACE = 0.1
 
 
 def neighbours(world_from_cameras: Array) -> list[int]:
@@ -73,7 +73,7 @@ def flow(
             row = np.where(inside, y + dy, 0).astype(int).clip(0, lens.height - 1)
             farthest = np.fmax(farthest, other_distance[row, column])
     expected = np.where(far, np.inf, np.linalg.norm(offset, axis=-1))
-    visible = inside & (expected <= (1 + HIDDEN) * farthest)
+    visible = inside & nothing_hides(farthest, expected, part=_HIDDEN)
     motion = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
     motion[..., 0] = shorter(lens, motion[..., 0])
     return motion, visible
@@ -127,7 +127,7 @@ def scene_flow(
     returned = motion + back
     returned[..., 0] = shorter(lens, returned[..., 0])
     is_known &= np.linalg.norm(returned, axis=-1) < _RETURNS
-    is_known &= farthest < (1 + SAME_SURFACE) * nearest
+    is_known &= farthest < (1 + ONE_SURFACE) * nearest
     rays = lens.rays(target[..., 0], target[..., 1])
     is_known &= np.isfinite(rays).all(axis=-1)
     before = lens.pixel_rays() * np.where(is_known, distance, 0)[..., None]

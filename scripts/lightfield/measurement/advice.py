@@ -22,7 +22,7 @@ import numpy as np
 
 from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics
-from lightfield.measurement.calibration import effort_for
+from lightfield.measurement.effort import effort_for
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
 from lightfield.planning.sampling import DENOISED, TRACED, standard_error
 
@@ -262,11 +262,11 @@ def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
         times_of_all_pixels = []
         for seed, now in enumerate(of_seeds):
             by_error = [(before[seed].seconds, before[seed].error) for before in rising]
-            times.append(_seconds_to_error(now.error, by_error) / now.seconds)
+            times.append(effort_for(now.error, by_error, before=True) / now.seconds)
             by_error = [
                 (before[seed].seconds, before[seed].error_of_all_pixels) for before in rising
             ]
-            seconds = _seconds_to_error(now.error_of_all_pixels, by_error)
+            seconds = effort_for(now.error_of_all_pixels, by_error, before=True)
             times_of_all_pixels.append(seconds / now.seconds)
         saved[stratum] = Saving(
             *_geometric_mean(times), *_geometric_mean(times_of_all_pixels), **asdict(difference)
@@ -356,17 +356,6 @@ def _picture_differences(experiment: Experiment, change: Change) -> dict[str, _D
         light=experiment.over_views({s: d.light for s, d in by_stratum.items()}),
     )
     return by_stratum
-
-
-def _seconds_to_error(error: float, points: Sequence[tuple[float, float]]) -> float:
-    """Return the seconds to an error, from (seconds, error) points in rising order of seconds.
-
-    Beyond the points the error is inversely proportional to the seconds.
-    """
-    seconds, largest_error = points[0]
-    if error >= largest_error:
-        return seconds * largest_error / error
-    return effort_for(error, points)
 
 
 def _geometric_mean(factors: Sequence[float]) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from lightfield.core.files import absolute_path, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import MeasuredTargetError, RenderBlock
 from lightfield.measurement import bias, metrics, strata
+from lightfield.measurement.effort import effort_for, whole_samples
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.trials import Trials, ViewWindow, nearest_view
 from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples
@@ -527,26 +528,8 @@ def _errors_by_stratum(
     return errors
 
 
-def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
-    """Return the effort at which the error is ``target``, from (effort, error) in rising order.
-
-    Between points the error is a power of the effort. After the last it is inversely proportional.
-    """
-    below = next((i for i, (_, error) in enumerate(points) if error <= target), None)
-    if below is None:
-        effort, error = points[-1]
-        return effort * error / target
-    if below == 0:
-        return points[0][0]
-    (x0, e0), (x1, e1) = points[below - 1 : below + 1]
-    # An error far below the reference's own may be measured as 0 or less by chance.
-    part = math.log(e0 / target) / math.log(e0 / max(e1, 1e-6 * target))
-    return float(x0 * (x1 / x0) ** part)
-
-
 def _with_samples(effort: float) -> dict[str, Any]:
-    # A rounding error must not add a sample.
-    return {"samples": math.ceil(round(effort, 6))}
+    return {"samples": whole_samples(effort)}
 
 
 def _print_progress(text: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_keys, reading
-from lightfield.measurement import metrics
+from lightfield.measurement.effort import Line, fit, whole_samples
 from lightfield.planning.cost import ProbedViews
 from lightfield.planning.sampling import DENOISED, TRACED
 
@@ -80,14 +80,13 @@ def of_measurement(probe: ProbedViews, content: Mapping[str, Any] | None) -> Equ
 class _Law:
     """The error is a power of the samples, and the seconds are a line over them."""
 
-    errors: metrics.Line
+    errors: Line
     overhead: float
     sample_seconds: float
 
     def samples_to(self, error: float) -> float:
         """Return the samples that reach an error: a whole number, at least one."""
-        # A rounding error must not add a sample.
-        return max(1.0, math.ceil(round(self.errors.inverse(error), 6)))
+        return max(1.0, whole_samples(self.errors.inverse(error)))
 
     def seconds(self, samples: float) -> float:
         return self.overhead + self.sample_seconds * samples
@@ -96,7 +95,7 @@ class _Law:
 def _law(points: list[dict[str, float]]) -> _Law | None:
     """Fit a method's points. None if they do not fit, as in a scene without noise."""
     counts = [point["samples"] for point in points]
-    errors = metrics.fit(counts, [point["error"] for point in points])
+    errors = fit(counts, [point["error"] for point in points])
     if errors is None:
         return None
     slope, intercept = np.polyfit(counts, [point["seconds"] for point in points], 1)

@@ -17,7 +17,6 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -30,6 +29,7 @@ from lightfield.core.units import duration
 from lightfield.formats.render_block import RenderBlock
 from lightfield.imaging import plots
 from lightfield.measurement import advice, metrics, strata, trials
+from lightfield.measurement.effort import Line, effort_within, fit, interpolated
 from lightfield.measurement.experiment import (
     WHOLE_VIEWS,
     Experiment,
@@ -305,7 +305,7 @@ def evaluated(points: Sequence[Point], reference_error: float) -> dict[str, Any]
     }
 
 
-def savings(points: Sequence[Point], plain: Mapping[str, metrics.Line]) -> list[dict[str, Any]]:
+def savings(points: Sequence[Point], plain: Mapping[str, Line]) -> list[dict[str, Any]]:
     """Return how many times less time and samples each point takes than plain path tracing.
 
     ``plain`` has the lines of `fitted` of plain path tracing. Without lines the result is empty.
@@ -331,7 +331,7 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
 
     One of plain path tracing's points sets the equal time and the equal error. With ``part`` 0.5 it
     is the middle point, with 1 the point of most samples. The error at equal time is interpolated
-    between a method's own points, and None beyond them. `seconds_to` gives the time.
+    between a method's own points, and None beyond them. `effort_within` gives the time.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
@@ -340,14 +340,13 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     rows = []
     for method in dict.fromkeys(p.method for p in points if p.method != SCENE_SETTINGS):
         line = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
-        seconds = seconds_to(equal.relative_mse, line)
+        curve = [(p.seconds, p.relative_mse) for p in line]
+        seconds = effort_within(equal.relative_mse, curve)
         rows.append(
             {
                 "method": method,
                 "seconds": equal.seconds,
-                "error": metrics.interpolated(
-                    equal.seconds, [(p.seconds, p.relative_mse) for p in line]
-                ),
+                "error": interpolated(equal.seconds, curve),
                 "equal_error": equal.relative_mse,
                 "seconds_at_equal_error": seconds,
                 "times_faster": seconds and equal.seconds / seconds,
@@ -357,31 +356,15 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     return rows
 
 
-def seconds_to(error: float, line: Sequence[Point]) -> float | None:
-    """Return when a method first has at most this ``error``, or None if it never has.
-
-    ``line`` has the method's points in rising order of seconds. The seconds are interpolated
-    between them. If even the first point has less error, they are that point's. The error of a
-    biased method may rise again.
-    """
-    if line[0].relative_mse <= error:
-        return line[0].seconds
-    for before, after in pairwise(line):
-        if after.relative_mse <= error:
-            points = [(point.relative_mse, point.seconds) for point in (before, after)]
-            return metrics.interpolated(error, points)
-    return None
-
-
-def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
+def fitted(points: Sequence[Point]) -> dict[str, Line]:
     """Fit the errors of a method's points over time and over samples. Empty for too few points."""
-    lines: dict[str, metrics.Line] = {}
+    lines: dict[str, Line] = {}
     for prefix, error in (("", "relative_mse"), ("of_all_pixels_", "relative_mse_whole")):
         # If a few pixels dominate an error, it may be below 0 by chance.
         positive = [point for point in points if getattr(point, error) > 0]
         errors = [getattr(point, error) for point in positive]
-        by_time = metrics.fit([point.seconds for point in positive], errors)
-        by_samples = metrics.fit([point.samples for point in positive], errors)
+        by_time = fit([point.seconds for point in positive], errors)
+        by_samples = fit([point.samples for point in positive], errors)
         if by_time and by_samples:
             lines[f"{prefix}over_time"] = by_time
             lines[f"{prefix}over_samples"] = by_samples

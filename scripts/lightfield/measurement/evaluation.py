@@ -24,12 +24,20 @@ from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.visibility import ONE_SURFACE
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_16_bit, tone_map
-from lightfield.measurement import metrics
+from lightfield.measurement.picture_difference import (
+    depth_error,
+    flip_map,
+    iv_psnr,
+    normal_error,
+    psnr,
+    solid_angles,
+    ssim_map,
+    ws_psnr,
+)
 
-# Neighbouring depths of different surfaces differ by more than this part.
-EDGE = 0.1
 # The width of an edge in pixels.
 _EDGE_PIXELS = 5
 _NORMALS = "normal"
@@ -269,7 +277,7 @@ def regions(
         finite_distance = np.where(np.isfinite(distance), distance, 1e9)
         near = minimum_filter(np.where(valid, finite_distance, np.inf), _EDGE_PIXELS)
         far = maximum_filter(np.where(valid, finite_distance, 0), _EDGE_PIXELS)
-        by_name["edges"] = compared & (far > (1 + EDGE) * near)
+        by_name["edges"] = compared & (far > (1 + ONE_SURFACE) * near)
         by_name["background"] = compared & np.isposinf(depth)
     return {name: region for name, region in by_name.items() if region.any()}
 
@@ -280,7 +288,7 @@ def errors(
     """Yield the errors of each region: means over its pixels, None without depth or normals.
 
     They are psnr in decibel, ws_psnr, iv_psnr, ssim and flip. Equal pictures have inf, 100, 100, 1
-    and 0. Depth is as in `metrics.depth_error`, and normal is the mean angle in degrees.
+    and 0. Depth is as in `depth_error`, and normal as in `normal_error`.
     Only the region "all" has iv_psnr, because a match may lie in another region. Outside the region
     "all" both pictures count as black.
     """
@@ -289,29 +297,29 @@ def errors(
     shown_colour = np.where(compared, shown.colour, 0)
     squares = ((true_colour - shown_colour) ** 2).mean(axis=-1)
     # A pixel that is cut by the lens's border has no solid angle, but its centre has a ray.
-    angles = np.maximum(metrics.solid_angles(lens), 1e-12)
+    angles = np.maximum(solid_angles(lens), 1e-12)
     weights = angles if isinstance(lens, Equirectangular) else None
-    similarity = metrics.ssim_map(true_colour, shown_colour)
-    flip = metrics.flip_map(true_colour, shown_colour)
+    similarity = ssim_map(true_colour, shown_colour)
+    flip = flip_map(true_colour, shown_colour)
     for name, region in parts.items():
         mean_square = float(squares[region].mean())
         yield (
             name,
             {
                 "pixels": int(region.sum()),
-                "psnr": metrics.psnr(mean_square),
-                "ws_psnr": metrics.ws_psnr(true_colour, shown_colour, np.where(region, angles, 0)),
-                "iv_psnr": metrics.iv_psnr(true_colour, shown_colour, region, weights)
+                "psnr": psnr(mean_square),
+                "ws_psnr": ws_psnr(true_colour, shown_colour, np.where(region, angles, 0)),
+                "iv_psnr": iv_psnr(true_colour, shown_colour, region, weights)
                 if name == "all"
                 else None,
                 "ssim": float(similarity[region].mean()),
                 "flip": float(flip[region].mean()),
                 "depth": None
                 if shown.depth is None or true.depth is None
-                else metrics.depth_error(shown.depth[region], true.depth[region]),
+                else depth_error(shown.depth[region], true.depth[region]),
                 "normal": None
                 if shown.normals is None or true.normals is None
-                else _angle(shown.normals[region], true.normals[region]),
+                else normal_error(shown.normals[region], true.normals[region]),
             },
         )
 
@@ -336,21 +344,3 @@ def _normals(path: Path, source: SourceDataset) -> Floats | None:
     normals = images.read_image(path, "RGB").colour.astype(np.float64)
     check_size(path, source.lightfield, normals)
     return normals
-
-
-def _angle(normals: Floats, truth: Floats) -> float | None:
-    """Return the mean angle in degrees between normals (n, 3), where the truth has a normal.
-
-    A missing normal, one of length 0 or not finite, counts as perpendicular to the truth.
-    """
-    has_normal = np.linalg.norm(truth, axis=-1) > 0.5
-    if not has_normal.any():
-        return None
-    normals = normals[has_normal]
-    truth = truth[has_normal]
-    is_missing = ~np.isfinite(normals).all(axis=-1) | ~normals.any(axis=-1)
-    with np.errstate(invalid="ignore"):
-        cosine = (normals * truth).sum(axis=-1)
-        sine = np.linalg.norm(np.cross(normals, truth), axis=-1)
-        angles = np.arctan2(sine, cosine)
-    return float(np.degrees(np.where(is_missing, np.pi / 2, angles)).mean())

@@ -29,8 +29,8 @@ BLOCK = 8
 _MOST_OF_NOISE = 2.0
 # The largest difference of all light, in standard errors.
 _MOST_ERRORS = 6.0
-# Depths of the same picture differ by less than this part.
-SAME_DEPTH = 1e-4
+# Depths of the same pixel on two devices differ by less than this part: only rounding differs.
+EQUAL_DEPTH = 1e-4
 # At silhouettes rounding decides which surface a ray hits, so this part of the pixels may differ.
 _SILHOUETTES = 1e-3
 
@@ -42,8 +42,8 @@ class DeviceComparison:
     - ``colour``: the mean squared difference of block means, relative as in `metrics.relative_mse`.
       The unit is the difference by noise alone: 1 if nothing but noise differs.
     - ``light``: the difference of all light, in standard errors.
-    - ``depth``: the part of the pixels whose depths differ by more than `SAME_DEPTH`, or where only
-      one device hits anything.
+    - ``depth``: the part of the pixels whose depths differ by more than `EQUAL_DEPTH`, or where
+      only one device hits anything.
     """
 
     colour: float
@@ -86,9 +86,9 @@ def compare(
 
 
 def _depths_differ(first: NDArray[np.float32], second: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return where two depths (h, w) differ by more than `SAME_DEPTH`, or only one is infinite."""
+    """Return where two depths (h, w) differ by more than `EQUAL_DEPTH`, or only one is infinite."""
     with np.errstate(invalid="ignore"):
-        near = np.abs(second / first - 1) <= SAME_DEPTH
+        near = np.abs(second / first - 1) <= EQUAL_DEPTH
     differ: NDArray[np.bool_] = ~near & ~(np.isinf(first) & np.isinf(second))
     return differ
 
@@ -202,7 +202,7 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             f"differ {content['colour']:.2f} times as much as noise explains (at most "
             f"{_MOST_OF_NOISE:g}). All light differs by {abs(content['light']):.1f} standard "
             f"errors (at most {_MOST_ERRORS:g}). {content['depth']:.2%} of the depths differ by "
-            f"more than a part of {SAME_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
+            f"more than a part of {EQUAL_DEPTH:g} (at most {_SILHOUETTES:.1%}).",
             f"A sample of a megapixel takes {units.duration(content['gpu_seconds'])} on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",

@@ -31,17 +31,14 @@ error.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
-import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
 
-from lightfield.geometry.lenses import Lens
 from lightfield.imaging.pictures import WHITE, exposure_for
 from lightfield.imaging.tonemap import encode_srgb, tone_map
+from lightfield.measurement.picture_difference import depth_error, flip_map, psnr, ssim_map
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,18 +46,6 @@ Mask = NDArray[np.bool_]
 _EPSILON = 0.01
 # This part of the pixels, with the largest errors, does not count.
 OUTLIERS = 0.001
-# The pixels along a side of SSIM's window: 3.5 standard deviations of 1.5 pixels around its middle.
-_SSIM_WINDOW = 11
-# From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
-TO_YCBCR = np.array(
-    [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
-)
-# IV-PSNR weights luma and both colour differences by these. Whole numbers, so that a mean of equal
-# values is exact on every processor.
-_IV_WEIGHTS = np.array([4.0, 1.0, 1.0])
-# IV-PSNR forgives shifts of this many pixels, and this difference of the mean colour.
-_SHIFT = 2
-_MOST_OFFSET = 0.01
 
 
 @dataclass(frozen=True)
@@ -144,8 +129,8 @@ class Errors:
     - ``relative_mse_unexposed``, ``mrse`` (pbrt's): of all pixels, of light without exposure.
     - ``psnr`` (decibel, inf if equal), ``ssim`` (1 if equal), ``flip`` (0 if equal): of the
       tone-mapped image.
-    - ``depth``: as in `depth_error`, or None without depth. Depth is one sample, and more samples
-      do not improve it.
+    - ``depth``: as in `depth_error`, or None without depth. Depth is one sample: more samples do
+      not improve it.
     """
 
     relative_mse: float
@@ -179,108 +164,6 @@ def compare(
         if depth is None or reference.depth is None
         else depth_error(depth[mask], reference.depth[mask]),
     )
-
-
-def ssim_map(truth: Array, shown: Array) -> Array:
-    """Return the structural similarity (h, w, 3) of sRGB pictures in [0, 1]. 1 is equal.
-
-    Source: Wang et al. 2004, with its Gaussian window of 1.5 pixels. Pictures continue mirrored
-    beyond their borders.
-    """
-    # scikit-image refuses pictures smaller than its window.
-    border = _SSIM_WINDOW // 2
-    margins = ((border, border), (border, border), (0, 0))
-    similarity: Array = structural_similarity(
-        np.pad(truth, margins, mode="symmetric"),
-        np.pad(shown, margins, mode="symmetric"),
-        data_range=1.0,
-        channel_axis=-1,
-        gaussian_weights=True,
-        sigma=1.5,
-        use_sample_covariance=False,
-        full=True,
-    )[1]
-    return similarity[border:-border, border:-border]
-
-
-def flip_map(truth: Array, shown: Array) -> Array:
-    """Return the FLIP (h, w) of sRGB pictures in [0, 1]. 0 is equal. Source: Andersson 2020."""
-    flip: Array = flip_evaluator.evaluate(
-        truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
-    )[0]
-    return flip.reshape(truth.shape[:2])
-
-
-def solid_angles(lens: Lens) -> Array:
-    """Return the solid angle (h, w) of each pixel of a lens in steradians.
-
-    It is half the cross product of the diagonals between the rays of the pixel's corners. It is 0
-    if a corner has no ray.
-    """
-    rays = lens.rays(np.arange(lens.width + 1.0)[None, :], np.arange(lens.height + 1.0)[:, None])
-    falling = rays[1:, 1:] - rays[:-1, :-1]
-    rising = rays[:-1, 1:] - rays[1:, :-1]
-    angles: Array = np.linalg.norm(np.cross(falling, rising), axis=-1) / 2
-    return np.nan_to_num(angles)
-
-
-def psnr(mean_square: float) -> float:
-    """Return the PSNR in decibel of pictures in [0, 1] with this mean squared error.
-
-    Equal pictures have inf. scikit-image's function would import all of SciPy's statistics, which
-    takes half a second.
-    """
-    return -10 * math.log10(mean_square) if mean_square else math.inf
-
-
-def ws_psnr(truth: Array, shown: Array, weights: Array) -> float:
-    """Return the PSNR in decibel of pictures (h, w, 3) in [0, 1], with pixel ``weights`` (h, w).
-
-    With `solid_angles` as weights it is WS-PSNR. Source: Sun, Lu and Yu 2017,
-    "Weighted-to-Spherically-Uniform Quality Evaluation for Omnidirectional Video". The mean square
-    counts as at least 1e-10, so equal pictures have 100 dB.
-    """
-    errors = ((truth - shown) ** 2).mean(axis=-1)
-    return -10 * math.log10(max(float((weights * errors).sum() / weights.sum()), 1e-10))
-
-
-def iv_psnr(
-    truth: Array, shown: Array, counted: NDArray[np.bool_], weights: Array | None = None
-) -> float:
-    """Return the IV-PSNR in decibel of sRGB pictures (h, w, 3) in [0, 1].
-
-    Only the ``counted`` pixels (h, w) count. The metric forgives shifts of up to two pixels, and
-    differences of the mean colour of up to a hundredth. Source: Dziembowski, Mieloch, Stankowski
-    and Grzelka 2022, "IV-PSNR – The Objective Quality Metric for Immersive Video Applications".
-    Panoramas have pixel ``weights`` (h, w). Their program, QMIV, has them, too, but does not divide
-    by their sum. This adds 10 log10(π / 2), 1.96 dB, to its figures of whole panoramas.
-    """
-    part = np.where(counted, 1.0 if weights is None else weights, 0.0)
-    true_picture = truth @ TO_YCBCR.T
-    shown_picture = shown @ TO_YCBCR.T
-    offset = (true_picture - shown_picture)[counted].mean(axis=0)
-    shown_picture = shown_picture + offset.clip(-_MOST_OFFSET, _MOST_OFFSET)
-    return min(
-        _iv_psnr(true_picture, shown_picture, part),
-        _iv_psnr(shown_picture, true_picture, part),
-    )
-
-
-def _iv_psnr(picture: Array, other: Array, weights: Array) -> float:
-    """Return the PSNR of a ``picture`` whose pixels are compared with their best matches."""
-    height, width = weights.shape
-    padded = np.pad(other, ((_SHIFT, _SHIFT), (_SHIFT, _SHIFT), (0, 0)), mode="edge")
-    least = np.full(weights.shape, np.inf)
-    best = np.zeros_like(picture)
-    for row in range(2 * _SHIFT + 1):
-        for column in range(2 * _SHIFT + 1):
-            squares = (picture - padded[row : row + height, column : column + width]) ** 2
-            error = squares @ _IV_WEIGHTS
-            is_less = error < least
-            least[is_less] = error[is_less]
-            best[is_less] = squares[is_less]
-    means = np.average(best.reshape(-1, 3), axis=0, weights=weights.ravel())
-    return float(np.average(-10 * np.log10(np.maximum(means, 1e-10)), weights=_IV_WEIGHTS))
 
 
 def relative_mse(
@@ -375,60 +258,6 @@ def developed(colour: NDArray[Any], reference: Reference) -> Array:
     """Return the sRGB image in [0, 1] as reports show it: exposed and tone-mapped."""
     mapped = tone_map(np.ascontiguousarray(colour, np.float32), reference.exposure, WHITE)
     return np.where(reference.mask[..., np.newaxis], encode_srgb(mapped), 0.0)
-
-
-def depth_error(depth: NDArray[Any], truth: NDArray[Any]) -> float:
-    """Return the mean of |depth / truth − 1|, at most 1 per pixel. inf is a miss, NaN unknown.
-
-    A pixel counts as 1 if only one of the two hit anything.
-    """
-    missed = np.isinf(depth)
-    truth_missed = np.isinf(truth)
-    with np.errstate(invalid="ignore"):
-        error = np.fmin(np.abs(depth / truth - 1), 1.0)
-    return float(np.where(missed | truth_missed, missed != truth_missed, error).mean())
-
-
-@dataclass(frozen=True)
-class Line:
-    """A power law y = factor · x^slope, fitted in logarithms, and the slope's standard error."""
-
-    slope: float
-    slope_error: float
-    factor: float
-
-    def at(self, x: float) -> float:
-        """Return y at x."""
-        return float(self.factor * x**self.slope)
-
-    def inverse(self, y: float) -> float:
-        """Return x at y. At most 1e300, as for a line that hardly falls or rises."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = np.log10(y / self.factor) / np.float64(self.slope)
-        return float(10 ** np.fmin(exponent, 300.0))
-
-
-def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
-    """Fit a power law by least squares of the logarithms.
-
-    Return None for fewer than three different x, or if a number is not above 0.
-    """
-    if len(set(x)) < 3 or min(*x, *y) <= 0:
-        return None
-    if min(y) == max(y):
-        # The fit would be level except for rounding.
-        return Line(0.0, 0.0, float(y[0]))
-    (slope, intercept), covariance = np.polyfit(np.log(x), np.log(y), 1, cov=True)
-    return Line(float(slope), math.sqrt(covariance[0, 0]), float(np.exp(intercept)))
-
-
-def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
-    """Return y at x by power laws between points (x, y), in any order. None outside of them."""
-    points = sorted(points)
-    for (x0, y0), (x1, y1) in pairwise(points):
-        if x0 <= x <= x1 and x1 > x0 and min(y0, y1) > 0:
-            return float(y0 * (y1 / y0) ** (math.log(x / x0) / math.log(x1 / x0)))
-    return None
 
 
 def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0) -> list[int]:

@@ -26,7 +26,14 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
-from lightfield.measurement import metrics, summaries
+from lightfield.measurement import summaries
+from lightfield.measurement.picture_difference import (
+    flip_map,
+    iv_psnr,
+    solid_angles,
+    ssim_map,
+    ws_psnr,
+)
 from lightfield.measurement.summaries import ALL_PIXELS, PLACES
 from lightfield.stages.measurement import SynthesisQuality, SynthesisSettings
 from lightfield.stages.synthesis import BEST
@@ -208,7 +215,7 @@ def compare(
     it, over the distance to the edge of their volume.
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
-    angles = metrics.solid_angles(truth.lens)
+    angles = solid_angles(truth.lens)
     weights = angles if isinstance(truth.lens, Equirectangular) else None
     cameras = np.array([view.world_from_camera for view in around])
     eyes = np.array([view.world_from_camera for view in views])
@@ -219,9 +226,9 @@ def compare(
         true_picture = _developed(true, exposure, inside)
         picture = _developed(synthesised.colour, exposure, inside)
         black = np.where(synthesised.holes[..., None], 0, picture)
-        similar = metrics.ssim_map(true_picture, picture)
-        flips = metrics.flip_map(true_picture, picture)
-        black_flips = metrics.flip_map(true_picture, black)
+        similar = ssim_map(true_picture, picture)
+        flips = flip_map(true_picture, picture)
+        black_flips = flip_map(true_picture, black)
         for region, pixels in regions(truth, view, inside).items():
             yield {
                 "variant": variant.name,
@@ -232,10 +239,10 @@ def compare(
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),
                 "region": region,
                 "part": float(pixels[inside].mean()),
-                "psnr": metrics.ws_psnr(true_picture, picture, pixels),
-                "psnr_black": metrics.ws_psnr(true_picture, black, pixels),
-                "ws_psnr": metrics.ws_psnr(true_picture, picture, np.where(pixels, angles, 0)),
-                "iv_psnr": metrics.iv_psnr(true_picture, picture, pixels, weights),
+                "psnr": ws_psnr(true_picture, picture, pixels),
+                "psnr_black": ws_psnr(true_picture, black, pixels),
+                "ws_psnr": ws_psnr(true_picture, picture, np.where(pixels, angles, 0)),
+                "iv_psnr": iv_psnr(true_picture, picture, pixels, weights),
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
                 "flip_black": float(black_flips[pixels].mean()),

@@ -27,6 +27,7 @@ from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.visibility import lies_on
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.planning.sampling import PLAIN, calibrated
@@ -334,8 +335,9 @@ def nearest_view(views: Sequence[View], view: View) -> View | None:
     return views[min(distances)[1]] if distances else None
 
 
-# Two depths of the same surface differ by less than this part, because pixels are coarse.
-SAME_DEPTH = 0.03
+# A window sees a point that lies on its surface within this part of the distance. Exports allow
+# less: they drop points in doubt, but a comparison of noise needs many pixels.
+_ON_SURFACE = 0.03
 
 
 def both_see(
@@ -363,5 +365,5 @@ def both_see(
     with np.errstate(invalid="ignore"):
         distance = np.linalg.norm(points - second.position, axis=1)
         surface_distance = np.linalg.norm(surface - second.position, axis=1)
-        same = inside & (np.abs(surface_distance / distance - 1) < SAME_DEPTH)
+    same = inside & lies_on(surface_distance, distance, part=_ON_SURFACE)
     return (rows * window.width + columns)[same], (down * other_window.width + across)[same]

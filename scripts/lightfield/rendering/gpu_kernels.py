@@ -6,7 +6,6 @@ code. The driver compiles the PTX, and keeps the result in its cache. OptiX need
 too.
 """
 
-import fcntl
 import os
 import re
 import sys
@@ -22,6 +21,7 @@ from typing import IO
 import bpy
 
 from lightfield.core import gpus
+from lightfield.core.locks import lock
 from lightfield.core.progress import COMPILED, COMPILING
 from lightfield.core.units import duration
 from lightfield.rendering import cycles
@@ -101,11 +101,7 @@ def _locked(path: Path, model: str) -> Iterator[IO[str]]:
         except OSError:
             # The driver cannot keep the kernels there either.
             file = stack.enter_context(tempfile.TemporaryFile("w", encoding="utf-8"))
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            _tell(f"waiting for a process that compiles Cycles' kernels for {model}")
-            fcntl.flock(file, fcntl.LOCK_EX)
+        lock(file, f"a process that compiles Cycles' kernels for {model}")
         yield file
 
 

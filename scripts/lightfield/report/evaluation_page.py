@@ -16,7 +16,8 @@ from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
-from lightfield.measurement import evaluation, metrics
+from lightfield.measurement import evaluation
+from lightfield.measurement.picture_difference import flip_map
 from lightfield.report import page
 from lightfield.stages.measurement import Evaluate, EvaluationSettings
 
@@ -140,7 +141,7 @@ def _compare(
         for region, errors in evaluation.errors(shown, true, regions, source.lens)
     ]
     pictures = [np.nan_to_num(image.colour) for image in (true, shown)]
-    flip = metrics.flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)
+    flip = flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)
     strip = np.concatenate([*pictures, flip], axis=1).clip(0, 1)
     images.write_png(picture, np.round(strip * 255).astype(np.uint8))
     return rows, evaluation.background_problem(shown, true, regions["all"], background)

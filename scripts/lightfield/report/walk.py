@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from lightfield.export.source import pixel_indices
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.visibility import pixel_indices
 from lightfield.report.packing import packed_bytes, webp
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels

@@ -15,11 +15,12 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt
 
 from lightfield.core.errors import UserError
-from lightfield.export.source import SourceDataset, pixel_indices
+from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.visibility import pixel_indices
 from lightfield.imaging import images
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels

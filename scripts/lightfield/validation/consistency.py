@@ -58,8 +58,9 @@ _NEIGHBOURHOOD = 48
 # Distances in metres are equal if they agree to this many decimals.
 DECIMALS = 6
 
-# Residuals beyond this many footprints belong to another surface, not to a slightly wrong view.
-SAME_SURFACE = 1.0
+# Residuals beyond this many footprints of a pixel belong to another surface, not to a slightly
+# wrong view. A view that is wrong by more has contradictions, and needs no measurement.
+_SAME_SURFACE_FOOTPRINTS = 1.0
 
 UNKNOWN = 0
 AGREE = 1
@@ -264,7 +265,7 @@ class Comparison:
 
     def measuring(self) -> "Comparison | None":
         """Return the patches that measure the surfaces' distance. None if they are too few."""
-        used = self.smooth & (np.abs(self.residual) < SAME_SURFACE)
+        used = self.smooth & (np.abs(self.residual) < _SAME_SURFACE_FOOTPRINTS)
         if used.sum() < _FEWEST_POINTS:
             return None
         return Comparison(*(getattr(self, each.name)[used] for each in fields(self)))

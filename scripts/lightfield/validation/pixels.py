@@ -17,6 +17,7 @@ from lightfield.formats.layout import IMAGES, File, ImageSet, rendered, source_v
 from lightfield.formats.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame, shorter
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.visibility import nothing_hides
 from lightfield.imaging import images
 from lightfield.validation import clipping, consistency, light_sums, reprojected
 from lightfield.validation.cameras import camera_of
@@ -39,8 +40,9 @@ _MOST_LIT_OUTSIDE = 0.05
 _FAINT = 0.001
 # A flow may be this many pixels off the place that follows from depth.
 _FLOW_OFF = 0.01
-# A point is hidden if it is farther away than this factor times the farthest surface around.
-HIDDEN = 1.011
+# A point is hidden if the farthest surface around is nearer by more than this part of its distance.
+# The flow was made with 0.01. A tenth more allows for the rounding of depths in half floats.
+_HIDDEN = 0.011
 # Regions of this many differently turned views are kept in memory.
 _MOST_REGIONS = 16
 
@@ -289,7 +291,8 @@ class Examiner:
         column, row = np.floor(places[compared]).astype(np.int64).T
         nearest, farthest = consistency.recorded_range(other, target_depth, column, row)
         distance = np.linalg.norm(points[compared] - other.position, axis=-1)
-        is_hidden = distance > HIDDEN * farthest
+        is_known = ~np.isnan(farthest)
+        is_hidden = is_known & ~nothing_hides(farthest, distance, part=_HIDDEN)
         is_open = distance <= nearest
         wrong = int(np.where(is_visible[compared], is_hidden, is_open).sum())
         if wrong:

@@ -4,11 +4,7 @@ The kernel frees the lock of a killed process. Its jobs may live on: each holds 
 receipt (`lightfield.core.receipts`), for which the jobs of the next run wait.
 """
 
-import fcntl
 import json
-import os
-import pwd
-import socket
 import sys
 import time
 from collections.abc import Iterable
@@ -17,6 +13,7 @@ from typing import IO
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import open_file, read_bytes, writing
+from lightfield.core.locks import Holder, try_lock
 
 NAME = "run.lock"
 # The open files whose locks this process holds.
@@ -34,48 +31,41 @@ def take(folders: Iterable[Path]) -> None:
             folder.mkdir(parents=True, exist_ok=True)
             file = path.open("a+b")
         try:
-            _lock(file)
-        except BlockingIOError:
-            raise UserError(_refusal(path)) from None
+            if not _lock(file):
+                raise UserError(_refusal(path))
         except OSError as error:
             print(f"warning: {path}: cannot be locked: {error.strerror}", file=sys.stderr)
         file.truncate(0)
-        file.write(json.dumps([os.getpid(), _user(), socket.gethostname()]).encode())
+        # The kernel does not say who holds a lock on another machine.
+        file.write(json.dumps(Holder.this_process()).encode())
         file.flush()
         _held.append(file)
 
 
-def _user() -> str:
-    """Return the name of this process's user."""
-    try:
-        return pwd.getpwuid(os.getuid()).pw_name
-    except KeyError:
-        return f"user {os.getuid()}"
+def _lock(file: IO[bytes]) -> bool:
+    """Lock a file. Return False if another run holds the lock.
 
-
-def _lock(file: IO[bytes]) -> None:
-    """Lock a file. A plan looks at the lock for a moment, so this tries again for a second."""
+    A plan looks at the lock for a moment, so this tries again for a second.
+    """
     for _ in range(10):
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
-        except BlockingIOError:
-            time.sleep(0.1)
-    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if try_lock(file):
+            return True
+        time.sleep(0.1)
+    return try_lock(file)
 
 
 def _refusal(path: Path) -> str:
     """Return which scene another run makes, and whose run it is."""
     try:
-        number, user, host = json.loads(read_bytes(path))
+        holder = Holder(*json.loads(read_bytes(path)))
     except (OSError, ValueError, TypeError):
         # That run has not written it yet, or is of an older version.
         whose, end = "", ""
     else:
-        here = host == socket.gethostname()
-        whose = f" (process {number} of {user}{'' if here else f' on {host}'})"
-        is_own = here and user == _user()
-        end = f", or end it (kill {number})" if is_own else f", or ask {user} to end it"
+        whose = f" ({holder})"
+        end = f", or ask {holder.user} to end it"
+        if holder.is_own:
+            end = f", or end it (kill {holder.process})"
     return (
         f"another run{whose} makes the scene {path.parent.name}: wait for it{end}; "
         "snakemake --cores 1 status shows its progress"
@@ -86,9 +76,7 @@ def is_held(folder: Path) -> bool:
     """Return whether a run holds the lock in a folder."""
     try:
         with open_file(folder / NAME) as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
+            # Shared, so that two plans do not take each other for a run.
+            return not try_lock(file, shared=True)
     except OSError:
         return False
-    return False
