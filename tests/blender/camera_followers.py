@@ -3,6 +3,9 @@
 Each function adds a white card, or several, to the open studio of `blend_scenes`.
 """
 
+import tempfile
+from pathlib import Path
+
 
 def card(name, location):
     """Add a card without thickness, which faces up."""
@@ -100,6 +103,46 @@ def culled():
     assert bpy.context.scene.camera
 
 
+def muted():
+    """Let one card turn to the active camera, and mute the link by which another one would."""
+    active_camera()
+    tree, info = _nodes(card("Still", (-0.9, -1.4, 0.4)))
+    (link,) = info.inputs["Object"].links
+    link.is_muted = True
+    turn = tree.nodes.new("GeometryNodeTransform")
+    _through(tree, turn)
+    tree.links.new(info.outputs["Rotation"], turn.inputs["Rotation"])
+
+
+def follow_track():
+    """Let a card be where the active camera sees a tracked feature of a film."""
+    constraint, clip = _of_film("FOLLOW_TRACK")
+    track = clip.tracking.tracks.new(name="Feature", frame=1)
+    track.markers[0].co = (0.55, 0.6)
+    constraint.track = "Feature"
+
+
+def object_solver():
+    """Let a card move with an object of a film, whose camera is the active one."""
+    _of_film("OBJECT_SOLVER")
+
+
+def line_art():
+    """Draw the outlines that the active camera sees."""
+    import bpy
+
+    drawing = bpy.data.grease_pencils.new("Lines")
+    lines = bpy.data.objects.new("Lines", drawing)
+    bpy.context.scene.collection.objects.link(lines)
+    drawing.layers.new("Ink").frames.new(1)
+    ink = bpy.data.materials.new("Ink")
+    bpy.data.materials.create_gpencil_data(ink)
+    drawing.materials.append(ink)
+    outline = lines.modifiers.new("outline", "LINEART")
+    outline.target_layer = "Ink"
+    outline.target_material = ink
+
+
 def named_by_nodes():
     """Let geometry nodes turn a card to the camera that their modifier names."""
     tree, info = _nodes(card("Named", (0.3, -1.2, 0.3)))
@@ -166,6 +209,21 @@ def _drive(owner, id_type, block, path, driven="location", add=0.6):
     target.data_path = path
     driver.expression = f"value + {add}"
     return target
+
+
+def _of_film(kind):
+    """Give a card a constraint of a kind that follows a film. Return both."""
+    import bpy
+
+    placed = card("Tracked", (0.3, -1.2, 0.3))
+    frame = bpy.data.images.new("film", 64, 48)
+    frame.filepath_raw = str(Path(tempfile.mkdtemp()) / "film0001.png")
+    frame.file_format = "PNG"
+    frame.save()
+    constraint = placed.constraints.new(kind)
+    constraint.use_active_clip = False
+    constraint.clip = bpy.data.movieclips.load(frame.filepath_raw)
+    return constraint, constraint.clip
 
 
 def _nodes(obj):
