@@ -3,6 +3,8 @@
 Each function adds a white card, or several, to the open studio of `blend_scenes`.
 """
 
+import itertools
+import math
 import tempfile
 from pathlib import Path
 
@@ -123,8 +125,40 @@ def follow_track():
 
 
 def object_solver():
-    """Let a card move with an object of a film, whose camera is the active one."""
-    _of_film("OBJECT_SOLVER")
+    """Let a card move with an object that Blender has found in a film of the active camera."""
+    import bpy
+
+    constraint, clip = _of_film("OBJECT_SOLVER")
+    # It faces the camera there.
+    constraint.id_data.location = (0.2, -0.1, -3)
+    thing = clip.tracking.objects.new("Thing")
+    thing.keyframe_a, thing.keyframe_b = 1, 3
+    clip.tracking.objects.active = thing
+    constraint.object = "Thing"
+    # Blender gives the scene's camera the film's lens.
+    lens = _camera().data
+    film_camera = clip.tracking.camera
+    film_camera.sensor_width, film_camera.focal_length = lens.sensor_width, lens.lens
+    focal = lens.lens / lens.sensor_width
+    places = itertools.product((-1, 0.1, 0.9), (-0.8, 1), (-1, 0.7))
+    for number, (x, y, z) in enumerate(places):
+        track = thing.tracks.new(name=str(number), frame=1)
+        for frame, turn in ((1, 0), (2, 0.25), (3, 0.5)):
+            across = x * math.cos(turn) + z * math.sin(turn) + turn
+            depth = 8 + x * math.sin(turn) - z * math.cos(turn)
+            # In parts of the film's width and height.
+            seen = (0.5 + focal * across / depth, 0.5 + focal * y / depth * 64 / 48)
+            if frame == 1:
+                track.markers[0].co = seen
+            else:
+                track.markers.insert_frame(frame, co=seen)
+    (window, *_) = bpy.context.window_manager.windows
+    (area, *_) = window.screen.areas
+    area.type = "CLIP_EDITOR"
+    area.spaces.active.clip = clip
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        bpy.ops.clip.solve_camera()
+    assert thing.reconstruction.is_valid
 
 
 def line_art():
