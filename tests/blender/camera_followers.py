@@ -3,6 +3,11 @@
 Each function adds a white card, or several, to the open studio of `blend_scenes`.
 """
 
+import itertools
+import math
+import tempfile
+from pathlib import Path
+
 
 def card(name, location):
     """Add a card without thickness, which faces up."""
@@ -100,6 +105,78 @@ def culled():
     assert bpy.context.scene.camera
 
 
+def muted():
+    """Let one card turn to the active camera, and mute the link by which another one would."""
+    active_camera()
+    tree, info = _nodes(card("Still", (-0.9, -1.4, 0.4)))
+    (link,) = info.inputs["Object"].links
+    link.is_muted = True
+    turn = tree.nodes.new("GeometryNodeTransform")
+    _through(tree, turn)
+    tree.links.new(info.outputs["Rotation"], turn.inputs["Rotation"])
+
+
+def follow_track():
+    """Let a card be where the active camera sees a tracked feature of a film."""
+    constraint, clip = _of_film("FOLLOW_TRACK")
+    track = clip.tracking.tracks.new(name="Feature", frame=1)
+    track.markers[0].co = (0.55, 0.6)
+    constraint.track = "Feature"
+
+
+def object_solver():
+    """Let a card move with an object that Blender has found in a film of the active camera."""
+    import bpy
+
+    constraint, clip = _of_film("OBJECT_SOLVER")
+    # It faces the camera there.
+    constraint.id_data.location = (0.2, -0.1, -3)
+    thing = clip.tracking.objects.new("Thing")
+    thing.keyframe_a, thing.keyframe_b = 1, 3
+    clip.tracking.objects.active = thing
+    constraint.object = "Thing"
+    # Blender gives the scene's camera the film's lens.
+    lens = _camera().data
+    film_camera = clip.tracking.camera
+    film_camera.sensor_width, film_camera.focal_length = lens.sensor_width, lens.lens
+    focal = lens.lens / lens.sensor_width
+    places = itertools.product((-1, 0.1, 0.9), (-0.8, 1), (-1, 0.7))
+    for number, (x, y, z) in enumerate(places):
+        track = thing.tracks.new(name=str(number), frame=1)
+        for frame, turn in ((1, 0), (2, 0.25), (3, 0.5)):
+            across = x * math.cos(turn) + z * math.sin(turn) + turn
+            depth = 8 + x * math.sin(turn) - z * math.cos(turn)
+            # In parts of the film's width and height.
+            seen = (0.5 + focal * across / depth, 0.5 + focal * y / depth * 64 / 48)
+            if frame == 1:
+                track.markers[0].co = seen
+            else:
+                track.markers.insert_frame(frame, co=seen)
+    (window, *_) = bpy.context.window_manager.windows
+    (area, *_) = window.screen.areas
+    area.type = "CLIP_EDITOR"
+    area.spaces.active.clip = clip
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        bpy.ops.clip.solve_camera()
+    assert thing.reconstruction.is_valid
+
+
+def line_art():
+    """Draw the outlines that the active camera sees."""
+    import bpy
+
+    drawing = bpy.data.grease_pencils.new("Lines")
+    lines = bpy.data.objects.new("Lines", drawing)
+    bpy.context.scene.collection.objects.link(lines)
+    drawing.layers.new("Ink").frames.new(1)
+    ink = bpy.data.materials.new("Ink")
+    bpy.data.materials.create_gpencil_data(ink)
+    drawing.materials.append(ink)
+    outline = lines.modifiers.new("outline", "LINEART")
+    outline.target_layer = "Ink"
+    outline.target_material = ink
+
+
 def named_by_nodes():
     """Let geometry nodes turn a card to the camera that their modifier names."""
     tree, info = _nodes(card("Named", (0.3, -1.2, 0.3)))
@@ -166,6 +243,21 @@ def _drive(owner, id_type, block, path, driven="location", add=0.6):
     target.data_path = path
     driver.expression = f"value + {add}"
     return target
+
+
+def _of_film(kind):
+    """Give a card a constraint of a kind that follows a film. Return both."""
+    import bpy
+
+    placed = card("Tracked", (0.3, -1.2, 0.3))
+    frame = bpy.data.images.new("film", 64, 48)
+    frame.filepath_raw = str(Path(tempfile.mkdtemp()) / "film0001.png")
+    frame.file_format = "PNG"
+    frame.save()
+    constraint = placed.constraints.new(kind)
+    constraint.use_active_clip = False
+    constraint.clip = bpy.data.movieclips.load(frame.filepath_raw)
+    return constraint, constraint.clip
 
 
 def _nodes(obj):

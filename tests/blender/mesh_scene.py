@@ -66,7 +66,8 @@ def placed():
         bpy.context.collection.objects.link(empty)
     parent = bpy.data.objects.new("squeezed", None)
     parent.location = (2.6, 6, -0.4)
-    parent.scale = (1, 1, 0.4)
+    # It also mirrors.
+    parent.scale = (1, 1, -0.4)
     bpy.context.collection.objects.link(parent)
     sheared = add("sheared", size=0.6, location=(0, 0, 0))
     sheared.parent = parent

@@ -13,6 +13,7 @@ import cv2
 import exr_windows
 import numpy as np
 import OpenEXR
+import pycolmap
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
@@ -67,249 +68,8 @@ def on_sphere(points, tolerance):
     np.testing.assert_allclose(np.linalg.norm(points, axis=-1), RADIUS, rtol=0, atol=tolerance)
 
 
-class Colmap:
-    """A model as text, according to COLMAP's format.rst."""
-
-    def __init__(self, folder):
-        def lines(name):
-            text = (folder / name).read_text().splitlines()
-            return [line.split() for line in text if not line.startswith("#")]
-
-        ((_, self.model, *self.size_and_parameters),) = lines("cameras.txt")
-        self.parameters = list(map(float, self.size_and_parameters[2:]))
-        self.images, self.seen = {}, {}
-        rows = lines("images.txt")
-        for head, body in zip(rows[::2], rows[1::2], strict=True):
-            quaternion = np.array(head[1:5], float)[[1, 2, 3, 0]]
-            turn, shift = Rotation.from_quat(quaternion).as_matrix(), np.array(head[5:8], float)
-            self.images[int(head[0])] = (head[9], turn, shift)
-            self.seen[int(head[0])] = np.array(body, float).reshape(-1, 3)
-        points = lines("points3D.txt")
-        self.positions = {int(row[0]): np.array(row[1:4], float) for row in points}
-        self.colours = {int(row[0]): np.array(row[4:7], int) for row in points}
-        self.tracks = {int(row[0]): np.array(row[8:], int).reshape(-1, 2) for row in points}
-
-        if self.model == "EQUIRECTANGULAR":
-            return
-        fx, fy, cx, cy, *distortion = self.parameters
-        self.matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-        self.distortion = np.array(distortion) if distortion else None
-        assert self.model == ("OPENCV_FISHEYE" if distortion else "PINHOLE")
-
-    def project(self, points, turn, shift):
-        """Project world points to pixels with OpenCV."""
-        vector = cv2.Rodrigues(turn)[0]
-        if self.distortion is None:
-            return cv2.projectPoints(points, vector, shift, self.matrix, None)[0][:, 0]
-        points, shift = points[:, None], shift[:, None]
-        return cv2.fisheye.projectPoints(points, vector, shift, self.matrix, self.distortion)[0][
-            :, 0
-        ]
-
-    def lift(self, pixels, z):
-        """Return the points (n, 3) in the camera's frame that OpenCV computes for pixels (n, 2)."""
-        if self.distortion is None:
-            directions = cv2.undistortPoints(pixels, self.matrix, None)
-        else:
-            directions = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
-        return np.column_stack([directions.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
-
-
 def test_the_program_offers_every_export_of_a_scene_yaml():
     assert {*EXPORTS, "instant_ngp"} == set(Exports.model_fields)
-
-
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
-def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
-    folder = exported(dataset, "colmap", source, tmp_path, format="text", points=400)
-    model = Colmap(folder / "sparse" / "0")
-    assert 100 < len(model.positions) <= 400
-    on_sphere(np.array([*model.positions.values()]), 1e-5)
-    for number, place in model.positions.items():
-        np.testing.assert_allclose(model.colours[number], colour_of(place), atol=6)
-        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 1
-        for image, index in model.tracks[number]:
-            assert model.seen[image][index, 2] == number
-    point_count = 0
-    for name, turn, shift in model.images.values():
-        camera = -turn.T @ shift
-        np.testing.assert_allclose(camera, matrices(dataset, source)[name[:-4]][:3, 3], atol=1e-12)
-        assert (folder / "images" / name).is_file()
-    for image, rows in model.seen.items():
-        places = np.array([model.positions[int(number)] for number in rows[:, 2]])
-        expected = model.project(places, *model.images[image][1:])
-        np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
-        point_count += len(rows)
-    # Nothing inside a sphere hides anything. So a view sees every point in its image.
-    every = 0
-    for name, turn, shift in model.images.values():
-        places = np.array([*model.positions.values()])
-        local = places @ turn.T + shift
-        x, y = model.project(places, turn, shift).T
-        width, height = map(int, model.size_and_parameters[:2])
-        inside = (local[:, 2] > 0) & (x > 0) & (x < width) & (y > 0) & (y < height)
-        mask = folder / "masks" / f"{name}.png"
-        if mask.exists():
-            valid = images.read_image(mask).channels["Y"]
-            column, row = np.where(inside, x, 0).astype(int), np.where(inside, y, 0).astype(int)
-            # A pixel at the rim of an image circle is valid, but partly outside the circle.
-            angle = np.degrees(np.arctan2(np.hypot(*local.T[:2]), local[:, 2]))
-            inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
-        every += inside.sum()
-    assert point_count == every
-
-
-def test_colmap_sees_the_points_all_around_a_panorama(tmp_path, capsys):
-    write_views(tmp_path / "dataset", LENSES["panorama"], RIG)
-    options = {"format": "text", "points": 400}
-    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, **options)
-    assert "gsplat, 3DGRUT and the original 3D Gaussian splatting do not" in capsys.readouterr().err
-    model = Colmap(folder / "sparse" / "0")
-    assert (model.model, model.parameters) == ("EQUIRECTANGULAR", [64, 32])
-    on_sphere(np.array([*model.positions.values()]), 1e-5)
-    assert not (folder / "masks").exists()
-    for number, (name, turn, shift) in model.images.items():
-        assert (folder / "images" / name).is_file()
-        rows = model.seen[number]
-        assert len(rows) > 100
-        local = np.array([model.positions[int(point)] for point in rows[:, 2]]) @ turn.T + shift
-        assert (local[:, 2] < 0).any()
-        # COLMAP's models.h: longitude grows to the right from the axis, latitude downwards.
-        x = (np.arctan2(local[:, 0], local[:, 2]) / (2 * math.pi) + 0.5) * 64
-        y = (np.arctan2(local[:, 1], np.hypot(local[:, 0], local[:, 2])) / math.pi + 0.5) * 32
-        np.testing.assert_allclose(rows[:, :2], np.column_stack([x, y]), atol=1e-6)
-
-
-def read_by_3dgrut(model):
-    """Return the angles in radians that 3DGRUT computes for pixels, and those that it projects.
-
-    Follows its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh.
-    The first are the angles (h, w) of pixels. The others are two rows: angles up to the largest,
-    and their radii in focal lengths.
-    """
-    width, height = map(int, model.size_and_parameters[:2])
-    fx, fy, cx, cy, *distortion = model.parameters
-    corner = math.hypot(max(cx, width - cx), max(cy, height - cy))
-    largest = max(corner / fx, corner / fy)
-    radius = np.polynomial.Polynomial([c for k in (1, *distortion) for c in (0, k)])
-    y, x = np.mgrid[:height, :width] + 0.5
-    seen = np.hypot((x - cx) / fx, (y - cy) / fy)
-    angles = seen * largest / max(width / 2 / fx, height / 2 / fy)
-    for _ in range(3):
-        angles = angles - (radius(angles) - seen) / radius.deriv()(angles)
-    projected = np.linspace(0, largest, 1000)
-    return angles, np.stack([projected, radius(projected)])
-
-
-TURNING = [0.02, -0.01, 0.003, -0.001]
-
-
-@pytest.mark.parametrize(
-    ("changed", "problem"),
-    [
-        ({"coefficients": TURNING}, "stops growing at 109.2°, but 3DGRUT reads it up to 121.5°"),
-        ({"coefficients": [0, 0, 0, 0]}, None),
-        ({"coefficients": [0.02, 0.01, 0, 0]}, None),
-        # Newton's method starts beyond the corner's angle, where the radius falls.
-        ({"coefficients": [0.021, -0.0043, -0.002, -0.0006], "fov": 174}, "stops growing at"),
-        ({"coefficients": TURNING, "focal_length": 40}, None),
-        ({"coefficients": [-0.1, 0, 0, 0], "focal_length": 24}, "draws nothing beyond 60.8°"),
-    ],
-)
-def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, problem):
-    camera = {
-        "lens": "kannala_brandt",
-        "focal_length": 12,
-        "fov": 160,
-        "resolution": [96, 96],
-        **changed,
-    }
-    write_views(tmp_path / "dataset", camera, {"type": "plane", "cameras": [2, 1], "size": 0.2})
-    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=50)
-    warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
-    assert [problem in line for line in warned] == [True] * (problem is not None)
-    rays = lenses.from_camera(camera).pixel_rays()
-    seen = np.isfinite(rays[..., 0])
-    true = np.arccos(-rays[..., 2][seen])
-    with np.errstate(all="ignore"):
-        angles, (projected, radii) = read_by_3dgrut(Colmap(folder / "sparse/0"))
-    off = np.abs(angles[seen] - true).max() > 0.01
-    unseen = projected > true.max() + 0.02
-    folds_in = (radii[unseen] < radii[~unseen].max() - 0.01).any()
-    cut = true.max() > projected.max()
-    assert (off or folds_in or cut) == (problem is not None)
-
-
-def test_colmaps_binary_model_equals_its_text_model(dataset, tmp_path):
-    text = exported(dataset, "colmap", "fisheye", tmp_path / "text", format="text", points=50)
-    binary = exported(dataset, "colmap", "fisheye", tmp_path / "binary", points=50)
-    model, folder = Colmap(text / "sparse" / "0"), binary / "sparse" / "0"
-    cameras = (folder / "cameras.bin").read_bytes()
-    assert np.frombuffer(cameras, "<u8", 1)[0] == 1
-    assert np.frombuffer(cameras, "<i4", 2, 8).tolist() == [1, 5]
-    assert np.frombuffer(cameras, "<u8", 2, 16).tolist() == [64, 60]
-    assert np.frombuffer(cameras, "<f8", -1, 32).tolist() == model.parameters
-    content, place = (folder / "images.bin").read_bytes(), 8
-    assert np.frombuffer(content, "<u8", 1)[0] == len(model.images)
-    for number, (name, turn, shift) in model.images.items():
-        assert np.frombuffer(content, "<i4", 1, place)[0] == number
-        values = np.frombuffer(content, "<f8", 7, place + 4)
-        np.testing.assert_allclose(
-            Rotation.from_quat(values[[1, 2, 3, 0]]).as_matrix(), turn, atol=1e-12
-        )
-        np.testing.assert_array_equal(values[4:], shift)
-        end = content.index(b"\0", place + 64)
-        assert content[place + 64 : end].decode() == name
-        count = int(np.frombuffer(content, "<u8", 1, end + 1)[0])
-        row = np.dtype([("pixel", "<f8", 2), ("point", "<i8")])
-        rows = np.frombuffer(content, row, count, end + 9)
-        np.testing.assert_array_equal(rows["pixel"], model.seen[number][:, :2])
-        np.testing.assert_array_equal(rows["point"], model.seen[number][:, 2])
-        place = end + 9 + count * row.itemsize
-    assert place == len(content)
-    content, place = (folder / "points3D.bin").read_bytes(), 8
-    assert np.frombuffer(content, "<u8", 1)[0] == len(model.positions)
-    for number, position in model.positions.items():
-        assert np.frombuffer(content, "<u8", 1, place)[0] == number
-        np.testing.assert_array_equal(np.frombuffer(content, "<f8", 3, place + 8), position)
-        assert list(content[place + 32 : place + 35]) == model.colours[number].tolist()
-        count = int(np.frombuffer(content, "<u8", 1, place + 43)[0])
-        track = np.frombuffer(content, "<i4", 2 * count, place + 51).reshape(-1, 2)
-        np.testing.assert_array_equal(track, model.tracks[number])
-        place += 51 + 8 * count
-    assert place == len(content)
-
-
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv"])
-def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path, source):
-    options = {"depth": True, "format": "text", "points": 50}
-    folder = exported(dataset, "colmap", source, tmp_path, **options)
-    model = Colmap(folder / "sparse" / "0")
-    size = "&".join(map(str, LENSES[source]["resolution"]))
-    for name, turn, shift in model.images.values():
-        content = (folder / "stereo/depth_maps" / f"{name}.geometric.bin").read_bytes()
-        assert content.startswith(f"{size}&1&".encode())
-        width, height = LENSES[source]["resolution"]
-        z = np.frombuffer(content[len(f"{size}&1&") :], "<f4").reshape(height, width)
-        row, column = np.nonzero(z)
-        assert len(row) > 1000
-        local = model.lift(np.stack([column, row], axis=-1) + 0.5, z[row, column])
-        on_sphere((local - shift) @ turn, 1e-5)
-
-
-def test_colmap_depth_maps_are_0_where_a_view_sees_the_sky(tmp_path):
-    def open_above(lens, matrix):
-        colour, distance = look(lens, matrix)
-        distance[: lens.height // 2] = np.inf
-        return colour, distance
-
-    folder = tmp_path / "dataset"
-    write_views(folder, LENSES["perspective"], RIG, see=open_above)
-    made = exported(folder, "colmap", "views", tmp_path, depth=True, points=50)
-    for path in sorted((made / "stereo/depth_maps").iterdir()):
-        z = np.frombuffer(path.read_bytes().removeprefix(b"64&48&1&"), "<f4").reshape(48, 64)
-        assert (z[:24] == 0).all()
-        assert ((z[24:] > 0.5) & (z[24:] < 2 * RADIUS)).all()
 
 
 def nerfstudio_rays(content):
@@ -694,13 +454,14 @@ def test_hci_is_for_regular_grids(dataset, tmp_path):
 
 def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path):
     folder = exported(dataset, "scannetpp", "fisheye", tmp_path, points=200)
-    model = Colmap(folder / "colmap")
-    assert model.parameters[4:] == [0, 0, 0, 0]
-    on_sphere(np.array([*model.positions.values()]), 1e-5)
-    for image, rows in model.seen.items():
-        places = np.array([model.positions[int(number)] for number in rows[:, 2]])
-        expected = model.project(places, *model.images[image][1:])
-        np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
+    model = pycolmap.Reconstruction(folder / "colmap")
+    (camera,) = model.cameras.values()
+    assert camera.params[4:].tolist() == [0, 0, 0, 0]
+    for image in model.images.values():
+        for seen in image.points2D:
+            place = model.points3D[seen.point3D_id].xyz
+            on_sphere(place, 1e-5)
+            np.testing.assert_allclose(image.project_point(place), seen.xy, atol=1e-6)
     lists = json.loads((folder / "train_test_lists.json").read_text())
     assert lists.pop("has_masks") is True
     assert {part: len(names) for part, names in lists.items()} == {"train": 10, "test": 2}
@@ -1108,40 +869,16 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     image = images.read_image(path)
     wall = {**image.channels, "Z": np.full_like(image.channels["Z"], 0.01)}
     images.write_exr(path, wall, {images.DEPTH_ATTRIBUTE: "z"})
-    folder = exported(tmp_path / "dataset", "colmap", "perspective", tmp_path, format="text")
-    model = Colmap(folder / "sparse" / "0")
-    number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
-    _, turn, shift = model.images[number]
+    folder = exported(tmp_path / "dataset", "colmap", "perspective", tmp_path)
+    model = pycolmap.Reconstruction(folder / "sparse" / "0")
+    (blocked,) = (image for image in model.images.values() if image.name == "view_0000f.png")
     # No other view sees the wall, so its points stay.
-    assert len(model.seen[number]) > 10
-    for index in model.seen[number][:, 2]:
-        assert model.tracks[int(index)][:, 0].tolist() == [number]
-        assert (turn @ model.positions[int(index)] + shift)[2] == pytest.approx(0.01, rel=1e-3)
-    assert all(len(rows) for rows in model.seen.values())
-
-
-def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
-    camera = {"lens": "rectilinear", "fov": 40, "resolution": [24, 24]}
-    write_views(tmp_path / "dataset", camera, {"type": "sphere", "subdivisions": 2, "size": 0.2})
-    sky = "view_0007f"
-    path = tmp_path / "dataset" / "exr" / f"{sky}.exr"
-    image = images.read_image(path)
-    nothing = {**image.channels, "Z": np.full_like(image.channels["Z"], np.inf)}
-    images.write_exr(path, nothing, {images.DEPTH_ATTRIBUTE: "z"})
-    # The views look in 42 directions, so four points are too few.
-    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=4)
-    model = Colmap(folder / "sparse" / "0")
-    assert len(model.images) == 42
-    for number, (name, turn, shift) in model.images.items():
-        rows = model.seen[number]
-        assert len(rows) > 0 or name == f"{sky}.png"
-        if len(rows):
-            places = np.array([model.positions[int(index)] for index in rows[:, 2]])
-            on_sphere(places, 1e-5)
-            np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
-    alone = sum(len(track) == 1 for track in model.tracks.values())
-    printed = capsys.readouterr().out
-    assert f"{len(model.positions)} points; only one view sees {alone} of them" in printed
+    assert len(blocked.points2D) > 10
+    for seen in blocked.points2D:
+        point = model.points3D[seen.point3D_id]
+        assert [element.image_id for element in point.track.elements] == [blocked.image_id]
+        assert (blocked.cam_from_world() * point.xyz)[2] == pytest.approx(0.01, rel=1e-3)
+    assert all(image.num_points3D for image in model.images.values())
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
@@ -1371,19 +1108,6 @@ def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dat
     refused = run_program("export.py", "colmap", *arguments, "--suffix", ".png", check=False)
     assert "--settings: excludes --suffix" in refused.stderr
     assert not (tmp_path / "made").exists()
-
-
-def test_a_text_model_may_have_no_points(tmp_path):
-    def sky(lens, _):
-        shape = (lens.height, lens.width)
-        return np.ones((*shape, 3)), np.full(shape, np.inf)
-
-    write_views(tmp_path / "dataset", LENSES["perspective"], RIG, see=sky)
-    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text")
-    model = Colmap(folder / "sparse" / "0")
-    assert len(model.images) == 12
-    assert not model.positions
-    assert (folder / "sparse/0/images.txt").read_text().endswith(".png\n\n")
 
 
 def test_points_come_from_views_with_sky_too():

@@ -2,10 +2,10 @@
 
 import json
 import shutil
-import struct
 
 import cv2
 import numpy as np
+import pycolmap
 import pytest
 from sphere import (
     BALL,
@@ -183,15 +183,8 @@ def test_pictures_without_alpha_show_transparent_views_in_front_of_black(tmp_pat
     assert np.abs(np.subtract(*np.array(shown, int))).max() <= 4
 
 
-def read_points3d(path):
-    """Return the positions (n, 3) of a points3D.txt."""
-    lines = [line.split() for line in path.read_text().splitlines() if not line.startswith("#")]
-    return np.array([line[1:4] for line in lines], float)
-
-
 def test_colmap_frames_have_the_same_names_and_the_points_of_their_frames(sequence, tmp_path):
-    options = {"points": 400, "format": "text"}
-    folder = exported(sequence / "split", "colmap_frames", tmp_path, **options)
+    folder = exported(sequence / "split", "colmap_frames", tmp_path, points=400)
     assert sorted(path.name for path in folder.glob("colmap_*")) == [
         "colmap_0",
         "colmap_1",
@@ -201,74 +194,50 @@ def test_colmap_frames_have_the_same_names_and_the_points_of_their_frames(sequen
     for place, number in enumerate(FRAMES):
         model = folder / f"colmap_{place}"
         names.add(tuple(sorted(path.name for path in (model / "images").iterdir())))
-        cameras = (model / "sparse/0/cameras.txt").read_text().split()
-        assert cameras[1] == "PINHOLE"
-        points = read_points3d(model / "sparse/0/points3D.txt")
+        read = pycolmap.Reconstruction(model / "sparse/0")
+        assert [camera.model_name for camera in read.cameras.values()] == ["PINHOLE"]
+        points = np.array([point.xyz for point in read.points3D.values()])
         on_sphere = np.abs(np.linalg.norm(points, axis=1) - RADIUS) < 1e-4
         on_ball = np.abs(np.linalg.norm(points - BALL, axis=1) - BALL_RADIUS) < 1e-4
         assert (on_sphere | on_ball).all()
         assert on_ball.any() == (FRAMES[number] is look_at_ball)
-        lines = (model / "sparse/0/images.txt").read_text().splitlines()[::2]
-        heads = {line.split()[9]: np.array(line.split()[1:8], float) for line in lines}
-        (first, *_) = sorted(heads)
-        assert first == "cam00.png"
-        w, x, y, z, *shift = heads[first]
-        turn = cv2.Rodrigues(2 * np.arccos(w) * np.array([x, y, z]) / np.sqrt(1 - w * w))[0]
+        for image in read.images.values():
+            for seen in image.points2D:
+                projected = image.project_point(read.points3D[seen.point3D_id].xyz)
+                np.testing.assert_allclose(projected, seen.xy, atol=1e-6)
+        first = read.find_image_with_name("cam00.png")
         views = source_of(sequence / "split").lightfield.views
-        nearest = min(views, key=lambda v: np.linalg.norm(v.position + turn.T @ shift))
+        nearest = min(views, key=lambda v: np.linalg.norm(v.position - first.projection_center()))
         assert nearest.split == "test"
-        np.testing.assert_allclose(nearest.position, -turn.T @ np.array(shift), atol=1e-9)
+        found = first.cam_from_world().inverse().matrix() * [1, -1, -1, 1]
+        np.testing.assert_allclose(found, nearest.world_from_camera[:3], atol=1e-12)
     assert len(names) == 1
-
-
-def read_cameras(model):
-    """Return width, height, and focal length of the camera of a binary model, and its images.
-
-    Images have rotation (3, 3) and translation (3,) from the world, by name.
-    """
-    content = (model / "cameras.bin").read_bytes()
-    count, number, kind, width, height, focal = struct.unpack_from("<QiiQQd", content)
-    assert (count, number, kind) == (1, 1, 1)
-    content = (model / "images.bin").read_bytes()
-    (count,) = struct.unpack_from("<Q", content)
-    place = 8
-    images_by_name = {}
-    for _ in range(count):
-        _, w, x, y, z, *shift, camera = struct.unpack_from("<i7di", content, place)
-        assert camera == 1
-        end = content.index(b"\0", place + 64)
-        (points,) = struct.unpack_from("<Q", content, end + 1)
-        turn = cv2.Rodrigues(2 * np.arccos(w) * np.array([x, y, z]) / np.sqrt(1 - w * w))[0]
-        images_by_name[content[place + 64 : end].decode()] = (turn, np.array(shift))
-        place = end + 9 + 24 * points
-    return width, height, focal, images_by_name
 
 
 @pytest.mark.parametrize("name", ["plain", "split"])
 def test_multipleview_has_the_frames_of_each_training_camera(sequence, tmp_path, name):
     folder = exported(sequence / name, "multipleview", tmp_path, points=300)
-    width, height, focal, cameras = read_cameras(folder / "sparse_")
-    assert [width, height] == FLAT["resolution"]
+    model = pycolmap.Reconstruction(folder / "sparse_")
+    (camera,) = model.cameras.values()
+    assert [camera.width, camera.height] == FLAT["resolution"]
     # 4DGaussians takes the first of the layouts that it knows, and this is the last one.
     for other in ("sparse", "transforms_train.json", "poses_bounds.npy", "dataset.json"):
         assert not (folder / other).exists()
     views = {tuple(v.position.round(9)): v for v in source_of(sequence / name).lightfield.views}
     # 4DGaussians takes a camera's number from between "image" and a suffix of four characters.
     seen = set()
-    for image, (turn, shift) in cameras.items():
-        camera = folder / f"cam{image[5:-4].zfill(2)}"
-        matrix = np.eye(4)
-        matrix[:3, :3] = turn.T @ np.diag([1, -1, -1])
-        matrix[:3, 3] = -turn.T @ shift
-        seen.add(views[tuple(matrix[:3, 3].round(9))].split)
-        assert len([*camera.iterdir()]) == len(FRAMES)
+    for image in model.images.values():
+        pictures = folder / f"cam{image.name[5:-4].zfill(2)}"
+        matrix = image.cam_from_world().inverse().matrix() * [1, -1, -1, 1]
+        seen.add(views[tuple(matrix[:, 3].round(9))].split)
+        assert len([*pictures.iterdir()]) == len(FRAMES)
         for number, frame in enumerate(FRAMES, 1):
-            picture = cv2.imread(str(camera / f"frame_{number:05}.jpg"))[..., ::-1]
-            assert_shows_its_frame(picture, frame, matrix, focal)
-    assert len(cameras) == (9 if name == "plain" else 5)
+            picture = cv2.imread(str(pictures / f"frame_{number:05}.jpg"))[..., ::-1]
+            assert_shows_its_frame(picture, frame, matrix, camera.focal_length_x)
+    assert len(model.images) == (9 if name == "plain" else 5)
     assert seen == ({None} if name == "plain" else {"train"})
     rows = np.load(folder / "poses_bounds_multipleview.npy")
-    assert rows.shape == (len(cameras), 17)
+    assert rows.shape == (len(model.images), 17)
     assert (rows[:, 15] < rows[:, 16]).all()
     assert (folder / "points3D_multipleview.ply").is_file()
 

@@ -5,10 +5,11 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pycolmap
 import pytest
 from checkouts import checkout, planned
 from pydantic import TypeAdapter
-from test_exports import RADIUS, VIEWS, Colmap, ply, write_views
+from test_exports import RADIUS, VIEWS, ply, write_views
 
 from lightfield import export
 from lightfield.configuration import scene_yaml
@@ -234,7 +235,7 @@ def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
     assert (folder / "sparse/0/test.txt").read_text().split() == [
         f"along_view_000{i}f.png" for i in range(4)
     ]
-    assert len(Colmap(folder / "sparse/0").images) == 12
+    assert len(pycolmap.Reconstruction(folder / "sparse/0").images) == 12
 
 
 def test_points_come_only_from_the_training_views(scene, tmp_path):

@@ -37,6 +37,8 @@ ACTIVE = {
     followers.driver_of_the_context: "Driven",
     followers.active_camera: "Turned",
     followers.culled: "Culled",
+    followers.follow_track: "Tracked",
+    followers.object_solver: "Tracked",
 }
 ALL = BY_NAME | ACTIVE
 # The first view has the pose of the file's camera.
@@ -205,6 +207,29 @@ def test_what_the_viewport_hides_is_found_and_what_nothing_follows_is_not_named(
     made = dataset(tmp_path / "plain.blend", tmp_path / "plain", followed_camera="view")
     assert "follow" not in made.said
     assert "followed_camera" not in made.lightfield.scene
+
+
+@pytest.mark.slow
+def test_a_muted_link_from_the_active_camera_stays_muted(tmp_path):
+    path = tmp_path / "scene.blend"
+    made = dataset(path, tmp_path, followers.muted)
+    assert "Turned follow the file's camera in all views" in made.said
+    for view, picture in zip(made.lightfield.views, made.pictures, strict=True):
+        expected = of_blender_itself(path, view, freeze_and_look_elsewhere)
+        assert difference(picture, expected) < EQUAL
+
+
+@pytest.mark.slow
+def test_outlines_can_be_kept_at_the_files_camera(tmp_path):
+    for choice, said in (
+        ("file", "the file's camera in all views"),
+        ("view", "each view's camera"),
+    ):
+        folder = tmp_path / choice
+        folder.mkdir()
+        made = dataset(folder / "scene.blend", folder, followers.line_art, followed_camera=choice)
+        assert f"Lines follows {said}" in made.said
+        assert made.lightfield.scene["followed_camera"] == choice
 
 
 @pytest.mark.slow

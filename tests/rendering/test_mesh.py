@@ -95,6 +95,9 @@ def read_glb(path):
         vertices = values(primitive["attributes"]["POSITION"], "<f4", 3).astype(np.float64)
         corners = values(primitive["indices"], "<u4", 3)
         matrix = np.reshape(node["matrix"], (4, 4)).T
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            # glTF 2.0, 3.7.4: a matrix that mirrors also turns the faces.
+            corners = corners[:, ::-1]
         world = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T
         assert node["name"] not in triangles
         triangles[node["name"]] = world[corners]
@@ -186,7 +189,21 @@ def test_a_glb_has_the_triangles_of_the_ply_with_y_up(scene):
 def volumes(triangles):
     """Return the signed volume that triangles enclose. An inverted mesh has the opposite sign."""
     a, b, c = np.moveaxis(triangles, 1, 0)
-    return abs(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
+def test_faces_look_outwards_also_where_a_matrix_mirrors_or_shears(scene):
+    triangles, owners = read_ply(scene / "mesh/scene.ply")
+    in_glb = read_glb(scene / "mesh/scene.glb")
+    mirrored = set()
+    for number, entry in enumerate(objects_of(scene)["objects"]):
+        if entry["original"] == "floor":
+            continue  # A plane encloses nothing.
+        assert volumes(triangles[owners == number]) > 0
+        assert volumes(in_glb[entry["name"]]) > 0
+        if np.linalg.det(entry["matrix"]) < 0:
+            mirrored.add(entry["original"])
+    assert mirrored == {"prop", "other prop", "sheared"}
 
 
 def test_a_box_is_the_tightest_along_its_axes_and_holds_what_the_views_show(scene):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import SMALL_WALK, error_listeners
 from PIL import Image
-from sphere import BALL, RADIUS, RED, look, look_at_ball, write_views
+from sphere import BALL, BALL_RADIUS, RADIUS, RED, look, look_at_ball, write_views
 
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
@@ -490,6 +490,57 @@ def test_other_modes_show_something_else(shared_tab, mode):
     if mode == "depth":
         # The ball, ahead, is nearer than its surroundings.
         assert np.abs(other[HEIGHT // 2, WIDTH // 2] - other[HEIGHT // 2, 5]).max() > 0.1
+
+
+def press(opened, name):
+    """Press the walk's button with a name."""
+    opened.locator("#walk-controls").get_by_role("button", name=name, exact=True).click()
+
+
+def palette_of(opened):
+    """Return the colours (256, 3), 0 to 255, of the page's scale of depths, from near to far."""
+    data = opened.evaluate(
+        "[...element('depth-bar').getContext('2d').getImageData(0, 0, 256, 1).data]"
+    )
+    return np.reshape(data, (256, 4))[:, :3]
+
+
+def test_depth_has_the_colours_of_the_pages_scale(shared_tab):
+    opened = shared_tab()
+    ticks = [
+        float(text.split()[0]) for text in opened.locator("#depth-ticks span").all_inner_texts()
+    ]
+    assert ticks == sorted(ticks)
+    palette = palette_of(opened)
+    press(opened, "Depth")
+    # The ball is ahead of the middle of the rig, and the sphere behind it.
+    for yaw, distance in ((0, BALL[1] - BALL_RADIUS), (math.pi, RADIUS)):
+        middle = look_from(opened, [0, 0, 0], yaw, 0)[HEIGHT // 2, WIDTH // 2]
+        place = np.interp(math.log(distance), np.log(ticks), np.linspace(0, 255, len(ticks)))
+        np.testing.assert_allclose(255 * middle, palette[round(place)], atol=8)
+
+
+def test_holes_are_pink_and_sources_have_the_colour_of_their_number(tmp_path, show):
+    rig = {"type": "plane", "cameras": [2, 2], "size": 0.2}
+    opened = show(written_page(tmp_path / "dataset", NARROW, rig, look))
+    wait(opened)
+    at = opened.evaluate("walk.at")
+    palette = palette_of(opened)
+    # The eye sees more than the views. They all show the middle, and nothing of what is behind.
+    press(opened, "Holes")
+    holes = look_from(opened, at, 0, 0)
+    assert np.ptp(holes[HEIGHT // 2, WIDTH // 2]) < 0.02
+    assert holes[2, 2] == pytest.approx([1, 0, 0.8], abs=0.01)
+    assert look_from(opened, at, math.pi, 0).reshape(-1, 3) == pytest.approx(
+        np.tile([1, 0, 0.8], (WIDTH * HEIGHT, 1)), abs=0.01
+    )
+    press(opened, "Sources")
+    sources = look_from(opened, at, 0, 0)
+    assert 255 * sources[HEIGHT // 2, WIDTH // 2] == pytest.approx(palette[-1], abs=4)
+    assert sources[2, 2] == pytest.approx([0, 0, 0], abs=0.01)
+    # Near the edge of what the views show, fewer of them show it.
+    row = 255 * sources[HEIGHT // 2]
+    assert (np.abs(row[:, None] - palette[100:160]).max(axis=-1) < 8).any()
 
 
 def test_a_thousand_frames_leak_nothing(shared_tab):

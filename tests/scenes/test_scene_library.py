@@ -107,6 +107,26 @@ def test_copies_point_forward_and_keep_their_slots():
     assert slots.tolist() == [1, 2, 2, 1, 2, 2]  # quads first
 
 
+def test_each_copy_keeps_the_slot_of_each_face():
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 1, 1)], float)
+    slot_of = {(0, 1, 2, 3): 5, (1, 2, 3, 0): 6, (0, 1, 4): 7, (2, 3, 4): 8}
+    faces = facets(corners, *slot_of)
+    house = faces._replace(slots=np.array([*slot_of.values()]))
+    made = copies(house, [(0, 0, 0), (9, 0, 0), (0, 9, 0)])
+    copied = [*made.quads.tolist(), *made.triangles.tolist()]
+    for face, slot in zip(copied, made.face_slots(), strict=True):
+        assert slot_of[tuple(corner % len(corners) for corner in face)] == slot
+    assert len(copied) == 12
+
+
+def test_each_copy_has_its_own_size_along_each_of_its_axes():
+    arrow = facets([(0, 0, 0), (1, 0, 0), (1, 1, 1)], (0, 1, 2))
+    # The +X axis of a copy points to -Y, and its +Y axis to +X.
+    made = copies(arrow, [(10, 0, 0), (0, 20, 0)], forward=(1, 0, 0), size=[(2, 3, 4), (5, 6, 7)])
+    assert made.vertices[[1, 2]] == pytest.approx(np.array([(10, -2, 0), (13, -2, 4)]))
+    assert made.vertices[[4, 5]] == pytest.approx(np.array([(0, 15, 0), (6, 15, 7)]))
+
+
 def test_frames_are_rotations():
     random = np.random.default_rng(1)
     turns = frames(random.normal(size=(20, 3)), random.normal(size=(20, 3)))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
+from mathutils import Matrix
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE
@@ -38,7 +39,7 @@ def followers(choice: str) -> dict[str, list[str]]:
     # A new object also makes Blender look for all relations again.
     scene.collection.objects.link(view_camera)
     by_name = sorted({name for camera in cameras for name in _changed_with(camera)})
-    active = _changed_with(view_camera)
+    active = list(_changed_with(view_camera))
     if active and choice == FILE:
         if file_camera is None:
             raise UserError(
@@ -46,7 +47,7 @@ def followers(choice: str) -> dict[str, list[str]]:
                 "it one, or let them follow each view's camera: scene: {followed_camera: view}"
             )
         freeze(file_camera)
-        if moving := _changed_with(view_camera):
+        if moving := _moved_with(view_camera):
             raise UserError(
                 f"{_listed(moving)}: would follow each view's camera, and each view would show "
                 "another scene; change that in Blender, or allow it: "
@@ -100,14 +101,19 @@ def _show_in_viewport() -> None:
     viewport.show_collections()
 
 
-def _changed_with(camera: Any) -> list[str]:
-    """Return the names of the blocks that Blender evaluates anew after a camera has changed."""
-    names: set[str] = set()
+def _changed_with(camera: Any) -> dict[str, bool]:
+    """Return the blocks that Blender evaluates anew after a camera has changed, by their names.
+
+    The value says whether Blender evaluates the place of an object alone, and not its mesh.
+    """
+    blocks: dict[str, bool] = {}
 
     def note(_: Any, depsgraph: Any) -> None:
-        names.update(
-            str(update.id.original.name_full) for update in depsgraph.updates if _is_shown(update)
-        )
+        for update in depsgraph.updates:
+            if _is_shown(update):
+                name = str(update.id.original.name_full)
+                is_place = update.is_updated_transform and not update.is_updated_geometry
+                blocks[name] = is_place and blocks.get(name, True)
 
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_post.append(note)
@@ -118,7 +124,28 @@ def _changed_with(camera: Any) -> list[str]:
         bpy.context.view_layer.update()
     finally:
         bpy.app.handlers.depsgraph_update_post.remove(note)
-    return sorted(names)
+    return dict(sorted(blocks.items()))
+
+
+def _moved_with(camera: Any) -> list[str]:
+    """Return the names of the blocks that are others if a camera is elsewhere. Move the camera.
+
+    Blender evaluates what follows a film anew with the active camera, even if its constraint names
+    another one. So an object of which only the place is evaluated counts only if it moves.
+    """
+    blocks = _changed_with(camera)
+    placed = [name for name, is_place in blocks.items() if is_place]
+    before = [_place(name) for name in placed]
+    camera.matrix_world = Matrix.Translation((3, 4, 5)) @ Matrix.Rotation(1, 4, (1, 2, 3))
+    bpy.context.view_layer.update()
+    stays = {name for name, place in zip(placed, before, strict=True) if _place(name) == place}
+    return [name for name in blocks if name not in stays]
+
+
+def _place(name: str) -> Any:
+    """Return where the object with a full name is."""
+    (obj,) = (obj for obj in bpy.data.objects if obj.name_full == name)
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
 
 
 def _is_shown(update: Any) -> bool:
