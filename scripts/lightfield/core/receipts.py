@@ -324,7 +324,8 @@ class OpenReceipt:
             self._read_before |= maker.inputs if maker else {}
         self.inputs[name] = self._sum_of_input(name)
         for each in self.inputs.keys() & self._read_before.keys():
-            if not is_receipt(each) and self.inputs[each] != self._read_before[each]:
+            is_of_user = not is_receipt(each) and self._made(each) is None
+            if is_of_user and self.inputs[each] != self._read_before[each]:
                 raise changed_since_plan(each)
 
     def _sum_of_input(self, name: str) -> str | None:
