@@ -185,6 +185,11 @@ EXPLAINED_TEXTS = [
         ":2:12: render.samples: is a number with too many digits",
     ),
     (
+        # The smallest that is larger than any float.
+        f"render:\n  samples: 0x1{'0' * 256}\n",
+        ":2:12: render.samples: is a number with too many digits",
+    ),
+    (
         'description: "a \\ud800"\n',
         ":1:14: description: has '\\ud800', half of a character",
     ),

@@ -38,6 +38,13 @@ LENSES = {
     "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
     "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
     "half": {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]},
+    # Neither side of it mirrors the other.
+    "left": {
+        "lens": "equirectangular",
+        "longitude": [-130, 50],
+        "latitude": [-40, 70],
+        "resolution": [36, 22],
+    },
 }
 
 

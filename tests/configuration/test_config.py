@@ -524,3 +524,18 @@ def test_a_drawn_value_has_its_line_in_the_family(tmp_path):
     )
     with pytest.raises(UserError, match=r"rooms\.yaml:8: render\.samples: is 0"):
         scene_yaml.read_scene(file)
+
+
+@pytest.mark.parametrize(("pixels", "width"), [(64, 256), (1024, 4096), (2048, 4096)])
+def test_the_pages_panorama_has_twice_the_angular_resolution_of_the_views(pixels, width):
+    """So a degree of it has twice the pixels of a degree of the fisheye, up to a limit."""
+    rig = {"type": "plane", "cameras": [2, 1], "size": 1}
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [pixels, pixels]}
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 1},
+        "rigs": {"View": rig | {"camera": camera}},
+    }
+    scene = scene_yaml.Scene.model_validate(content)
+    (dataset,) = datasets_of("tried", scene, "full", Preset(), {})
+    assert dataset.panorama_width == width

@@ -47,7 +47,7 @@ PUBLISHED = {
     },
 }
 OF = {
-    "colmap": ("perspective", "shifted", "fisheye", "opencv", "panorama"),
+    "colmap": ("opencv",),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
     "lichtfeld": ("perspective", "shifted", "fisheye", "panorama"),
     "ncore": ("perspective", "shifted", "fisheye", "wide"),
@@ -57,8 +57,6 @@ OF = {
 FRAMES = {1: look, 2: look_at_ball, 5: look_at_ball}
 SEQUENCE = {
     "dnerf": {"points": 20000},
-    "colmap_frames": {"points": 20000},
-    "multipleview": {"points": 20000},
     "neural_3d_video": {"points": 20000},
 }
 
@@ -132,8 +130,8 @@ def main() -> None:
     for kind, sources in OF.items():
         for name in sources:
             options = {"sources": [name], "points": 40000}
-            # COLMAP and LichtFeld have no depth maps of panoramas.
-            is_panorama = kind != "nerfstudio" and name == "panorama"
+            # LichtFeld has no depth maps of panoramas.
+            is_panorama = kind == "lichtfeld" and name == "panorama"
             if kind != "ncore" and not is_panorama:
                 options["depth"] = True
             settings = settings_of(kind).model_validate(options)

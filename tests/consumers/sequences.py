@@ -1,8 +1,4 @@
-"""Reads the exports of a sequence: D-NeRF with nerfstudio, COLMAP's with pycolmap, and videos.
-
-4DGaussians and SpacetimeGaussians are no packages. What follows here is how their readers find
-pictures, poses and times.
-"""
+"""Reads the exports of a sequence: D-NeRF with nerfstudio, and videos with OpenCV."""
 
 import json
 
@@ -10,8 +6,6 @@ import cv2
 import numpy as np
 
 RADIUS = 3.0
-# From a camera that looks along z to OpenGL's.
-FLIP = np.diag([1, -1, -1])
 
 
 def shows(picture, frame, rotation, position, focal):
@@ -38,18 +32,10 @@ def shows(picture, frame, rotation, position, focal):
     return errors[~near_ball].max()
 
 
-def pose_of(image):
-    """Return the camera-to-world rotation and the position of an image of pycolmap."""
-    matrix = image.cam_from_world().inverse().matrix()
-    return matrix[:, :3] @ FLIP, matrix[:, 3]
-
-
 def check(folder):
     times = sorted(int(path.name[1:]) for path in folder.glob("f[0-9]*"))
     times = [(time - times[0]) / (times[-1] - times[0]) for time in times]
     dnerf(folder / "exports/dnerf", times)
-    colmap_frames(folder / "exports/colmap_frames", len(times))
-    multipleview(folder / "exports/multipleview", len(times))
     if (folder / "exports/neural_3d_video").exists():
         neural_3d_video(folder / "exports/neural_3d_video", len(times))
 
@@ -74,57 +60,6 @@ def dnerf(folder, times):
         counts.append(len(outputs.image_filenames))
     print(f"nerfstudio, dnerf: {counts} pictures, colours within {levels:.1f} levels")
     assert levels < 3
-
-
-def colmap_frames(folder, count):
-    import pycolmap
-
-    levels, names = 0.0, set()
-    for frame in range(count):
-        model = pycolmap.Reconstruction(folder / f"colmap_{frame}" / "sparse" / "0")
-        (camera,) = model.cameras.values()
-        for image in model.images.values():
-            picture = cv2.imread(str(folder / f"colmap_{frame}" / "images" / image.name))[..., ::-1]
-            levels = max(
-                levels, shows(picture.astype(float), frame, *pose_of(image), camera.params[0])
-            )
-        names.add(tuple(sorted(image.name for image in model.images.values())))
-        distances = [np.linalg.norm(point.xyz) for point in model.points3D.values()]
-        assert max(distances) < RADIUS + 1e-4
-        assert (min(distances) < RADIUS - 1e-4) == (frame > 0)
-    (image_names,) = names
-    assert image_names[0] == "cam00.png"
-    print(
-        f"pycolmap {pycolmap.__version__}, colmap_frames: {count} models of {len(image_names)} "
-        f"images, colours within {levels:.1f} levels"
-    )
-    assert levels < 3
-
-
-def multipleview(folder, count):
-    import pycolmap
-
-    # pycolmap reads the model without its place in 4DGaussians' folders.
-    model = pycolmap.Reconstruction(folder / "sparse_")
-    camera = model.cameras[1]
-    rows = np.load(folder / "poses_bounds_multipleview.npy")
-    levels = 0.0
-    for image in model.images.values():
-        pictures = folder / f"cam{image.name[5:-4].zfill(2)}"
-        rotation, position = pose_of(image)
-        np.testing.assert_allclose(
-            rows[image.image_id - 1, :15].reshape(3, 5)[:, 3], position, atol=1e-9
-        )
-        for frame in range(count):
-            picture = cv2.imread(str(pictures / f"frame_{frame + 1:05d}.jpg"))[..., ::-1]
-            error = shows(picture.astype(float), frame, rotation, position, camera.params[0])
-            levels = max(levels, error)
-        assert len([*pictures.iterdir()]) == count
-    print(
-        f"pycolmap {pycolmap.__version__}, multipleview: {len(model.images)} cameras with {count} "
-        f"frames, colours within {levels:.1f} levels"
-    )
-    assert levels < 8
 
 
 def neural_3d_video(folder, count):

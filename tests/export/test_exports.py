@@ -274,7 +274,9 @@ def opengl_points(camera, depth):
     return np.stack([x, y, z], axis=-1) * depth[..., None] @ turn.T + camera["Position"]
 
 
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide", "panorama"])
+@pytest.mark.parametrize(
+    "source", ["perspective", "shifted", "fisheye", "wide", "panorama", "left"]
+)
 def test_opendibr_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
     folder = exported(dataset, "opendibr", source, tmp_path)
     content = json.loads((folder / "cameras.json").read_text())
@@ -297,7 +299,7 @@ def test_opendibr_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_allclose(rgb[seen], expected[seen], atol=1)
 
 
-@pytest.mark.parametrize("source", ["perspective", "shifted", "panorama", "half"])
+@pytest.mark.parametrize("source", ["perspective", "shifted", "panorama", "half", "left"])
 def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
     folder = exported(dataset, "miv", source, tmp_path)
     content = json.loads((folder / "sequence.json").read_text())
@@ -916,6 +918,24 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
     listed = {"files": {"../../../../outside.txt": sha256(outside)}}
     (target / "export.json").write_text(json.dumps(listed))
     assert "outside.txt is not a file of the dataset" in checked()[2].problems[0]
+
+
+def test_depth_of_views_without_it_is_an_error_that_says_how_to_get_it(dataset):
+    source = SourceDataset(dataset, "png", ".png")
+    with pytest.raises(
+        UserError, match=r"view_0000f.png: has no depth; reproject with format: exr"
+    ):
+        source.depth(source.lightfield.views[0], "z")
+
+
+def test_a_fisheye_with_no_pixel_on_its_axis_is_exported_for_nerfstudio():
+    content = {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1},
+        "rigs": {"LF": EVEN_PLANE | {"camera": VIEWS | {"resolution": [65, 64]}}},
+        "exports": {"nerfstudio": {"sources": ["views"]}},
+    }
+    assert TypeAdapter(Scene).validate_python(content).exports.nerfstudio
 
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):

@@ -205,6 +205,10 @@ def test_colmap_frames_have_the_same_names_and_the_points_of_their_frames(sequen
             for seen in image.points2D:
                 projected = image.project_point(read.points3D[seen.point3D_id].xyz)
                 np.testing.assert_allclose(projected, seen.xy, atol=1e-6)
+            picture = cv2.imread(str(model / "images" / image.name))[..., ::-1]
+            matrix = image.cam_from_world().inverse().matrix() * [1, -1, -1, 1]
+            (camera,) = read.cameras.values()
+            assert_shows_its_frame(picture, number, matrix, camera.focal_length_x)
         first = read.find_image_with_name("cam00.png")
         views = source_of(sequence / "split").lightfield.views
         nearest = min(views, key=lambda v: np.linalg.norm(v.position - first.projection_center()))

@@ -15,6 +15,7 @@ from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses, rigs, rotations
 from lightfield.workflow.loading import scene_datasets
 
@@ -373,3 +374,14 @@ def test_settings_do_not_change_when_a_job_records_the_checksum_of_a_blend(
     # The job looks it up when it runs.
     for planned in (before, after):
         assert planned.capture.source.sha256 == "a" * 64
+
+
+@pytest.mark.parametrize("group", ["", "..", "a/b", "a\n", "-a"])
+def test_a_pass_whose_name_is_no_folder_is_refused(group: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="passes"):
+        _ = read(tmp_path, content(passes=[f"Combined_{group}"])).passes
+
+
+@pytest.mark.parametrize("name", PASSES)
+def test_a_pass_has_the_bytes_of_its_numbers(name: str) -> None:
+    assert PASSES[name].bytes == len(PASSES[name].channels) * np.dtype(PASSES[name].dtype).itemsize

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from skimage.color import xyz2rgb
 
+from lightfield.imaging import pictures
 from lightfield.imaging.primaries import PRIMARIES, from_rec_709, to_rec_709
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, to_16_bit, tone_map
 
@@ -76,3 +77,11 @@ def test_16_bit_codes_are_the_nearest_ones(beside):
 def test_values_out_of_range_are_clipped():
     values = np.array([-1.0, -0.0, 1.0, 7.0, np.inf, -np.inf, np.nan], np.float32)
     assert to_8_bit(values).tolist() == [0, 0, 255, 255, 255, 0, 0]
+
+
+def test_pictures_are_white_from_five_times_the_middle_on():
+    grey = np.array([[0, 1, 4, 5, 9]], np.float32)[..., None].repeat(3, axis=-1)
+    # v (1 + v / 25) / (1 + v) and sRGB's curve, by hand.
+    expected = [0, 191, 247, 255, 255]
+    assert pictures.develop(grey, 0)[0, :, 1].tolist() == pytest.approx(expected, abs=1)
+    assert pictures.develop(grey / 2, 1)[0, :, 1].tolist() == pytest.approx(expected, abs=1)

@@ -432,3 +432,12 @@ def test_axe_finds_no_fault_in_a_page_of_errors(dataset, tmp_path, run_program, 
     tab = show(tmp_path / "index.html", width)
     assert accessibility.faults(tab) == []
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_mean_is_over_the_views_that_have_a_number():
+    rows = [
+        {"view": "a", "region": "all", "psnr": 20.0, "depth": None, "normal": None},
+        {"view": "b", "region": "all", "psnr": 30.0, "depth": 0.5, "normal": None},
+    ]
+    (mean,) = evaluation.means(rows)
+    assert mean == {"view": "mean", "region": "all", "psnr": 25.0, "depth": 0.5, "normal": None}

@@ -1,13 +1,16 @@
 """Errors of images, compared with known noise, other programs, and calculations by hand."""
 
+from dataclasses import replace
+
 import cv2
 import flip_evaluator
 import numpy as np
 import pytest
+from scipy import stats
 from skimage.metrics import structural_similarity
 
 from lightfield.geometry import lenses
-from lightfield.measurement import metrics
+from lightfield.measurement import metrics, summaries
 from lightfield.measurement.effort import Line, fit, interpolated
 from lightfield.measurement.picture_difference import (
     TO_YCBCR,
@@ -17,6 +20,7 @@ from lightfield.measurement.picture_difference import (
     ssim_map,
     ws_psnr,
 )
+from lightfield.planning.sampling import standard_error
 
 SIZE = 64
 MASK = np.hypot(*(np.mgrid[:SIZE, :SIZE] + 0.5 - SIZE / 2)) < SIZE / 2
@@ -328,3 +332,39 @@ def test_ws_psnr_and_iv_psnr_are_those_of_qmiv(name):
         assert measured == pytest.approx(expected, abs=0.01)
     counted = np.ones((height, width), bool)
     assert iv_psnr(truth, shown, counted, weights) == pytest.approx(of_shifts, abs=0.02)
+
+
+def test_only_the_chosen_part_of_the_pixels_with_a_ray_counts():
+    truth = scene()
+    whole = reference(truth, 0.01, 4)
+    left = np.zeros((SIZE, SIZE), bool)
+    left[:, : SIZE // 2] = True
+    image = noisy(truth, 0.03, 5)
+    spoilt = np.where((left & MASK)[..., None], image, np.float32(9))
+    part = replace(whole, part=left)
+    assert metrics.relative_mse(spoilt, part) == metrics.relative_mse(image, part)
+    assert metrics.relative_mse(spoilt, whole) > 100 * metrics.relative_mse(image, whole)
+
+
+def test_a_standard_error_is_the_one_of_scipy():
+    values = [1.0, 3.0, 4.0, 9.0]
+    assert standard_error(values) == pytest.approx(stats.sem(values))
+    assert standard_error(values[:1]) == 0
+
+
+def test_means_over_views_count_each_by_its_part_of_the_region():
+    columns = dict.fromkeys(summaries.MEANS, 0)
+    rows = [
+        {"truth": "a", "variant": "all", "value": "", "region": region, "part": part}
+        | columns
+        | {"psnr": psnr}
+        for region, part, psnr in (
+            ("all", 1, 10),
+            ("rim", 0.75, 20),
+            ("all", 1, 10),
+            ("rim", 0.25, 40),
+        )
+    ]
+    (mean,) = summaries.means(rows, "rim")
+    assert mean["psnr"] == pytest.approx((3 * 20 + 40) / 4)
+    assert mean["part"] == 0.5

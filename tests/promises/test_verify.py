@@ -110,6 +110,14 @@ def problems_of(folder):
     return bookkeeping.problems([folder], work=None)
 
 
+def test_a_copy_that_lacks_its_validation_is_named_in_one_line(one_view):
+    sums = one_view / SUMS
+    listed = [line.split("  ")[1] for line in sums.read_text().splitlines()]
+    (one_view / "validation.json").unlink()
+    write_checksums(one_view, [name for name in listed if name != "validation.json"])
+    assert problems_of(one_view) == {str(sums): "has no checksum of validation.json"}
+
+
 def test_a_copys_own_lists_must_agree(one_view):
     right = (one_view / "validation.json").read_text()
     put(one_view / "validation.json", {"valid": False})

@@ -113,3 +113,16 @@ def test_a_list_of_views_that_no_camera_sees_is_refused(turn, problem, tmp_path)
         LightField.from_json(content, tmp_path / "lightfield.json")
     place = f"{tmp_path}/lightfield.json: frames[1]: world_matrix: "
     assert str(refusal.value).startswith(place + problem)
+
+
+@pytest.mark.parametrize(("frames", "depth_of_field"), [((1, 1), False), (None, True)])
+def test_a_scene_without_the_camera_that_views_take_is_refused(frames, depth_of_field, tmp_path):
+    def without_camera():
+        import bpy
+
+        bpy.data.objects.remove(bpy.context.scene.camera)
+
+    path = tmp_path / "empty.blend"
+    save(path, blend_scenes.studio, without_camera)
+    with pytest.raises(UserError, match="has no camera"):
+        inventory_of_path(path, frames, depth_of_field)

@@ -98,6 +98,38 @@ def test_a_damaged_file_is_refused_by_its_name(name, damage, folder, listed):
     assert damage == text or problem in error
 
 
+@pytest.mark.parametrize("name", ["mdd", "pc2", "external"])
+def test_a_file_that_lacks_its_last_byte_is_refused(name, folder, listed):
+    file = folder / FILES[name][0]
+    file.write_bytes(file.read_bytes()[:-1])
+    assert "is cut short" in listed(name)
+
+
+def test_a_damaged_file_of_a_library_in_another_folder_is_refused(folder, listed):
+    """The library names it by its own place, and its suffix does not tell what it is."""
+    import bpy
+
+    (folder / "library").mkdir()
+    content = (folder / "ies.ies").read_bytes()
+    (folder / "library/lamp.profile").write_bytes(cut(content))
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "ies.blend"))
+    (spot,) = (obj for obj in bpy.data.objects if obj.type == "LIGHT" and obj.data.type == "SPOT")
+    name, lamp = spot.name, spot.data
+    (node,) = (each for each in lamp.node_tree.nodes if each.bl_idname == "ShaderNodeTexIES")
+    node.filepath = "//lamp.profile"
+    library = str(folder / "library/lamps.blend")
+    bpy.data.libraries.write(library, {spot})
+    bpy.data.objects.remove(spot)
+    bpy.data.lights.remove(lamp)
+    with bpy.data.libraries.load(library, link=True, relative=True) as (_, wanted):
+        wanted.objects = [name]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "main.blend"))
+    error = listed("main")
+    assert "the light profile " in error
+    assert "is cut short" in error
+
+
 @pytest.mark.parametrize(
     ("name", "shown", "other"),
     [

@@ -95,3 +95,20 @@ def test_a_scene_that_is_too_small_is_warned_of(folder, run_program, tmp_path):
     places = [(0, -800, 0), (1, -800, 0)]
     (warning,) = checked(folder, run_program, "box", places, tmp_path / "small")
     assert "the scene covers at most" in warning and "800 m from its middle" in warning
+
+
+@pytest.mark.slow
+def test_a_camera_is_as_clear_as_its_nearest_surface_is_far():
+    """A hollow ball around all has a box that holds the cameras, too."""
+    import bpy
+
+    from lightfield.rendering import blend_file, clearance
+
+    blend_file.new_scene()
+    for name, radius in (("a", 3), ("b", 0.5), ("c", 4)):
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=radius)
+        bpy.context.object.name = name
+    bpy.context.view_layer.update()
+    found = clearance.surroundings(np.array([[0.9, 0, 0], [0, 0, 2.8], [0, 3.6, 0]]), 10.0)
+    assert found.distances == pytest.approx([0.4, 0.2, 0.4], abs=0.02)
+    assert found.box == pytest.approx(np.array([[-4] * 3, [4] * 3]), abs=0.02)

@@ -537,8 +537,10 @@ def test_each_face_of_a_cube_map_has_a_file_for_its_lens_map(dataset, run, run_p
     run_program("lens_map.py", maps / "lens.npy", *flags)
     assert names(maps) == sorted(f"lens_{face}.npy" for face in CUBE_FACES)
     use = ["--lens-map", str(maps / "lens.npy"), "--png", "--filter-prefix", "view_0000f"]
-    run(*flags, *use, configs=False)
+    receipt = dataset / "receipts/cube.jsonl"
+    run(*flags, *use, "--receipt", str(receipt), configs=False)
     assert names(dataset / "out") == sorted(f"view_0000f_{face}.png" for face in "flrud")
+    assert {str(file) for file in maps.iterdir()} <= receipts.read(receipt).inputs.keys()
 
 
 def test_a_warning_is_printed_once(dataset, run, capsys):

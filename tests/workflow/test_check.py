@@ -58,6 +58,26 @@ def test_a_changed_setting_input_or_version_makes_a_job_outdated(folder):
     assert verdict(path, samples=4).outdated == ["scene.yaml"]
 
 
+def test_a_job_that_did_not_read_a_file_that_it_now_must_read_is_outdated(folder):
+    for name in ("scene.yaml", "places.json"):
+        Path(name).write_text(name)
+    path = make("a", "[]", ["scene.yaml"])
+    jobs = JobCheck(Path("work"), Path("results"), lambda _: {}, {"stage": 1})
+    assert jobs.verdict(path, {}, ["scene.yaml", "places.json"]).outdated == ["places.json"]
+
+
+def test_a_newer_receipt_is_a_reason_to_run_only_if_its_job_runs(folder):
+    first = make("a", "[1]")
+    second = make("b", "[2]", [first])
+    later = Path("results/scene/b.json").stat().st_mtime + 60
+    os.utime(first, (later, later))
+    for wanted, is_only_newer in (({}, True), ({"quality": 2}, False)):
+        settings = {first: wanted, second: {}}
+        jobs = JobCheck(Path("work"), Path("results"), settings.get, {"stage": 1})
+        assert jobs.verdict(second, {}).is_fine
+        assert jobs.is_only_newer(second, first) == is_only_newer
+
+
 def test_an_equal_remake_changes_nothing_behind_it(folder):
     first = make("a", "[1]")
     second = make("b", "[2]", [first])

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lightfield.core import receipts
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_bytes, write_text
+from lightfield.core.files import sha256, write_bytes, write_text
+from lightfield.formats.layout import SUMS
+from lightfield.imaging import images
 from lightfield.workflow import shard_log
 
 HEADER = {"stage": "render_shard", "version": None, "settings": {}}
@@ -129,3 +132,13 @@ def test_a_receipt_still_holds_until_a_setting_or_a_file_changes():
     assert not holds(samples=4)
     view.write_bytes(b"other bytes")
     assert not holds()
+
+
+def test_a_file_without_a_receipt_is_finished_only_if_its_sum_is_published():
+    """Its key alone does not say that its pixels are whole."""
+    bare, published = (Path(f"results/scene/{rig}/exr/a.exr") for rig in ("bare", "published"))
+    for file in (bare, published):
+        images.write_exr(file, {"R": np.zeros((2, 2), np.float32)}, {images.KEY_ATTRIBUTE: "key"})
+    write_text(published.parents[1] / SUMS, f"{sha256(published)}  exr/a.exr\n")
+    assert not finished("0-1.jsonl", bare)
+    assert finished("0-2.jsonl", published)
