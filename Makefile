@@ -3,7 +3,6 @@
 # make test-other  runs mypy, and the tests that are not slow, with the other supported Python
 # make test-snakemakes  builds the smoke scene with the oldest and the newest Snakemake
 # make consumers   reads exports with the consumers' own code, in an environment of its own
-# make learn       learns radiance fields from exported files, in the same environment
 # make extension   writes the Blender extension that draws rigs, in build/
 # make docs        builds the documents as a site with a search, in site/
 
@@ -29,7 +28,7 @@ INSTALL_PLUGIN = cp -R $(PLUGIN) \
 	"$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test test-other test-snakemakes check consumers learn soak docs extension locks
+.PHONY: all test test-other test-snakemakes check consumers soak docs extension locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -73,13 +72,6 @@ consumers: .venv/complete .venv-consumers/complete
 	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
 	.venv-consumers/bin/pip -q install --require-hashes --no-deps -r envs/requirements-nerfstudio.txt
 	@touch $@
-
-# Two runs, because a page shows the measurements that exist when it is planned.
-LEARNED = --config scenes='[garden_learn, object_learn]' rigs=all preset=full
-
-learn: .venv/complete .venv-consumers/complete
-	snakemake --cores $(CORES) learn $(LEARNED)
-	snakemake --cores $(CORES) $(LEARNED)
 
 # The search needs a server: python -m http.server --directory site
 docs: export NO_MKDOCS_2_WARNING = 1

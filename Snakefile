@@ -111,7 +111,6 @@ include: "rules/plan.smk"
 include: "rules/error.smk"
 include: "rules/benchmark.smk"
 include: "rules/synthesis.smk"
-include: "rules/learn.smk"
 
 
 # Only Snakemake's path of an output says whether it has a storage.

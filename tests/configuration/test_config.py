@@ -426,7 +426,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     ],
 )
 @pytest.mark.slow
-def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
+def test_snakemake_ends_with_one_line_and_no_job(arguments, expected):
     result = forks.run_snakemake(["--cores", "1", "--config", *arguments], ROOT)
     assert result.returncode != 0
     errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]

@@ -3,8 +3,8 @@
 The consumers are nerfstudio, NCore and OpenCV. `make consumers` runs this in an environment of its
 own, after export.py. The tests read COLMAP's models with pycolmap. Prints the largest error of each
 export. An error beyond its limit ends in an AssertionError. published.py reads what is published,
-sequences.py the exports with a time, and lichtfeld.py those for a program that has no Python
-package.
+sequences.py the exports with a time, lichtfeld.py those for a program that has no Python package,
+and learning.py those from which a field learns.
 """
 
 import json
@@ -12,12 +12,12 @@ import sys
 from pathlib import Path
 
 import cv2
+import learning
 import lichtfeld
 import numpy as np
 import published
 import sequences
 
-ROOT = Path(__file__).resolve().parents[2]
 RADIUS = 3.0  # The radius of the scene, a sphere around the origin.
 
 
@@ -33,17 +33,22 @@ def ours(folder, name):
     return saved["names"].tolist(), saved["matrices"], saved["rays"]
 
 
-def nerfstudio(folder, name):
+def nerfstudio_parser(folder):
+    """Return nerfstudio's parser of an export. It leaves the poses as they are."""
     from nerfstudio.data.dataparsers.nerfstudio_dataparser import NerfstudioDataParserConfig
 
-    parser = NerfstudioDataParserConfig(
-        data=folder / "nerfstudio" / name,
+    return NerfstudioDataParserConfig(
+        data=folder,
         orientation_method="none",
         center_method="none",
         auto_scale_poses=False,
         downscale_factor=1,
         load_3D_points=False,  # would need open3d
     ).setup()
+
+
+def nerfstudio(folder, name):
+    parser = nerfstudio_parser(folder / "nerfstudio" / name)
     names, matrices, rays = ours(folder, name)
     seen = np.isfinite(rays[..., 0])
     radians = metres = 0.0
@@ -229,25 +234,6 @@ def opencv(folder, name):
     assert pixels < 1e-3
 
 
-def radiance_field(folder):
-    """Check that `make learn` learns more from true poses than from shuffled ones."""
-    sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "benchmarks")]
-    import torch
-
-    from learn import EVALUATIONS, learn
-    from lightfield.core.progress import Progress
-    from nerfstudio_views import SHUFFLED, TRUE, read, readings
-
-    views = dict(readings(read(folder / "learn" / "export")))
-    progress = Progress(2 * EVALUATIONS, "learn", "evaluations")
-    psnr = {name: learn(views[name], progress, 60)[1][-1]["psnr"] for name in (TRUE, SHUFFLED)}
-    print(
-        f"torch {torch.__version__}: a radiance field shows held-out rays with "
-        f"{psnr[TRUE]:.1f} dB, and with {psnr[SHUFFLED]:.1f} dB from shuffled poses"
-    )
-    assert psnr[TRUE] > psnr[SHUFFLED] + 5
-
-
 def main():
     folder = Path(sys.argv[1])
     published.check(folder / "publish" / "sphere")
@@ -261,7 +247,7 @@ def main():
     sequences.check(folder / "sequence")
     for name in ("fisheye", "opencv"):
         opencv(folder, name)
-    radiance_field(folder)
+    learning.check(nerfstudio_parser(folder / "learn" / "export"))
 
 
 if __name__ == "__main__":

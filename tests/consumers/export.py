@@ -141,7 +141,7 @@ def main() -> None:
         export_moving(folder / "moving" / name, motion)
     write_sequence(folder / "sequence")
     publish_views(folder / "publish")
-    write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
+    write_views(folder / "learn" / "dataset", LENSES["perspective"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
     settings = settings_of("nerfstudio").model_validate({"sources": ["views"], "depth": True})
     export.run("nerfstudio", source, settings, folder / "learn" / "export")

@@ -437,7 +437,7 @@ def test_hci_disparity_as_exr_has_the_values_of_the_benchmarks_maps(tmp_path):
         np.testing.assert_array_equal(channel.pixels, pfm(path.with_suffix(".pfm")))
 
 
-def test_a_plane_with_a_baseline_suits_hci_at_every_number_of_views(tmp_path):
+def test_a_plane_with_a_baseline_suits_hci_at_every_number_of_views():
     for name, keys in (("baseline", {"baseline": 0.2}), ("size", {"size": [1.6, 0, 0.8]})):
         rig = rigs.from_settings({"type": "plane", "cameras": [9, 5], **keys})
         lens = lenses.from_camera(LENSES["perspective"])

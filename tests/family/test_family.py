@@ -364,7 +364,7 @@ def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_pa
 
 @pytest.mark.slow
 def test_views_of_members_are_kept_without_their_folder_of_work(face, tmp_path):
-    """So are the views of members that a version before receipts has built."""
+    """Their published checksums tell which are intact."""
     build = build_of(face())
     assert build.build("cpu", 1)["state"] == "valid"
     assert rendered_views(build) == ["view_0000f", "view_0001f"]

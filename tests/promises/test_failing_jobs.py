@@ -63,7 +63,6 @@ TARGETS = [
     "render_overhead",
     "gpu_check",
     "synthesis",
-    "learn",
     "verify",
 ]
 CHOSEN = ["--config", "scenes=[brought,imported,modelled,many]", "rigs=all", "preset=full"]

@@ -85,7 +85,7 @@ def test_the_installed_packages_read_a_dataset_with_their_dependencies_alone(ins
 
 
 @pytest.mark.slow
-def test_a_program_beside_the_installed_library_is_not_started_anew(installed, tmp_path):
+def test_a_program_beside_the_installed_library_is_not_started_anew(installed):
     """Jupyter's kernel is such a program. Of ours, each starts anew in a clean environment."""
     program = installed / "kernel_launcher.py"
     program.write_text(

@@ -152,12 +152,6 @@ def sphere(tmp_path_factory):
         "lens pair,a to b,float32,5.0,1e-6,2e-6,ok\n"
         "lens pair,b to a,float32,5.0,4e-6,2e-6,FAIL\n"
     )
-    (measured / "learn/ball").mkdir(parents=True)
-    (measured / "learn/ball/LFSphere.csv").write_text(
-        "learned,reading,held_out,step,psnr\n"
-        "fisheye,as exported,fisheye,600,24.0625\n"
-        "fisheye,as exported,fisheye,100,18.5\n"
-    )
     page = make_page(folder, SPHERE, *measured.rglob("*.csv"), panorama=True)
     return SimpleNamespace(page=page, lightfield=lightfield, folder=folder)
 
@@ -208,9 +202,6 @@ def test_the_page_loads_completely_from_one_file(sphere, show):
     assert "±" not in text
     for part in ("180° × 180°", "Frame\n7", "Pixels without a hit\n0 %", "snakemake --cores all"):
         assert part in text
-    # The result of learning is the last figure.
-    assert "24.1" in text
-    assert "18.5" not in text
     assert YAML.strip() in tab.text_content("#rebuild pre >> nth=1")
     # The worst case, as part of its bound, comes first.
     assert text.index("200%") < text.index("50%")

@@ -379,7 +379,6 @@ def test_an_image_is_refused_as_text(refused, tmp_path):
         ("reprojection.csv", tables.reprojection, "scenario"),
         ("stability.csv", tables.stability, "group"),
         ("synthesis/a/b.csv", lambda files: tables.synthesis(files, "a/b"), "truth"),
-        ("learn/a/b.csv", lambda files: tables.learning(files, "a/b"), "learned"),
     ],
 )
 def test_a_table_of_another_kind_is_named(tmp_path, name, read, column):

@@ -24,7 +24,7 @@ NAMES = ["a", "b", "c", "d"]
 
 
 @pytest.fixture
-def dataset(tmp_path, monkeypatch, capsys):
+def dataset(tmp_path, capsys):
     """A dataset of four views. Functions note some of them as made, and print its status."""
     folder, receipts = tmp_path / "results/scene/rig", tmp_path / "work/receipts/scene/rig"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [2, 1]})
@@ -234,7 +234,7 @@ def test_progress_works_while_nothing_is_finished(capsys, monkeypatch):
     ]
 
 
-def test_a_familys_members_are_counted_by_their_state(tmp_path, monkeypatch, capsys):
+def test_a_familys_members_are_counted_by_their_state(tmp_path, capsys):
     failure = {"stage": "import_model", "cause": "it is empty", "log": "work/chairs/b/member.log"}
     states = {"a": {"state": "valid"}, "b": {"state": "failed", "failure": failure}}
     for name, state in states.items():

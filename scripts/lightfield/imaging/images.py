@@ -275,11 +275,6 @@ def attribute(path: Path, name: str) -> Attribute | None:
         return None
 
 
-def has_key(path: Path, key: str) -> bool:
-    """Return whether a file exists, and its header says that it was made with ``key``."""
-    return attribute(path, KEY_ATTRIBUTE) == key
-
-
 def is_finished(path: Path, key: str) -> bool:
     """Return whether a file exists, is complete, and was made with the settings of ``key``."""
     try:

@@ -125,7 +125,6 @@ def _measurements(job: ReportHtml, lightfield: LightField) -> dict[str, tables.M
     candidates = {
         "error_vs_time": tables.error_vs_time(files, str(lightfield.scene["name"])),
         "synthesis": tables.synthesis(files, name),
-        "learning": tables.learning(files, name),
         "reprojection": tables.reprojection(files),
         "stability": tables.stability(files),
     }

@@ -150,27 +150,6 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
     return Measurement(page.plot(path.with_suffix("")), tables)
 
 
-def learning(files: Sequence[Path], folder: str) -> Measurement | None:
-    """Return how well fields are learned from a dataset's exports. ``folder`` is scene/rig."""
-    path = _named(files, f"learn/{folder}.csv")
-    if path is None:
-        return None
-    rows = _read_csv(path, "learned", "held_out", "reading", "step", "psnr")
-    last = {
-        (row["learned"], row["held_out"], row["reading"]): float(row["psnr"])
-        for row in sorted(rows, key=lambda row: int(row["step"]))
-    }
-    return Measurement(
-        page.plot(path.with_suffix("")),
-        {
-            "Held-out rays after the last step": Table(
-                ["learned from", "held out", "read", "PSNR, dB"],
-                [[*names, f"{psnr:.1f}"] for names, psnr in last.items()],
-            )
-        },
-    )
-
-
 def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     """Return the error of a scene's renders against their run time. None if it was not measured."""
     path = _named(files, f"error_vs_time/{scene}.json")

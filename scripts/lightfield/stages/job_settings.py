@@ -274,9 +274,12 @@ def _measurements(build: Build, dataset: Dataset) -> list[Path]:
 
     They are not inputs: a page must never start a measurement, which takes an hour.
     """
-    stems = ["reprojection", "stability", f"error_vs_time/{dataset.scene_name}"]
-    for kind in ("synthesis", "learn"):
-        stems.append(f"{kind}/{dataset.scene_folder}/{dataset.rig_folder}")
+    stems = [
+        "reprojection",
+        "stability",
+        f"error_vs_time/{dataset.scene_name}",
+        f"synthesis/{dataset.scene_folder}/{dataset.rig_folder}",
+    ]
     files = [
         Path(build.config.results, "benchmarks", f"{stem}{suffix}")
         for stem in stems

@@ -16,15 +16,22 @@ from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.imaging import pictures
 
-# The inverse of the distance is tried in this many equal steps from the surface to infinity.
+# Reflections where they appear to be bring 0.4, 0.6 and 0 dB: PSNR of held-out views of the garden,
+# the barbershop and the courtyard. The numbers below were chosen together, none by itself.
+
+# The inverse of the distance is tried in this many equal steps from the surface to infinity. If
+# cameras 0.3 m apart see a mirror 2 m away, a step moves the reflection by 0.5°, about a pixel.
 STEPS = 16
-# A view is compared with this many others, whose cameras are nearest.
+# A view is compared with this many others, whose cameras are nearest. On a sphere of views, most
+# views have six neighbours.
 NEIGHBOURS = 6
-# Larger views are compared at this many pixels along the longer side.
+# Larger views are compared at this many pixels along the longer side, to bound the time.
 LARGEST = 256
-# Differences of roots of colours are averaged over windows of this many pixels along a side.
+# Differences of roots of colours are averaged over windows of this many pixels along a side. The 49
+# pixels divide the noise of a difference by 7.
 WINDOW = 7
-# Views disagree if the roots of their colours differ by more than this.
+# Views disagree if the roots of their colours differ by more than this, on average about 5 of the
+# 255 levels of sRGB.
 _DISAGREE = 0.02
 # They agree at a farther distance if their difference falls below this part of the difference on
 # the surface.
@@ -33,7 +40,7 @@ _BETTER = 0.85
 # surface in one piece: at most this part of its pixels beside a tear.
 _DETAIL = 0.04
 _TORN = 0.1
-# A window must be seen by more than this many other views on average.
+# A window must be seen by more than this many other views on average: one alone may be wrong.
 OTHERS = 1.0
 # Reflections grow by at most this many pixels. They grow on surfaces whose inverse distances differ
 # by less than this part. The difference in this smaller window must be less than this part.
@@ -41,9 +48,11 @@ REACH = 16
 FLAT = 0.3
 EDGE = 3
 _GROWS = 1.0
-# Views see the same surface if their distances differ by less than this part.
+# Views see the same surface if their distances differ by less than this part. A pixel of 1° is off
+# by as much on a surface at an incidence of 70°.
 SAME = np.float32(0.05)
-# Beyond this inverse distance, in 1/m, nothing can seem to be farther away.
+# Beyond this inverse distance, in 1/m, nothing can seem to be farther away. At 50 m, cameras 0.3 m
+# apart see a reflection move by at most 0.3°, less than a pixel.
 FARTHEST = np.float32(0.02)
 
 

@@ -14,36 +14,53 @@ import numpy as np
 from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
-# The weight of a view's distance from the surface in its penalty. Its angle has the weight 1.
+# Figures in decibels: PSNR of held-out views of the garden, the barbershop and the courtyard.
+
+# A view at twice the target's distance from the surface has half the detail. It has the penalty of
+# an angle of 0.1 rad, or 6°. Chosen, not measured.
 DISTANCE = np.float32(0.1)
-# Added to the penalty: an angle in radians that is hardly worse than none.
+# Added to the penalty, in radians. So a view in the target's own direction weighs at most four
+# times as much as one 3° aside: noise averages, and no view jumps into sight. Chosen, not measured.
 SHARP = np.float32(0.05)
 # A view counts by how many times nearer than the target it is, but not more than so many times.
+# Four of its pixels then lie across one of the target's, which is finer than the samples. Counting
+# near views more brought 0 to 0.1 dB.
 CLOSEST = np.float32(4)
-# On a plane the inverse distance changes evenly. So a large step between neighbours is a surface
-# too, if the steps before and after it differ from it by less than this part.
+# On a plane the inverse distance changes evenly: its steps differ by none of their size. At a jump
+# between two level surfaces they differ by all of it. This is the middle.
 EVEN = np.float32(0.5)
-# Drawings at a pixel show one surface if their inverse distances differ by less than this part.
+# A drawing that is off by a pixel is off in inverse distance by the pixel's angle times the tangent
+# of incidence, which is at most 6 within a surface. This is 3 % for a pixel of 0.3° (a fisheye of
+# 600 pixels) and 10 % for one of 1° (180 pixels). So drawings at a pixel show one surface if their
+# inverse distances differ by less than this part.
 SAME = np.float32(0.03)
 # A surface hides another one that is farther by this part. Between SAME and HIDDEN the weight falls
 # to 0.
 HIDDEN = np.float32(0.1)
 # A drawing far behind the nearest one counts as if its inverse distance were this part of the
-# nearest one's.
+# nearest one's. With splats, it brought 0.1, 0 and 0.2 dB.
 BEHIND = np.float32(0.15)
-# A pixel's splat reaches so far from its middle, in pixels across and down.
+# A pixel's splat reaches so far from its middle, in pixels across and down. There a pixel without
+# neighbours on its surface has an opacity of 2 · 0.25² = 1/8, the least that a sample shows.
 SPLAT = np.float32(0.75)
-# Colours blend inside a splat if the inverse distances of pixels differ by less than this part.
+# Colours blend inside a splat if the inverse distances of pixels differ by less than this part. Of
+# two such pixels, one hides less than a third of the other's weight (SAME, HIDDEN).
 SPLAT_SAME = np.float32(0.05)
-# A surface hides everything behind it if its vertices have at least this certainty.
+# A surface hides everything behind it if its vertices have at least this certainty. It is above the
+# certainty of vertices beside a tear, 0.25, and below 1. So a triangle with one such corner hides
+# in its greater part.
 CERTAIN = np.float32(0.5)
-# Added to the roots of colours before inverting them, so that black has an inverse.
+# Added to the roots of colours before inverting them, so that black has an inverse. Its square is
+# 3 of the 255 levels of sRGB: what is darker looks black.
 DARK = np.float32(0.03)
-# A surface with an inverse distance this small, in 1/m, counts as sky.
+# A surface with an inverse distance this small, in 1/m, counts as sky. At 10 km, a step of 10 m
+# moves it by 1 mrad, less than a pixel of 90° in 1,000 pixels.
 FAR = np.float32(1e-4)
-# A triangle larger than this part of the picture is an artefact at a lens's rim.
+# A triangle larger than this part of the picture is an artefact at a lens's rim: it would magnify a
+# view's pixel to a quarter of the picture.
 LARGEST = np.float32(0.25)
-# Rounding moves a triangle's edges by at most this part of its width times its height.
+# Rounding moves a triangle's edges by at most this part of its width times its height: about ten
+# roundings of float32, each of 6e-8, and some more to be safe.
 ROUNDING = np.float32(1e-6)
 
 

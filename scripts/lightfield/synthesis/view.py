@@ -26,20 +26,26 @@ from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels
 
 # Views are chosen by how well they see points at two distances that are typical of the scene. The
-# points lie in this many directions across and down the picture.
+# points lie in this many directions across and down the picture. In one of 90° they are 7.5° apart,
+# about as far as neighbours among 642 views on a sphere.
 DIRECTIONS = 12
-# Neighbours count as different surfaces beyond the angle of incidence with this tangent.
+# Neighbours count as different surfaces beyond the angle of incidence with this tangent, 80.5°. So
+# steep a surface shows a sixth of the pixels that it would show from the front.
 _STEEPEST = 6.0
-# Vertices beside a tear may mix the colours of two surfaces, so they have this certainty.
+# Vertices beside a tear may mix the colours of two surfaces, so they have this certainty. A quarter
+# with splats was better than a sixth without, by 0.1, 0 and 0.2 dB: PSNR of held-out views of the
+# garden, the barbershop and the courtyard.
 TORN_WEIGHT = 0.25
 # From another place, a mirror shows a reflection elsewhere. A reflection that is drawn unmoved
-# counts this much.
+# counts this much, so that it hardly shows beside one that is drawn moved. Chosen, not measured.
 UNMOVED_WEIGHT = 0.1
 # A view's certainty falls over this many pixels towards its edge, so that the edge does not show.
+# Chosen by eye, for views of 256 pixels.
 RIM = 12
-# Sharpens a view's colours by this amount, because interpolation will blur them.
+# Sharpens a view's colours by this amount, because interpolation will blur them. Interpolating and
+# sharpening roots brought 0.1 dB in the garden.
 SHARPENED = 0.8
-# Samples across and down a pixel.
+# Samples across and down a pixel. Two brought 0.4 dB, and four would add at most 0.05 dB.
 SAMPLES = 2
 
 

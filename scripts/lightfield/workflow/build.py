@@ -300,10 +300,6 @@ class Build:
             and _reach(other) < _reach(dataset)
         ]
 
-    def learned_from(self, wildcards: Wildcards) -> list[str]:
-        """Return the lists of a dataset's exports that benchmarks/learn.py reads."""
-        return learned_exports(self.dataset(wildcards))
-
     def split_lightfields(self, wildcards: Wildcards) -> list[str]:
         """Return the light fields of a scene's rigs that have a split."""
         return [
@@ -435,14 +431,6 @@ def has_bundle(receipt: str) -> bool:
     """Return whether the job of a receipt makes files that no rule declares."""
     job = receipt.removesuffix(SUFFIX)
     return bool(re.search(r"/(\d+-\d+|inventory|mesh|(export|sequence)_\w+|batches/\w+)$", job))
-
-
-def learned_exports(dataset: Dataset) -> list[str]:
-    """Return the lists of a dataset's exports with depth that benchmarks/learn.py reads."""
-    options = dataset.exports.nerfstudio
-    if options is None or not options.depth:
-        return []
-    return [path for path in dataset.exported if path.endswith(f"exports/nerfstudio/{MANIFEST}")]
 
 
 @cache

@@ -45,7 +45,7 @@ def stocked(scene: Scene[Barbershop]) -> None:
             earlier = set(bpy.data.objects)
             goods(scene, random, bottle_meshes, pot_meshes)
             scene.plan.arrange(owner.__name__, set(bpy.data.objects) - earlier)
-    plants.plants(scene, bottle_meshes, pot_meshes)
+    plants.plants(scene, bottle_meshes)
 
 
 ELEMENTS = (

@@ -92,7 +92,7 @@ def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
     return model.mesh(kind)
 
 
-def plants(scene: Scene[Barbershop], bottles: Goods, pots: Goods) -> None:
+def plants(scene: Scene[Barbershop], bottles: Goods) -> None:
     """Plants on the sills, bottles between them; others in the corners, one hanging."""
     plan = scene.plan
     random = scene.random("plants")
