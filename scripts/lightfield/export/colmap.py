@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from lightfield.configuration.exports import Colmap
 from lightfield.core.files import atomic_path
-from lightfield.core.progress import Progress
 from lightfield.export import cameras
+from lightfield.export.pictures import write_pictures
 from lightfield.export.points import (
     Observations,
     Points,
@@ -38,7 +38,6 @@ from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.imaging import images
 
 PINHOLE = (1, "PINHOLE")
 OPENCV_FISHEYE = (5, "OPENCV_FISHEYE")
@@ -62,16 +61,12 @@ def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
     colmap_model = model(source, settings.points)
     write = colmap_model.write_binary if settings.format == "binary" else colmap_model.write_text
     write(folder / "sparse" / "0")
-    progress = Progress(len(views), "colmap", "views")
-    for view in views:
-        name = f"{view.name}.png"
-        source.write_image(view, folder / "images" / name)
-        valid = source.valid(view)
-        if not valid.all():
-            images.write_png(folder / "masks" / f"{name}.png", valid.astype(np.uint8) * 255)
+    for view, _ in write_pictures(
+        source, folder, "colmap", picture="images/{}.png", mask="masks/{}.png.png"
+    ):
         if settings.depth:
-            _write_depth(folder / "stereo" / "depth_maps" / f"{name}.geometric.bin", source, view)
-        progress.done()
+            depth_maps = folder / "stereo" / "depth_maps"
+            _write_depth(depth_maps / f"{view.name}.png.geometric.bin", source, view)
 
 
 def model(source: SourceDataset, count: int) -> "Model":

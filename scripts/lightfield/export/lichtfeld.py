@@ -14,6 +14,7 @@ LichtFeld finds masks, depth and normals by the image's name without its suffix.
 Studio's transforms.cpp, blender_loader.cpp, filesystem_utils.hpp and image_exr.cpp.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,8 @@ import numpy as np
 from lightfield.configuration.exports import LichtFeld
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, write_json, write_text
-from lightfield.core.progress import Progress
 from lightfield.export import cameras
+from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
@@ -47,23 +48,22 @@ def export(source: SourceDataset, settings: LichtFeld, folder: Path) -> None:
     views = sorted(source.lightfield.views, key=lambda view: view.name)
     suffix = f".{settings.format}"
     frames = []
-    progress = Progress(len(views), "lichtfeld", "views")
-    for view in views:
-        image = folder / "images" / f"{view.name}{suffix}"
-        if settings.format == "exr":
-            _write_exr(source.path(view), image)
-        else:
-            source.write_image(view, image)
-        valid = source.valid(view)
-        if not valid.all():
-            images.write_png(folder / "masks" / f"{view.name}.png", valid.astype(np.uint8) * 255)
+    picture = f"images/{{}}{suffix}"
+    for view, _ in write_pictures(
+        source,
+        folder,
+        "lichtfeld",
+        picture=picture,
+        mask="masks/{}.png",
+        views=views,
+        write=partial(_write_exr, source) if settings.format == "exr" else None,
+    ):
         if settings.depth:
             images.write_png(folder / "depth" / f"{view.name}.png", _depth(source, view))
         if settings.normals:
             images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
-        path = image.relative_to(folder).as_posix()
+        path = picture.format(view.name)
         frames.append({"file_path": path, "transform_matrix": view.world_from_camera.tolist()})
-        progress.done()
     write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
     parts = splits(source.lightfield)
     for part, part_views in (("train", parts.train), ("test", parts.test)):
@@ -88,8 +88,9 @@ def camera(lens: Lens) -> dict[str, Any]:
     return {"camera_model": "OPENCV_FISHEYE", **focal, **center, **size, **distortion}
 
 
-def _write_exr(path: Path, target: Path) -> None:
+def _write_exr(source: SourceDataset, view: View, target: Path) -> None:
     """Make a hard link to an EXR. If it stores other pixels than it shows, write what it shows."""
+    path = source.path(view)
     if images.read_header(path).window.is_stored_whole:
         link_or_copy(path, target)
         return

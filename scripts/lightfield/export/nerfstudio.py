@@ -21,8 +21,8 @@ import numpy as np
 
 from lightfield.configuration.exports import Nerfstudio
 from lightfield.core.files import write_json
-from lightfield.core.progress import Progress
 from lightfield.export import cameras
+from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
@@ -30,7 +30,6 @@ from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.imaging import images
 
 POINT_CLOUD = "points.ply"
 # In metres.
@@ -44,23 +43,25 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
     masked = any(not source.valid(view).all() for view in views)
     frames = []
     depth_maps = DepthMaps(_DEPTH_UNIT)
-    progress = Progress(len(views), "nerfstudio", "views")
-    for view in views:
+    for view, _ in write_pictures(
+        source,
+        folder,
+        "nerfstudio",
+        picture="images/{}.png",
+        mask="masks/{}.png",
+        mask_all=masked,
+    ):
         name = f"{view.name}.png"
         frame: dict[str, Any] = {
             "file_path": f"images/{name}",
             "transform_matrix": view.world_from_camera.tolist(),
         }
-        source.write_image(view, folder / "images" / name)
         if masked:
             frame["mask_path"] = f"masks/{name}"
-            mask = source.valid(view).astype(np.uint8) * 255
-            images.write_png(folder / "masks" / name, mask)
         if settings.depth:
             frame["depth_file_path"] = f"depths/{name}"
             depth_maps.write(folder / "depths" / name, source.depth(view, meaning))
         frames.append(frame)
-        progress.done()
     depth_maps.report(folder)
     parts = splits(source.lightfield)
     write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))

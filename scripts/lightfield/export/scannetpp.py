@@ -11,15 +11,12 @@ Source: ScanNet++'s documentation, and 3DGRUT's reader of it.
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lightfield.configuration.exports import ScanNetPP
 from lightfield.core.files import write_json
-from lightfield.core.progress import Progress
 from lightfield.export.colmap import model
+from lightfield.export.pictures import write_pictures
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.imaging import images
 
 IMAGES = "image_undistorted_fisheye"
 
@@ -27,21 +24,20 @@ IMAGES = "image_undistorted_fisheye"
 def export(source: SourceDataset, settings: ScanNetPP, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     model(source, settings.points).write_text(folder / "colmap")
-    views = source.lightfield.views
-    masked = False
-    progress = Progress(len(views), "scannetpp", "views")
-    for view in views:
-        source.write_image(view, folder / IMAGES / f"{view.name}.png")
-        valid = source.valid(view)
-        if not valid.all():
-            mask = valid.astype(np.uint8) * 255
-            images.write_png(folder / IMAGES / f"{view.name}_mask.png", mask)
-            masked = True
-        progress.done()
+    has_masks = [
+        has_mask
+        for _, has_mask in write_pictures(
+            source,
+            folder,
+            "scannetpp",
+            picture=f"{IMAGES}/{{}}.png",
+            mask=f"{IMAGES}/{{}}_mask.png",
+        )
+    ]
     parts = splits(source.lightfield)
     lists = {"train": parts.train, "test": parts.test}
     content: dict[str, Any] = {}
     for part, part_views in lists.items():
         content[part] = [f"{view.name}.png" for view in part_views]
-    content["has_masks"] = masked
+    content["has_masks"] = any(has_masks)
     write_json(folder / "train_test_lists.json", content)

@@ -16,6 +16,7 @@ from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.visibility import ONE_SURFACE, lies_on, pixel_indices
 from lightfield.imaging import images
+from lightfield.imaging.alpha import divisor
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 
@@ -127,7 +128,7 @@ class SourceDataset:
         alpha = None
         if self.lightfield.transparent:
             alpha = image.channels["A"][..., None].astype(np.float32)
-            alpha = np.where(alpha > 0, alpha, np.float32(1))
+            alpha = divisor(alpha)
             colour /= alpha
         if self.look:
             return np.asarray(self.look.to_pixels(colour, 8, alpha), np.uint8)

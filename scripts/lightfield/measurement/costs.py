@@ -19,7 +19,7 @@ from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
-from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples, kwh
+from lightfield.planning.cost import DENOISING_SAMPLES, Rate, cost_in_samples, kwh
 from lightfield.planning.sampling import standard_error
 from lightfield.stages import measurement
 from lightfield.workflow import history
@@ -295,15 +295,27 @@ def _machine_seconds(
 
 @dataclass(frozen=True)
 class Scale:
-    """The scale of the full dataset. ``pixels`` and ``effort`` are factors for a view.
+    """The size of the full dataset beside this one's: the pixels of a view, and a pixel's cost.
 
-    The effort of a pixel counts in samples. Denoising counts as samples, too.
+    The cost counts in samples. Denoising counts as samples, too.
     """
 
     views: int
     samples: int
-    pixels: float
-    effort: float
+    full_pixels: int
+    full_cost: float
+    pixels_here: int
+    cost_here: float
+
+    @property
+    def pixels(self) -> float:
+        """The pixels of a full view, over a view's here."""
+        return self.full_pixels / self.pixels_here
+
+    @property
+    def effort(self) -> float:
+        """The cost of a pixel of a full view, over a pixel's here."""
+        return self.full_cost / self.cost_here
 
     @classmethod
     def of(cls, full: measurement.FullSize, lightfield: LightField) -> "Scale":
@@ -315,12 +327,13 @@ class Scale:
         assert isinstance(samples, int)
         # If a target error decides, both are unknown until then.
         denoise = render.denoise if full.denoise is None else full.denoise
-        effort = cost_in_samples(samples, denoise)
         return cls(
             views=full.views,
             samples=samples,
-            pixels=math.prod(full.resolution) / (lens.width * lens.height),
-            effort=effort / cost_in_samples(render.samples, render.denoise),
+            full_pixels=math.prod(full.resolution),
+            full_cost=cost_in_samples(samples, denoise),
+            pixels_here=lens.width * lens.height,
+            cost_here=cost_in_samples(render.samples, render.denoise),
         )
 
 
@@ -349,11 +362,12 @@ def extrapolation(
         return None
     latest = _latest_renderings(all_renderings)
     scale = Scale.of(full, lightfield)
-    times = [view.path_tracing * scale.pixels * scale.effort for view in latest]
+    times = [view.path_tracing for view in latest]
     error = None
     if len(times) > 1:
         missing_part = max(0.0, 1 - len(times) / scale.views)
-        error = scale.views * standard_error(times) * math.sqrt(missing_part)
+        a_view = standard_error(times) * scale.pixels * scale.effort
+        error = scale.views * a_view * math.sqrt(missing_part)
     # Beside a graphics card, a core's time is only a part of the machine's.
     part = 1 if by_processor else 1 / energy.core_count
     growing_stages = {"validate", FLOW.name, *reprojections}
@@ -368,7 +382,11 @@ def extrapolation(
     )
     first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
     once = first_views + part * (start_ups + fixed_stages)
-    seconds = scale.views * (mean(times) + each_view * scale.pixels) + once
+    rate = Rate(
+        sample_seconds=mean(times) / (scale.pixels_here * scale.cost_here),
+        pixel_seconds=each_view / scale.pixels_here,
+    )
+    seconds = scale.views * rate.view_seconds(scale.full_pixels, scale.full_cost) + once
     machine = seconds / energy.core_count if by_processor else seconds
     return {
         "views": scale.views,

@@ -26,6 +26,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.visibility import ONE_SURFACE
 from lightfield.imaging import images
+from lightfield.imaging.alpha import divisor
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_16_bit, tone_map
 from lightfield.measurement.picture_difference import (
     depth_error,
@@ -168,7 +169,7 @@ def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, F
     if alpha is not None:
         alpha = np.rint(alpha * largest) / largest
         covered = image.channels["A"][..., np.newaxis].astype(np.float32)
-        light = light / np.where(covered > 0, covered, 1)
+        light = light / divisor(covered)
     if source.look:
         return source.look.to_pixels(light, 16, _covered(alpha)) / largest, alpha
     return to_16_bit(tone_map(light, source.exposure, source.reinhard)) / largest, alpha
@@ -176,7 +177,7 @@ def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, F
 
 def _covered(alpha: Floats | None) -> Floats | None:
     """Return alpha (h, w, 1) by which colour can be divided. None without alpha."""
-    return None if alpha is None else np.where(alpha > 0, alpha, 1)[..., np.newaxis]
+    return None if alpha is None else divisor(alpha)[..., np.newaxis]
 
 
 def _alpha(image: images.Image) -> Floats | None:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from lightfield.core import processors, units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics, trials
 from lightfield.measurement.trials import Trial, Trials
+from lightfield.planning.cost import Rate, pixel_cost
 from lightfield.planning.sampling import standard_error
 from lightfield.stages.measurement import FullSize, GpuCheck
 
@@ -119,7 +119,8 @@ def make(job: GpuCheck) -> None:
     """
     device = _gpu_of(job)
     lightfield, renderer = trials.of_calibrated(job)
-    content = check(renderer, device, lightfield.render, job.settings.full)
+    cost_samples = pixel_cost(lightfield.render, job.calibration)
+    content = check(renderer, device, cost_samples, job.settings.full)
     name = job.output.name
     text = table(name, content)
     print(text)
@@ -151,15 +152,14 @@ def _gpu_of(job: GpuCheck) -> str:
 
 
 def check(
-    renderer: Trials, device: str, render: RenderBlock, full: Mapping[str, FullSize]
+    renderer: Trials, device: str, cost_samples: float, full: Mapping[str, FullSize]
 ) -> dict[str, Any]:
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
-    ``render`` has the scene's settings. ``full`` has the size of each of its datasets. Returns
-    the comparison, and the seconds of a sample of a megapixel on a core and on the GPU. Also
-    returns the GPU hours of each dataset.
+    ``cost_samples`` is the cost of a pixel of the scene in samples, with denoising. ``full`` has
+    the size of each of the scene's datasets. Returns the comparison, and the seconds of a sample of
+    a megapixel on a core and on the GPU. Also returns the GPU hours of each dataset.
     """
-    assert isinstance(render.samples, int)
     lens = renderer.lens
     scale = min(1.0, SIZE / max(lens.width, lens.height))
     small = lens.resized(*(max(BLOCK, round(side * scale)) for side in (lens.width, lens.height)))
@@ -175,6 +175,7 @@ def check(
     on_gpu = renderer.on(device, lens)
     timed = on_gpu.render(on_gpu.first_view, 1, settings)
     gpu = timed.seconds / (lens.width * lens.height * SAMPLES)
+    rate = Rate(gpu)
     return {
         "same": comparison.same,
         **asdict(comparison),
@@ -182,10 +183,10 @@ def check(
         "size": [small.width, small.height],
         "core_seconds": core * 1e6,
         "gpu_seconds": gpu * 1e6,
-        "samples": render.samples,
+        "samples": cost_samples,
         "hours": {
-            name: dataset.views * math.prod(dataset.resolution) * render.samples * gpu / 3600
-            for name, dataset in full.items()
+            name: size.views * rate.view_seconds(math.prod(size.resolution), cost_samples) / 3600
+            for name, size in full.items()
         },
     }
 
@@ -206,7 +207,7 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             f"A sample of a megapixel takes {units.duration(content['gpu_seconds'])} on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",
-            f"| dataset at full size, {content['samples']} samples | GPU hours |",
+            f"| dataset at full size, {content['samples']:g} samples with denoising | GPU hours |",
             "| --- | ---: |",
             *rows,
             f"| together | {sum(content['hours'].values()):.3g} |",

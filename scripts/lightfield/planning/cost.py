@@ -21,7 +21,7 @@ from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, read_bytes, read_keys, reading
 from lightfield.formats import light_groups, passes
-from lightfield.formats.render_block import MeasuredTargetError
+from lightfield.formats.render_block import MeasuredTargetError, RenderBlock
 from lightfield.planning import sampling
 
 if TYPE_CHECKING:
@@ -129,6 +129,25 @@ _JOB = Cost(JOB_SECONDS)
 _BLENDER = Cost(START_UP_SECONDS)
 
 
+@dataclass(frozen=True)
+class Rate:
+    """How fast a device renders. Each estimate of views that nobody rendered follows from one.
+
+    A dry run guesses the rate, a page takes it from the finished views, and a GPU check from the
+    view that it times.
+
+    - ``sample_seconds``: seconds for a sample of a pixel. `cost_in_samples` counts denoising, too.
+    - ``pixel_seconds``: seconds for a pixel beside its samples.
+    """
+
+    sample_seconds: float
+    pixel_seconds: float = 0.0
+
+    def view_seconds(self, pixels: float, cost_samples: float) -> float:
+        """Return the seconds for a view with this many ``pixels`` of so many samples."""
+        return pixels * cost_samples * self.sample_seconds + pixels * self.pixel_seconds
+
+
 def cost(
     stage: str,
     dataset: Dataset | None = None,
@@ -164,6 +183,19 @@ def members_cost(datasets: Iterable[Dataset], members: int) -> Cost:
 def cost_in_samples(samples: float, denoise: bool) -> float:
     """Return the cost of a pixel in samples: ``samples``, and denoising if ``denoise``."""
     return samples + DENOISING_SAMPLES * denoise
+
+
+def pixel_cost(render: RenderBlock, calibration: Path | None) -> float:
+    """Return the cost of a pixel in samples, with denoising, of views with ``render`` settings.
+
+    The file of a ``calibration`` says it, because adaptive sampling takes fewer samples than it
+    may. Raises `UserError` for a damaged file.
+    """
+    if calibration is None:
+        assert isinstance(render.samples, int)
+        return cost_in_samples(render.samples, render.denoise)
+    with reading(calibration, "calibration"):
+        return float(read_keys(calibration, "calibrate.py", "cost_samples")["cost_samples"])
 
 
 def kwh(machine_seconds: float, watts: float) -> float:
@@ -241,7 +273,7 @@ def _planned_view_seconds(dataset: Dataset) -> float:
     if dataset.imported:
         reprojected = [_reprojected_view(dataset, name) for name in dataset.reprojections]
         return _imported_view(dataset).seconds + sum(each.seconds for each in reprojected)
-    return dataset.pixels * _planned_samples(dataset) * _sample_seconds(dataset)
+    return _rate(dataset).view_seconds(dataset.pixels, _planned_samples(dataset))
 
 
 # Probes.
@@ -326,7 +358,7 @@ def _rendered_view(dataset: Dataset) -> Cost:
     memory = Cost(memory_bytes=_memory(dataset, dataset.pixels))
     if probe := _probe_of(dataset):
         return probe.view_cost + memory
-    seconds = dataset.pixels * _cost_samples(dataset) * _sample_seconds(dataset)
+    seconds = _rate(dataset).view_seconds(dataset.pixels, _cost_samples(dataset))
     render = dataset.render
     pixel_bytes = 6 * (1 + light_group_count(dataset))
     pixel_bytes += sum(each.bytes for each in render.selected_passes if not passes.is_group(each))
@@ -393,10 +425,10 @@ def _memory(dataset: Dataset, pixels: int) -> int:
     return rendering_memory(scene, pixels, denoise, light_group_count(dataset))
 
 
-def _sample_seconds(dataset: Dataset) -> float:
-    """Return the seconds for a sample of a pixel."""
+def _rate(dataset: Dataset) -> Rate:
+    """Return the guessed rate of one core."""
     is_moving = dataset.render.camera_motion is not None
-    return SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1)
+    return Rate(SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1))
 
 
 def _planned_samples(dataset: Dataset) -> int:

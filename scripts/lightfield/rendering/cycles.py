@@ -27,8 +27,8 @@ from lightfield.rendering import (
     motion_blur,
     moving_camera,
     namesakes,
+    principled_passes,
     pruning,
-    surfaces,
     volumes,
 )
 from lightfield.stages.measurement import RENDERS_ON, CheckDevice
@@ -88,7 +88,7 @@ def set_up(
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
-    surfaces.set_up(view_layer(scene), passes)
+    principled_passes.set_up(view_layer(scene), passes)
     if groups := lightfield.render.emitters_of_groups:
         light_groups.set_up(view_layer(scene), groups)
     _use_device(scene, device)

@@ -13,6 +13,7 @@ from lightfield.formats.depth import depth_meaning
 from lightfield.geometry.depth import in_16_bits, with_precision
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.imaging.alpha import divisor
 from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
@@ -255,8 +256,7 @@ def _developed(
         alpha = strip[:, :, 3:]
         if transparent:
             covered[rows] = alpha[:, :, 0].clip(0, 1)
-            # A pixel with light but without alpha keeps its colour.
-            alpha = np.where(covered[rows] > 0, covered[rows], np.float32(1))[:, :, None]
+            alpha = divisor(covered[rows])[:, :, None]
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha

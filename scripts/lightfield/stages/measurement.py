@@ -376,7 +376,7 @@ class EvaluateSurface(Stage[SurfaceSettings]):
     """Compares a reconstructed surface with the true one, by the metrics of a benchmark."""
 
     name = "evaluate_surface"
-    function = "lightfield.measurement.surfaces:evaluate"
+    function = "lightfield.measurement.surface_accuracy:evaluate"
     by_hand = SurfaceSettings
 
     candidate: Path = reads("the reconstructed surface", positional=True, metavar="SURFACE")

@@ -16,6 +16,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.formats.export_lists import IN_FOLDERS
 from lightfield.formats.layout import ImageSet
+from lightfield.imaging.alpha import divisor
 from lightfield.validation.files import lists_of
 from lightfield.validation.result import Check
 
@@ -55,7 +56,7 @@ def count(colour: NDArray[Any], alpha: NDArray[Any] | None, region: NDArray[np.b
     if alpha is not None:
         covered = alpha[part].astype(np.float32)
         shown = shown & (covered > 0)
-        light /= np.where(covered > 0, covered, 1)
+        light /= divisor(covered)
     steps = np.ceil(_STEPS * np.log2(np.maximum(light[shown], 2.0**_DARKEST)))
     numbers = np.minimum(steps, _STEPS * _BRIGHTEST).astype(np.int64) - _STEPS * _DARKEST
     return np.bincount(numbers, minlength=_STEPS * (_BRIGHTEST - _DARKEST) + 1)
