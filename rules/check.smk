@@ -18,7 +18,7 @@ from lightfield.core.receipts import (
     SUFFIX,
     make_way,
 )
-from lightfield.stages import job_settings
+from lightfield.workflow import job_settings
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import run_lock
 from lightfield.workflow.build import has_bundle

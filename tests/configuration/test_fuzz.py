@@ -43,13 +43,13 @@ from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.planning import cost as planning
 from lightfield.planning.cost import cost
+from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import calibrated
 from lightfield.reprojection import lens_map
 from lightfield.stages.registry import VERSIONS
 from lightfield.validation import splits_check
 from lightfield.workflow import history
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.loading import scene_datasets
 from lightfield.workflow.presence import check_external_files
 
 TIMES = itertools.count(10**18, 10**6)

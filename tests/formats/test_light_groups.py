@@ -21,9 +21,9 @@ from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.planning.cost import cost, view_cost
+from lightfield.planning.loading import scene_datasets
 from lightfield.reprojection.filters import FILTERS
 from lightfield.validation.validate import validate
-from lightfield.workflow.loading import scene_datasets
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
 

@@ -16,8 +16,8 @@ from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
 from lightfield.planning.cost import cost
+from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import PLAIN
-from lightfield.workflow.loading import scene_datasets
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}

@@ -8,7 +8,7 @@ from checkouts import ROOT
 from lightfield.configuration.config_file import load_config, read_config
 from lightfield.planning import cost as planning
 from lightfield.planning.cost import Cost, cost, kwh, view_cost
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 GB = 10**9
 

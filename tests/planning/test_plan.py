@@ -19,11 +19,11 @@ from lightfield.measurement import plan
 from lightfield.measurement.equal_error import of_measurement
 from lightfield.planning.cost import ProbedViews, cost, read_probe
 from lightfield.planning.forecast import Request, requests_table
+from lightfield.planning.loading import scene_datasets
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Plan, Probe, ProbeSettings
 from lightfield.workflow import shard_log
 from lightfield.workflow.history import History
-from lightfield.workflow.loading import scene_datasets
 
 SILVR = ("garden", "lone_monk", "barbershop")
 

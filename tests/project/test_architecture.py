@@ -102,7 +102,7 @@ def test_reading_the_rules_imports_nothing_heavy():
     modules = subprocess.run(
         [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
     ).stdout.split()
-    assert "lightfield.workflow.loading" in modules
+    assert "lightfield.planning.loading" in modules
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
 
 
@@ -113,7 +113,7 @@ MECHANISMS = [
     "lightfield.workflow.history",
     "lightfield.workflow.member_record",
     "lightfield.workflow.presence",
-    "lightfield.workflow.shard_counts",
+    "lightfield.planning.shard_counts",
     "lightfield.workflow.shard_log",
     "lightfield.validation.verification",
 ]

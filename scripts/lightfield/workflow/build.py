@@ -28,7 +28,7 @@ from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import VALIDATION
 from lightfield.planning.cost import Cost, cost, members_cost
-from lightfield.workflow.loading import (
+from lightfield.planning.loading import (
     chosen_families,
     load_datasets,
     scene_datasets,

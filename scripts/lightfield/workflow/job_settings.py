@@ -29,6 +29,7 @@ from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
+from lightfield.planning.loading import rendered_frames, scene_datasets
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
@@ -48,7 +49,6 @@ from lightfield.stages.scene import (
     InventorySettings,
 )
 from lightfield.workflow.build import Build, Wildcards, full_datasets, source_of
-from lightfield.workflow.loading import rendered_frames, scene_datasets
 
 Content = dict[str, Any]
 
