@@ -1,25 +1,19 @@
 # Radiance fields that learn from exported files. They are not part of a dataset: name the target.
-import os
-import shlex
 from pathlib import Path
 
 from lightfield.workflow.build import learned_exports
 
-# The environment that has torch.
-CONSUMERS = FOLDER / ".venv-consumers"
-CONSUMERS_PYTHON = shlex.quote(os.path.relpath(CONSUMERS / "bin/python"))
-
 
 rule measure_learning:
     input:
-        consumers=consumers,
-        exports=of_build(BUILD.learned_from),
+        consumers=RUN.consumers_of,
+        exports=RUN.of_build(RUN.build.learned_from),
     output:
         multiext(
-            f"{RESULTS}/benchmarks/learn/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
+            f"{RUN.results}/benchmarks/learn/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
         ),
     log:
-        log_of("{scene}/{rig}/learn"),
+        RUN.log_of("{scene}/{rig}/learn"),
     resources:
         mem_mb=2000,
         runtime=120,
@@ -31,14 +25,14 @@ rule measure_learning:
     message:
         "Learning what the exports of {wildcards.scene}/{wildcards.rig} show"
     shell:
-        f"{CONSUMERS_PYTHON} {BENCHMARKS}/learn.py"
+        f"{RUN.consumers_python} {RUN.benchmarks}/learn.py"
         " {params.folders} --output {params.stem} > {log} 2>&1"
 
 
 rule learn:
     input:
         [
-            f"{RESULTS}/benchmarks/learn/{dataset.name}.csv"
-            for dataset in CHOSEN_DATASETS
+            f"{RUN.results}/benchmarks/learn/{dataset.name}.csv"
+            for dataset in RUN.chosen
             if learned_exports(dataset)
         ],

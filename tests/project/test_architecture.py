@@ -1,10 +1,12 @@
 """The packages are those of docs/explanation/architecture.md, and import only those above them."""
 
 import ast
+import io
 import itertools
 import re
 import subprocess
 import sys
+import tokenize
 from pathlib import Path
 
 import pytest
@@ -171,6 +173,30 @@ def test_the_jobs_that_run_beside_snakemake_are_known():
         for job in re.findall(r'receipt_of\(\s*"(.+?)"', rule)
     }
     assert local_jobs == {job for job, kind in KINDS.items() if kind.is_local}
+
+
+def test_the_files_of_rules_define_no_functions():
+    """The Python of a run is in scripts/lightfield/workflow, where mypy and imports find it."""
+    for file in (ROOT / "Snakefile", *(ROOT / "rules").glob("*.smk")):
+        assert not re.search(r"^\s*(?:def|class|try|with|@)\b", file.read_text(), re.M), file
+
+
+# What the Snakefile and rules/common.smk make for all rules.
+SHARED = {"CONFIG", "FOLDER", "HANDLERS", "IS_MAIN_PROCESS", "PLAN", "REQUESTS", "RUN"}
+
+
+def test_the_files_of_rules_share_only_the_run():
+    for file in (ROOT / "rules").glob("*.smk"):
+        text = file.read_text()
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        constants = {
+            token.string
+            for before, token in itertools.pairwise(tokens)
+            if token.type == tokenize.NAME and token.string.isupper() and before.string != "."
+        }
+        own = set(re.findall(r"^(\w+) = ", text, re.M))
+        own |= {name for line in re.findall(r" import (.*)", text) for name in line.split(", ")}
+        assert constants <= own | SHARED, file
 
 
 # Snakemake's documentation allows a Snakefile these.

@@ -90,6 +90,10 @@ class Build:
         """The datasets of the smoke scene. Raises `UserError` if its YAML is missing or wrong."""
         return [self.datasets[d.name] for d in scene_datasets(SMOKE, settings=self.config)]
 
+    def smoke_files(self, wildcards: Wildcards) -> list[str]:
+        """Return all files of the smoke scene. Raises `UserError` as `smoke` does."""
+        return [path for d in self.smoke for path in (*d.files, *d.intermediates)]
+
     @cached_property
     def scenes(self) -> dict[str, Dataset]:
         """Any dataset of each scene YAML, by its name: all of them have the same .blend."""
