@@ -1,5 +1,6 @@
 # Measurements that anybody can repeat. They are not part of a dataset: name the target.
 from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import GPU_CHECK
 
 MEASURED = f"{RUN.results}/benchmarks"
 
@@ -71,8 +72,7 @@ rule render_overhead:
 rule check_gpu:
     input:
         PLAN.reads(
-            "{scene}/gpu_check",
-            "gpu_check",
+            GPU_CHECK,
             check=RUN.of_first("blend_check"),
             blend=RUN.of_first("blend"),
             inventory=RUN.of_first("inventory"),
@@ -81,9 +81,9 @@ rule check_gpu:
         ),
     output:
         multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
-        receipt=PLAN.receipt_of("{scene}/gpu_check"),
+        receipt=PLAN.receipt_of(GPU_CHECK),
     log:
-        RUN.log_of("{scene}/gpu_check"),
+        RUN.log_of(GPU_CHECK),
     # Alone on the machine, so that nothing else is in the times.
     threads: RUN.cores
     resources:

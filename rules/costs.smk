@@ -1,12 +1,12 @@
 # The costs of a dataset, and the progress of a build.
 from lightfield.workflow.arguments import optional, status_arguments
+from lightfield.workflow.jobs import COSTS
 
 
 rule costs:
     input:
         PLAN.reads(
-            "{scene}/{rig}/costs",
-            "costs",
+            COSTS,
             validation=RUN.paths.validation,
             published=RUN.of_dataset("published"),
             views=PLAN.only_stored(RUN.of_dataset("all_receipts")),
@@ -16,9 +16,9 @@ rule costs:
         ),
     output:
         costs=update(RUN.paths.costs),
-        receipt=PLAN.receipt_of("{scene}/{rig}/costs"),
+        receipt=PLAN.receipt_of(COSTS),
     log:
-        RUN.log_of("{scene}/{rig}/costs"),
+        RUN.log_of(COSTS),
     localrule: True
     params:
         dataset=subpath(output.costs, ancestor=2),

@@ -1,24 +1,24 @@
 # Error: against render time, measured on request, and below a scene's target, which a scene YAML
 # may give instead of samples.
 from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CALIBRATE, ERROR_VS_TIME, PROBE_CAMERAS
 
 
 use rule lightfield as probe_cameras with:
     input:
         PLAN.reads(
-            "{scene}/probe_cameras",
-            "probes",
+            PROBE_CAMERAS,
             inventory=RUN.of_first("lightfield_inventory"),
             model=RUN.of_first("model_record"),
             places=RUN.of_first("places"),
         ),
     output:
         lightfield=update(RUN.paths.probes),
-        receipt=PLAN.receipt_of("{scene}/probe_cameras"),
+        receipt=PLAN.receipt_of(PROBE_CAMERAS),
     log:
-        RUN.log_of("{scene}/probe_cameras"),
+        RUN.log_of(PROBE_CAMERAS),
     benchmark:
-        RUN.times_of("{scene}/probe_cameras")
+        RUN.times_of(PROBE_CAMERAS)
     localrule: True
     message:
         "Placing the probe cameras of {wildcards.scene}"
@@ -28,7 +28,7 @@ use rule lightfield as probe_cameras with:
 rule calibrate:
     input:
         PLAN.reads(
-            "{scene}/calibrate",
+            CALIBRATE,
             check=RUN.of_first("blend_check"),
             blend=RUN.of_first("blend"),
             inventory=RUN.of_first("inventory"),
@@ -36,11 +36,11 @@ rule calibrate:
         ),
     output:
         calibration=update(RUN.paths.calibration),
-        receipt=PLAN.receipt_of("{scene}/calibrate"),
+        receipt=PLAN.receipt_of(CALIBRATE),
     log:
-        RUN.log_of("{scene}/calibrate"),
+        RUN.log_of(CALIBRATE),
     benchmark:
-        RUN.times_of("{scene}/calibrate")
+        RUN.times_of(CALIBRATE)
     threads: RUN.cores
     resources:
         **RUN.gpu,
@@ -63,7 +63,7 @@ rule calibrate:
 rule measure_error:
     input:
         PLAN.reads(
-            "{scene}/error_vs_time",
+            ERROR_VS_TIME,
             check=RUN.of_first("blend_check"),
             blend=RUN.of_first("blend"),
             inventory=RUN.of_first("inventory"),
@@ -79,9 +79,9 @@ rule measure_error:
             ".svg",
             ".png",
         ),
-        receipt=PLAN.receipt_of("{scene}/error_vs_time"),
+        receipt=PLAN.receipt_of(ERROR_VS_TIME),
     log:
-        RUN.log_of("{scene}/error_vs_time"),
+        RUN.log_of(ERROR_VS_TIME),
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
     threads: RUN.cores
     resources:

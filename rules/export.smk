@@ -1,25 +1,25 @@
 # Files with which trainers open a dataset.
 from lightfield.configuration.exports import SEQUENCE_EXPORTS
+from lightfield.workflow.jobs import EXPORT, EXPORT_INSTANT_NGP, EXPORT_SEQUENCE
 from lightfield.workflow.run import one_of
 
 
 rule export_to_instant_ngp:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{source}export_instant_ngp",
-            "instant_ngp",
+            EXPORT_INSTANT_NGP,
             views=RUN.of_build(RUN.build.receipts),
             lightfield=RUN.paths.source_lightfield(),
             trained=RUN.of_build(RUN.build.training_transforms),
         ),
     output:
         transforms=update(RUN.paths.transforms()),
-        receipt=PLAN.receipt_of("{scene}/{rig}/{source}export_instant_ngp"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/{source}export_instant_ngp"),
+        receipt=PLAN.receipt_of(EXPORT_INSTANT_NGP),
+        bundle=PLAN.bundle_of(EXPORT_INSTANT_NGP),
     log:
-        RUN.log_of("{scene}/{rig}/{source}export_instant_ngp"),
+        RUN.log_of(EXPORT_INSTANT_NGP),
     benchmark:
-        RUN.times_of("{scene}/{rig}/export/{source}instant_ngp")
+        RUN.times_of(EXPORT_INSTANT_NGP)
     localrule: True
     params:
         views=RUN.of_build(RUN.build.folder_of_views),
@@ -34,20 +34,19 @@ rule export_to_instant_ngp:
 rule export:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{source}export_{format}",
-            "export",
+            EXPORT,
             views=RUN.of_build(RUN.build.exported_views),
             lightfield=RUN.paths.source_lightfield(),
             dataset=RUN.paths.lightfield,
         ),
     output:
         update(RUN.paths.export_list()),
-        receipt=PLAN.receipt_of("{scene}/{rig}/{source}export_{format}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/{source}export_{format}"),
+        receipt=PLAN.receipt_of(EXPORT),
+        bundle=PLAN.bundle_of(EXPORT),
     log:
-        RUN.log_of("{scene}/{rig}/{source}export_{format}"),
+        RUN.log_of(EXPORT),
     benchmark:
-        RUN.times_of("{scene}/{rig}/export/{source}{format}")
+        RUN.times_of(EXPORT)
     wildcard_constraints:
         format=rf"(?!(?:{one_of([* SEQUENCE_EXPORTS, 'instant_ngp'])})[/.])[a-z0-9_]+",
     resources:
@@ -68,16 +67,15 @@ rule export:
 use rule export as export_sequence with:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{source}sequence_{format}",
-            "export_sequence",
+            EXPORT_SEQUENCE,
             views=RUN.of_build(RUN.build.exported_frames),
         ),
     output:
         update(RUN.paths.export_list()),
-        receipt=PLAN.receipt_of("{scene}/{rig}/{source}sequence_{format}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/{source}sequence_{format}"),
+        receipt=PLAN.receipt_of(EXPORT_SEQUENCE),
+        bundle=PLAN.bundle_of(EXPORT_SEQUENCE),
     log:
-        RUN.log_of("{scene}/{rig}/{source}sequence_{format}"),
+        RUN.log_of(EXPORT_SEQUENCE),
     wildcard_constraints:
         rig="[A-Za-z0-9_.-]+",
         format=one_of(SEQUENCE_EXPORTS),

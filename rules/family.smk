@@ -1,17 +1,18 @@
 # Families of scenes. One job builds a batch of members, with all stages of each.
 from lightfield.configuration.corpus import CORPUS_FILES
+from lightfield.workflow.jobs import BUILD_MEMBERS, CORPUS, COUNT_MEMBERS
 
 
 rule build_members:
     input:
-        PLAN.reads("{family}/batches/{batch}", "batch"),
+        PLAN.reads(BUILD_MEMBERS),
     output:
-        receipt=PLAN.receipt_of("{family}/batches/{batch}"),
-        bundle=PLAN.bundle_of("{family}/batches/{batch}"),
+        receipt=PLAN.receipt_of(BUILD_MEMBERS),
+        bundle=PLAN.bundle_of(BUILD_MEMBERS),
     log:
-        RUN.log_of("{family}/batches/{batch}"),
+        RUN.log_of(BUILD_MEMBERS),
     benchmark:
-        RUN.times_of("{family}/batches/{batch}")
+        RUN.times_of(BUILD_MEMBERS)
     # With a store, model files lie where Snakemake runs.
     localrule: PLAN.is_stored and any(family.models for family in RUN.build.families.values())
     # One core, or more if there are fewer batches than cores.
@@ -32,17 +33,15 @@ rule build_members:
 
 rule corpus:
     input:
-        PLAN.reads(
-            "{family}/corpus", "corpus", batches=RUN.of_build(RUN.build.batch_receipts)
-        ),
+        PLAN.reads(CORPUS, batches=RUN.of_build(RUN.build.batch_receipts)),
     output:
         [update(f"{RUN.results}/{{family}}/{name}") for name in CORPUS_FILES],
-        receipt=PLAN.receipt_of("{family}/corpus"),
-        bundle=PLAN.bundle_of("{family}/corpus"),
+        receipt=PLAN.receipt_of(CORPUS),
+        bundle=PLAN.bundle_of(CORPUS),
     log:
-        RUN.log_of("{family}/corpus"),
+        RUN.log_of(CORPUS),
     benchmark:
-        RUN.times_of("{family}/corpus")
+        RUN.times_of(CORPUS)
     localrule: True
     params:
         folder=f"{RUN.results}/{{family}}",
@@ -59,15 +58,14 @@ rule corpus:
 rule count_members:
     input:
         PLAN.reads(
-            "{family}/members",
-            "members",
+            COUNT_MEMBERS,
             corpus=f"{RUN.results}/{{family}}/corpus.json",
         ),
     output:
         members=update(f"{RUN.work}/{{family}}/members.json"),
-        receipt=PLAN.receipt_of("{family}/members"),
+        receipt=PLAN.receipt_of(COUNT_MEMBERS),
     log:
-        RUN.log_of("{family}/members"),
+        RUN.log_of(COUNT_MEMBERS),
     localrule: True
     params:
         failed=f"{RUN.results}/{{family}}/failed.txt",

@@ -1,22 +1,22 @@
 # The optical flow from each view to its neighbour.
+from lightfield.workflow.jobs import FLOW
 
 
 rule flow:
     input:
         # A neighbour may belong to another shard.
         PLAN.reads(
-            "{scene}/{rig}/flow/{first}-{end}",
-            "flow",
+            FLOW,
             views=RUN.of_build(RUN.build.receipts),
             lightfield=RUN.paths.lightfield,
         ),
     output:
-        receipt=PLAN.receipt_of("{scene}/{rig}/flow/{first}-{end}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/flow/{first}-{end}"),
+        receipt=PLAN.receipt_of(FLOW),
+        bundle=PLAN.bundle_of(FLOW),
     log:
-        RUN.log_of("{scene}/{rig}/flow/{first}-{end}"),
+        RUN.log_of(FLOW),
     benchmark:
-        RUN.times_of("{scene}/{rig}/flow/{first}-{end}")
+        RUN.times_of(FLOW)
     resources:
         mem_mb=2000,
     params:

@@ -1,23 +1,23 @@
 # The surface that cameras can see, as meshes.
+from lightfield.workflow.jobs import MESH
 
 
 rule mesh:
     input:
         PLAN.reads(
-            "{scene}/{rig}/mesh",
-            "mesh",
+            MESH,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("inventory"),
         ),
     output:
         update(RUN.paths.mesh_list),
-        receipt=PLAN.receipt_of("{scene}/{rig}/mesh"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/mesh"),
+        receipt=PLAN.receipt_of(MESH),
+        bundle=PLAN.bundle_of(MESH),
     log:
-        RUN.log_of("{scene}/{rig}/mesh"),
+        RUN.log_of(MESH),
     benchmark:
-        RUN.times_of("{scene}/{rig}/mesh")
+        RUN.times_of(MESH)
     resources:
         mem_mb=8000,
         runtime=60,

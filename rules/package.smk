@@ -1,21 +1,21 @@
 # A dataset as archives with a card, as SILVR publishes its own.
+from lightfield.workflow.jobs import PACK, PUBLISH
 
 
 rule pack:
     input:
         PLAN.reads(
-            "{scene}/{rig}/package",
-            "pack",
+            PACK,
             sums=RUN.of_build(RUN.build.packed_sums),
             files=PLAN.only_stored(RUN.of_build(RUN.build.packed_lists)),
         ),
     output:
         archive=RUN.paths.package,
         card=update(RUN.paths.card),
-        receipt=PLAN.receipt_of("{scene}/{rig}/package"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/package"),
+        receipt=PLAN.receipt_of(PACK),
+        bundle=PLAN.bundle_of(PACK),
     log:
-        RUN.log_of("{scene}/{rig}/package"),
+        RUN.log_of(PACK),
     params:
         folder=RUN.paths.folder,
     message:
@@ -29,17 +29,16 @@ rule pack:
 rule publish:
     input:
         PLAN.reads(
-            "{scene}/{rig}/publish",
-            "pack",
+            PUBLISH,
             sums=RUN.of_build(RUN.build.packed_sums),
             files=PLAN.only_stored(RUN.of_build(RUN.build.packed_lists)),
         ),
     output:
         [update(document) for document in RUN.paths.documents],
-        receipt=PLAN.receipt_of("{scene}/{rig}/publish"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/publish"),
+        receipt=PLAN.receipt_of(PUBLISH),
+        bundle=PLAN.bundle_of(PUBLISH),
     log:
-        RUN.log_of("{scene}/{rig}/publish"),
+        RUN.log_of(PUBLISH),
     params:
         folder=RUN.paths.folder,
         output=subpath(output[0], parent=True),

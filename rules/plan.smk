@@ -2,12 +2,13 @@
 import shlex
 
 from lightfield.workflow.arguments import equal_error_arguments
+from lightfield.workflow.jobs import PROBE
 
 
 rule probe:
     input:
         PLAN.reads(
-            "{scene}/{rig}/probe",
+            PROBE,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("inventory"),
@@ -15,9 +16,9 @@ rule probe:
         ),
     output:
         probe=update(RUN.paths.probe),
-        receipt=PLAN.receipt_of("{scene}/{rig}/probe"),
+        receipt=PLAN.receipt_of(PROBE),
     log:
-        RUN.log_of("{scene}/{rig}/probe"),
+        RUN.log_of(PROBE),
     resources:
         **RUN.gpu,
         mem_mb=6000,

@@ -1,4 +1,5 @@
 # The views. One job renders one shard, and keeps every finished view.
+from lightfield.workflow.jobs import RENDER
 from lightfield.workflow.run import one_of
 
 
@@ -8,14 +9,12 @@ ruleorder: import_views > render
 
 rule import_views:
     input:
-        PLAN.reads(
-            "{scene}/{rig}/render/{first}-{end}", lightfield=RUN.paths.lightfield
-        ),
+        PLAN.reads(RENDER, lightfield=RUN.paths.lightfield),
     output:
-        receipt=PLAN.receipt_of("{scene}/{rig}/render/{first}-{end}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/render/{first}-{end}"),
+        receipt=PLAN.receipt_of(RENDER),
+        bundle=PLAN.bundle_of(RENDER),
     log:
-        RUN.log_of("{scene}/{rig}/render/{first}-{end}"),
+        RUN.log_of(RENDER),
     wildcard_constraints:
         scene=one_of(
             {d.scene_folder for d in RUN.build.datasets.values() if d.imported}
@@ -37,7 +36,7 @@ rule import_views:
 rule render:
     input:
         PLAN.reads(
-            "{scene}/{rig}/render/{first}-{end}",
+            RENDER,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("inventory"),
@@ -45,17 +44,17 @@ rule render:
             cameras=RUN.paths.cameras,
         ),
     output:
-        receipt=PLAN.receipt_of("{scene}/{rig}/render/{first}-{end}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/render/{first}-{end}"),
+        receipt=PLAN.receipt_of(RENDER),
+        bundle=PLAN.bundle_of(RENDER),
     log:
-        RUN.log_of("{scene}/{rig}/render/{first}-{end}"),
+        RUN.log_of(RENDER),
     benchmark:
-        RUN.times_of("{scene}/{rig}/render/{first}-{end}")
+        RUN.times_of(RENDER)
     threads: REQUESTS.threads_of_shard
     resources:
         **RUN.gpu,
-        mem_mb=REQUESTS.memory_of("render"),
-        runtime=REQUESTS.minutes_of("render"),
+        mem_mb=REQUESTS.memory_of(RENDER),
+        runtime=REQUESTS.minutes_of(RENDER),
         stall_seconds=REQUESTS.stall_seconds,
     params:
         folder=RUN.paths.views,

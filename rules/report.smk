@@ -1,24 +1,30 @@
 # Pictures and pages of datasets.
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS
 from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import (
+    FIGURES,
+    INDEX,
+    PAGE,
+    PANORAMA_LIGHTFIELD,
+    RENDER_PANORAMA,
+)
 
 
 use rule lightfield as panorama_lightfield with:
     input:
         PLAN.reads(
-            "{scene}/{rig}/panorama/lightfield",
-            "panorama",
+            PANORAMA_LIGHTFIELD,
             inventory=RUN.of_dataset("blend_inventory"),
             model=RUN.of_dataset("model_record"),
             calibration=RUN.of_dataset("calibration"),
         ),
     output:
         lightfield=update(RUN.paths.panorama_lightfield),
-        receipt=PLAN.receipt_of("{scene}/{rig}/panorama/lightfield"),
+        receipt=PLAN.receipt_of(PANORAMA_LIGHTFIELD),
     log:
-        RUN.log_of("{scene}/{rig}/panorama/lightfield"),
+        RUN.log_of(PANORAMA_LIGHTFIELD),
     benchmark:
-        RUN.times_of("{scene}/{rig}/panorama/lightfield")
+        RUN.times_of(PANORAMA_LIGHTFIELD)
     localrule: True
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
@@ -27,7 +33,7 @@ use rule lightfield as panorama_lightfield with:
 rule render_panorama:
     input:
         PLAN.reads(
-            "{scene}/{rig}/panorama/render",
+            RENDER_PANORAMA,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("inventory"),
@@ -35,15 +41,15 @@ rule render_panorama:
         ),
     output:
         update(RUN.paths.panorama),
-        receipt=PLAN.receipt_of("{scene}/{rig}/panorama/render"),
+        receipt=PLAN.receipt_of(RENDER_PANORAMA),
     log:
-        RUN.log_of("{scene}/{rig}/panorama/render"),
+        RUN.log_of(RENDER_PANORAMA),
     benchmark:
-        RUN.times_of("{scene}/{rig}/panorama/render")
+        RUN.times_of(RENDER_PANORAMA)
     resources:
         **RUN.gpu,
-        mem_mb=REQUESTS.memory_of("render_panorama"),
-        runtime=REQUESTS.minutes_of("render_panorama"),
+        mem_mb=REQUESTS.memory_of(RENDER_PANORAMA),
+        runtime=REQUESTS.minutes_of(RENDER_PANORAMA),
     params:
         folder=RUN.paths.panorama_views,
         device=RUN.settings.device,
@@ -60,8 +66,7 @@ rule render_panorama:
 rule figures:
     input:
         PLAN.reads(
-            "{scene}/{rig}/figures",
-            "figures",
+            FIGURES,
             views=RUN.of_build(RUN.build.receipts),
             lightfield=RUN.paths.lightfield,
             panorama=RUN.of_dataset("panorama"),
@@ -77,11 +82,11 @@ rule figures:
             for picture in PICTURES
         ],
         [update(f"{RUN.paths.folder}/report/{plot}.svg") for plot in PLOTS],
-        receipt=PLAN.receipt_of("{scene}/{rig}/figures"),
+        receipt=PLAN.receipt_of(FIGURES),
     log:
-        RUN.log_of("{scene}/{rig}/figures"),
+        RUN.log_of(FIGURES),
     benchmark:
-        RUN.times_of("{scene}/{rig}/report/figures")
+        RUN.times_of(FIGURES)
     localrule: True
     params:
         dataset=subpath(output[0], ancestor=2),
@@ -97,8 +102,7 @@ rule figures:
 rule page:
     input:
         PLAN.reads(
-            "{scene}/{rig}/page",
-            "page",
+            PAGE,
             published=RUN.of_dataset("published"),
             views=PLAN.only_stored(RUN.of_dataset("all_receipts")),
             pictures=RUN.paths.pictures,
@@ -108,11 +112,11 @@ rule page:
         ),
     output:
         page=update(RUN.paths.page),
-        receipt=PLAN.receipt_of("{scene}/{rig}/page"),
+        receipt=PLAN.receipt_of(PAGE),
     log:
-        RUN.log_of("{scene}/{rig}/page"),
+        RUN.log_of(PAGE),
     benchmark:
-        RUN.times_of("{scene}/{rig}/report/page")
+        RUN.times_of(PAGE)
     localrule: True
     params:
         dataset=subpath(output.page, ancestor=2),
@@ -130,16 +134,16 @@ rule page:
 rule index:
     input:
         PLAN.reads(
-            "index",
+            INDEX,
             are_noted=True,
             pages=[dataset.paths.page for dataset in RUN.chosen],
             corpora=RUN.build.corpus_lists,
         ),
     output:
         page=update(f"{RUN.results}/index.html"),
-        receipt=PLAN.receipt_of("index"),
+        receipt=PLAN.receipt_of(INDEX),
     log:
-        RUN.log_of("index"),
+        RUN.log_of(INDEX),
     localrule: True
     params:
         results=subpath(output.page, parent=True),

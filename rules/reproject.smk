@@ -1,21 +1,21 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.workflow.jobs import LENS_MAP, REPROJECT, REPROJECTED_LIGHTFIELD
 
 
 rule reprojected_lightfield:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{reprojection}/lightfield",
-            "reproject",
+            REPROJECTED_LIGHTFIELD,
             lightfield=RUN.paths.lightfield,
         ),
     output:
         lightfield=update(RUN.paths.source_lightfield("{reprojection}/")),
-        receipt=PLAN.receipt_of("{scene}/{rig}/{reprojection}/lightfield"),
+        receipt=PLAN.receipt_of(REPROJECTED_LIGHTFIELD),
     log:
-        RUN.log_of("{scene}/{rig}/{reprojection}/lightfield"),
+        RUN.log_of(REPROJECTED_LIGHTFIELD),
     benchmark:
-        RUN.times_of("{scene}/{rig}/{reprojection}/lightfield")
+        RUN.times_of(REPROJECTED_LIGHTFIELD)
     localrule: True
     params:
         views=RUN.paths.views,
@@ -33,17 +33,16 @@ rule reprojected_lightfield:
 rule lens_map:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{reprojection}/lens_map",
-            "lens_map",
+            LENS_MAP,
             lightfield=RUN.paths.lightfield,
         ),
     output:
         RUN.paths.lens_map(),
-        receipt=PLAN.receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
+        receipt=PLAN.receipt_of(LENS_MAP),
     log:
-        RUN.log_of("{scene}/{rig}/{reprojection}/lens_map"),
+        RUN.log_of(LENS_MAP),
     benchmark:
-        RUN.times_of("{scene}/{rig}/{reprojection}/lens_map")
+        RUN.times_of(LENS_MAP)
     localrule: True
     params:
         file=RUN.paths.lens_map(),
@@ -59,7 +58,7 @@ rule lens_map:
 use rule lens_map as lens_maps with:
     output:
         [RUN.paths.lens_map(face=face) for face in CUBE_FACES],
-        receipt=PLAN.receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
+        receipt=PLAN.receipt_of(LENS_MAP),
     # Snakemake does not take this from the other rule.
     localrule: True
 
@@ -67,19 +66,18 @@ use rule lens_map as lens_maps with:
 rule reproject:
     input:
         PLAN.reads(
-            "{scene}/{rig}/{reprojection}/{first}-{end}",
-            "reproject",
+            REPROJECT,
             views=RUN.paths.receipt("render"),
             lightfield=RUN.paths.lightfield,
             lens_maps=RUN.of_build(RUN.build.lens_maps),
         ),
     output:
-        receipt=PLAN.receipt_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
-        bundle=PLAN.bundle_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
+        receipt=PLAN.receipt_of(REPROJECT),
+        bundle=PLAN.bundle_of(REPROJECT),
     log:
-        RUN.log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
+        RUN.log_of(REPROJECT),
     benchmark:
-        RUN.times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
+        RUN.times_of(REPROJECT)
     resources:
         mem_mb=2000,
     params:

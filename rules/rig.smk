@@ -1,24 +1,24 @@
 # The places of the cameras, and their lens.
 from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CHECK_CAMERAS, FREE_PLACES, LIGHTFIELD, SPLITS
 
 
 # Only a random rig's places depend on the scene.
 rule free_places:
     input:
         PLAN.reads(
-            "{scene}/{rig}/free_places",
-            "free_places",
+            FREE_PLACES,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("blend_inventory"),
         ),
     output:
         places=update(RUN.paths.places),
-        receipt=PLAN.receipt_of("{scene}/{rig}/free_places"),
+        receipt=PLAN.receipt_of(FREE_PLACES),
     log:
-        RUN.log_of("{scene}/{rig}/free_places"),
+        RUN.log_of(FREE_PLACES),
     benchmark:
-        RUN.times_of("{scene}/{rig}/cameras/free_places")
+        RUN.times_of(FREE_PLACES)
     resources:
         mem_mb=8000,
         runtime=60,
@@ -35,8 +35,7 @@ rule free_places:
 rule lightfield:
     input:
         PLAN.reads(
-            "{scene}/{rig}/lightfield",
-            "lightfield",
+            LIGHTFIELD,
             inventory=RUN.of_dataset("lightfield_inventory"),
             model=RUN.of_dataset("model_record"),
             calibration=RUN.of_dataset("calibration"),
@@ -44,11 +43,11 @@ rule lightfield:
         ),
     output:
         lightfield=update(RUN.paths.lightfield),
-        receipt=PLAN.receipt_of("{scene}/{rig}/lightfield"),
+        receipt=PLAN.receipt_of(LIGHTFIELD),
     log:
-        RUN.log_of("{scene}/{rig}/lightfield"),
+        RUN.log_of(LIGHTFIELD),
     benchmark:
-        RUN.times_of("{scene}/{rig}/cameras/lightfield")
+        RUN.times_of(LIGHTFIELD)
     localrule: True
     params:
         optional=optional("calibration", "places", "inventory", "model"),
@@ -63,7 +62,7 @@ rule lightfield:
 rule check_cameras:
     input:
         PLAN.reads(
-            "{scene}/{rig}/check_cameras",
+            CHECK_CAMERAS,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
             inventory=RUN.of_dataset("blend_inventory"),
@@ -71,11 +70,11 @@ rule check_cameras:
         ),
     output:
         cameras=update(RUN.paths.cameras),
-        receipt=PLAN.receipt_of("{scene}/{rig}/check_cameras"),
+        receipt=PLAN.receipt_of(CHECK_CAMERAS),
     log:
-        RUN.log_of("{scene}/{rig}/check_cameras"),
+        RUN.log_of(CHECK_CAMERAS),
     benchmark:
-        RUN.times_of("{scene}/{rig}/cameras/check_cameras")
+        RUN.times_of(CHECK_CAMERAS)
     resources:
         mem_mb=8000,
         runtime=60,
@@ -91,14 +90,12 @@ rule check_cameras:
 
 rule splits:
     input:
-        PLAN.reads(
-            "{scene}/splits", lightfields=RUN.of_build(RUN.build.split_lightfields)
-        ),
+        PLAN.reads(SPLITS, lightfields=RUN.of_build(RUN.build.split_lightfields)),
     output:
         splits=update(RUN.paths.splits),
-        receipt=PLAN.receipt_of("{scene}/splits"),
+        receipt=PLAN.receipt_of(SPLITS),
     log:
-        RUN.log_of("{scene}/splits"),
+        RUN.log_of(SPLITS),
     localrule: True
     message:
         "Listing what the views of {wildcards.scene} are for"

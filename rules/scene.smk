@@ -1,23 +1,23 @@
 # A .blend: built by a scene builder, made of a model file, or brought by the user and checked.
+from lightfield.workflow.jobs import BUILD_SCENE, CHECK_BLEND, IMPORT_MODEL, INVENTORY
 from lightfield.workflow.run import one_of
 
 
 rule build_scene:
     input:
         PLAN.reads(
-            "{name}/build_scene",
-            "build_scene",
+            BUILD_SCENE,
             # With a store, each job's folder has a user's own builder, as it has the scene YAMLs.
             builder=PLAN.only_shared(RUN.builder_of),
         ),
     output:
         # Snakemake copies a file before it is updated, and this one is large.
         blend=RUN.paths.built_blend,
-        receipt=PLAN.receipt_of("{name}/build_scene"),
+        receipt=PLAN.receipt_of(BUILD_SCENE),
     log:
-        RUN.log_of("{name}/build_scene"),
+        RUN.log_of(BUILD_SCENE),
     benchmark:
-        RUN.times_of("{name}/build_scene")
+        RUN.times_of(BUILD_SCENE)
     resources:
         mem_mb=8000,
         runtime=30,
@@ -32,19 +32,18 @@ rule build_scene:
 rule import_model:
     input:
         PLAN.reads(
-            "{name}/import_model",
-            "import_model",
+            IMPORT_MODEL,
             model=RUN.model_of,
             light=RUN.light_of,
         ),
     output:
         blend=RUN.paths.model_blend,
         record=update(RUN.paths.model_record),
-        receipt=PLAN.receipt_of("{name}/import_model"),
+        receipt=PLAN.receipt_of(IMPORT_MODEL),
     log:
-        RUN.log_of("{name}/import_model"),
+        RUN.log_of(IMPORT_MODEL),
     benchmark:
-        RUN.times_of("{name}/import_model")
+        RUN.times_of(IMPORT_MODEL)
     # With a store a user's files lie where Snakemake runs.
     localrule: PLAN.is_stored
     resources:
@@ -61,17 +60,16 @@ rule import_model:
 rule check_blend:
     input:
         PLAN.reads(
-            "{name}/check_blend",
-            "check_blend",
+            CHECK_BLEND,
             blend=RUN.checked_blend_of,
         ),
     output:
         check=update(RUN.paths.blend_check),
-        receipt=PLAN.receipt_of("{name}/check_blend"),
+        receipt=PLAN.receipt_of(CHECK_BLEND),
     log:
-        RUN.log_of("{name}/check_blend"),
+        RUN.log_of(CHECK_BLEND),
     benchmark:
-        RUN.times_of("{name}/check_blend")
+        RUN.times_of(CHECK_BLEND)
     localrule: True
     message:
         "Checking {input.blend}"
@@ -84,19 +82,18 @@ rule check_blend:
 rule inventory:
     input:
         PLAN.reads(
-            "{name}/inventory",
-            "inventory",
+            INVENTORY,
             check=RUN.blend_check_of,
             blend=RUN.blend_of,
         ),
     output:
         inventory=update(RUN.paths.inventory),
-        receipt=PLAN.receipt_of("{name}/inventory"),
-        bundle=PLAN.bundle_of("{name}/inventory"),
+        receipt=PLAN.receipt_of(INVENTORY),
+        bundle=PLAN.bundle_of(INVENTORY),
     log:
-        RUN.log_of("{name}/inventory"),
+        RUN.log_of(INVENTORY),
     benchmark:
-        RUN.times_of("{name}/inventory")
+        RUN.times_of(INVENTORY)
     # With a store a user's files lie where Snakemake runs.
     localrule:
         PLAN.is_stored

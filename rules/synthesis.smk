@@ -1,11 +1,11 @@
 # The quality of views synthesised inside a light field. It is not part of a dataset: name the target.
+from lightfield.workflow.jobs import SYNTHESIS
 
 
 rule measure_synthesis:
     input:
         PLAN.reads(
-            "{scene}/{rig}/synthesis",
-            "synthesis",
+            SYNTHESIS,
             views=RUN.of_build(RUN.build.rendered_receipts),
             truth=RUN.of_build(RUN.build.truth_receipts),
             lightfield=RUN.paths.lightfield,
@@ -17,9 +17,9 @@ rule measure_synthesis:
             ".svg",
             ".png",
         ),
-        receipt=PLAN.receipt_of("{scene}/{rig}/synthesis"),
+        receipt=PLAN.receipt_of(SYNTHESIS),
     log:
-        RUN.log_of("{scene}/{rig}/synthesis"),
+        RUN.log_of(SYNTHESIS),
     resources:
         mem_mb=4000,
     params:

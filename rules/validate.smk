@@ -1,5 +1,6 @@
 # Validation of datasets, and the checksums of all published files.
 from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CHECKSUMS, VALIDATE, VALIDATE_SEQUENCE
 
 
 # An invalid dataset is an outcome too: it gets its validation.json, and fails below. It also gets its
@@ -7,8 +8,7 @@ from lightfield.workflow.arguments import optional
 rule validate:
     input:
         PLAN.reads(
-            "{scene}/{rig}/validate",
-            "validate",
+            VALIDATE,
             views=RUN.of_dataset("all_receipts"),
             published=RUN.of_dataset("published"),
             cameras=RUN.of_dataset("cameras"),
@@ -17,11 +17,11 @@ rule validate:
         ),
     output:
         validation=update(RUN.paths.validation),
-        receipt=PLAN.receipt_of("{scene}/{rig}/validate"),
+        receipt=PLAN.receipt_of(VALIDATE),
     log:
-        RUN.log_of("{scene}/{rig}/validate"),
+        RUN.log_of(VALIDATE),
     benchmark:
-        RUN.times_of("{scene}/{rig}/validate")
+        RUN.times_of(VALIDATE)
     wildcard_constraints:
         scene=RUN.scene_of_dataset,
     threads: 2
@@ -44,17 +44,16 @@ rule validate:
 rule checksums:
     input:
         PLAN.reads(
-            "{scene}/{rig}/checksums",
-            "checksums",
+            CHECKSUMS,
             validation=RUN.paths.validation,
             receipts=RUN.of_dataset("all_receipts"),
             lists=RUN.of_dataset("published"),
         ),
     output:
         sums=update(RUN.paths.sums),
-        receipt=PLAN.receipt_of("{scene}/{rig}/checksums"),
+        receipt=PLAN.receipt_of(CHECKSUMS),
     log:
-        RUN.log_of("{scene}/{rig}/checksums"),
+        RUN.log_of(CHECKSUMS),
     wildcard_constraints:
         scene=RUN.scene_of_dataset,
     localrule: True
@@ -72,19 +71,18 @@ rule checksums:
 rule validate_sequence:
     input:
         PLAN.reads(
-            "{scene}/{rig}/validate_sequence",
-            "validate_sequence",
+            VALIDATE_SEQUENCE,
             exports=RUN.of_build(RUN.build.sequence_exports),
             views=RUN.of_build(RUN.build.validated_frames),
         ),
     output:
         validation=update(RUN.paths.validation),
         sums=update(RUN.paths.sums),
-        receipt=PLAN.receipt_of("{scene}/{rig}/validate_sequence"),
+        receipt=PLAN.receipt_of(VALIDATE_SEQUENCE),
     log:
-        RUN.log_of("{scene}/{rig}/validate_sequence"),
+        RUN.log_of(VALIDATE_SEQUENCE),
     benchmark:
-        RUN.times_of("{scene}/{rig}/validate")
+        RUN.times_of(VALIDATE_SEQUENCE)
     wildcard_constraints:
         scene=RUN.scene_of_sequence,
         rig="[A-Za-z0-9_.-]+",

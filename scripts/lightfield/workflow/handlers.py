@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -13,14 +14,23 @@ from typing import Any
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import duration
-from lightfield.planning.cost import Cost, cost
+from lightfield.planning.cost import Cost
 from lightfield.planning.forecast import Work, forecast, requests_table
-from lightfield.planning.phases import KINDS, ORDER, SENSOR_PHASE
+from lightfield.planning.phases import SENSOR_PHASE
 from lightfield.workflow import run_lock
 from lightfield.workflow.job_plan import JobPlan, PlannedJob
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    CALIBRATE,
+    COUNT_MEMBERS,
+    ORDER,
+    PACK,
+    RENDER,
+    Job,
+)
 from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.run_display import RunDisplay, Task
-from lightfield.workflow.start import StartChecks, explain_full_disk, is_import
+from lightfield.workflow.start import StartChecks, explain_full_disk
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -96,18 +106,16 @@ class Handlers:
 
     def _announce_calibrations(self) -> None:
         """Print the estimated time of each calibration, and of the datasets that depend on it."""
-        seconds: dict[str, dict[str, float]] = {}
+        seconds: dict[str, dict[Job, float]] = {}
         for planned in self._plan.planned_jobs():
-            stage = KINDS[planned.job].stage
-            if stage in ("calibrate", "render"):
-                of_scene = {"calibrate": 0.0, "render": 0.0}
-                costs = seconds.setdefault(planned.names["scene"], of_scene)
-                costs[stage] += (self._cost_of(planned) or Cost()).seconds
+            if planned.job in (CALIBRATE, RENDER):
+                costs = seconds.setdefault(planned.names["scene"], {CALIBRATE: 0.0, RENDER: 0.0})
+                costs[planned.job] += (self._cost_of(planned) or Cost()).seconds
         for scene, costs in seconds.items():
-            if costs["calibrate"]:
+            if costs[CALIBRATE]:
                 print(
-                    f"calibrating {scene} takes some {duration(costs['calibrate'])} of a core,"
-                    f" and rendering it then some {duration(costs['render'])}",
+                    f"calibrating {scene} takes some {duration(costs[CALIBRATE])} of a core,"
+                    f" and rendering it then some {duration(costs[RENDER])}",
                     file=sys.stderr,
                 )
 
@@ -130,33 +138,21 @@ class Handlers:
             reprojection = self._run.asked(self._run.build.reprojection, planned.names)
             if reprojection and reprojection.sensor:
                 return SENSOR_PHASE
-        return KINDS[planned.job].phase
+        return planned.job.phase
 
     def _rendered_views(self, planned: PlannedJob) -> int:
         """Return the number of the dataset's views that a job renders."""
         job, names = planned
-        if KINDS[job].stage == "build_members":
+        if job is BUILD_MEMBERS:
             return self._run.asked(self._run.build.batch_views, names)
-        is_shard = KINDS[job].stage == "render"
-        return int(names["end"]) - int(names["first"]) if is_shard else 0
+        return int(names["end"]) - int(names["first"]) if job is RENDER else 0
 
     def _cost_of(self, planned: PlannedJob) -> Cost | None:
         """Return the cost of a job. None if it is unknown."""
         job, names = planned
-        run, build = self._run, self._run.build
-        stage = KINDS[job].stage
-        if stage is None:
+        if job.cost is None:
             return None
-        if stage == "calibrate":
-            return cost(stage, build.first_of_scene(names["scene"]))
-        if stage == "build_members":
-            return run.asked(build.batch_cost, names)
-        # Packing a sequence belongs to several datasets.
-        if "rig" not in names or f"{names['scene']}/{names['rig']}" not in build.datasets:
-            return cost(stage)
-        if is_import(run, planned):
-            stage = "import_views"
-        return run.asked(lambda names: build.job_cost(stage, names), names)
+        return self._run.asked(partial(job.cost, self._run.build), names)
 
     # The ends.
 
@@ -212,7 +208,7 @@ class Handlers:
     def _print_packages(self, is_left: IsLeft) -> None:
         """Print the paths of the first archives of this run's packages."""
         for receipt, (job, names) in self._plan.asked.items():
-            if job == "{scene}/{rig}/package":
+            if job is PACK:
                 state = "not packed" if is_left(receipt) else "packed"
                 archive = self._run.paths.package.format(**names)
                 print(f"{state}: {self._plan.shown(archive)}", file=sys.stderr)
@@ -220,7 +216,7 @@ class Handlers:
     def _print_families(self, is_left: IsLeft) -> None:
         """Print how many members of each family are built, if this run has counted them."""
         for receipt, planned in self._plan.asked.items():
-            is_count = KINDS[planned.job].stage == "count_members"
+            is_count = planned.job is COUNT_MEMBERS
             if is_count and self._plan.check.will_run(receipt) and not is_left(receipt):
                 log = Path(self._run.log_of(planned.name))
                 print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
@@ -256,7 +252,7 @@ class Handlers:
     def _print_requests(self, jobs: list[PlannedJob]) -> None:
         """Print what the jobs of a dry run would request of the cluster."""
         requests = self.display.requests
-        logs = [self._run.log_of(each.name) for each in jobs if not KINDS[each.job].is_local]
+        logs = [self._run.log_of(each.name) for each in jobs if not each.job.is_local]
         found = [requests[log] for log in logs if log in requests]
         if found:
             print(f"\n{requests_table(found)}\n\n{REQUESTS_NOTE}")

@@ -6,6 +6,7 @@ judges the job's receipt. A job that must run gets the mark as an input with new
 
 import atexit
 import contextlib
+import functools
 import itertools
 import json
 import os
@@ -24,11 +25,11 @@ from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, special_kind, unreadable, write_text
 from lightfield.core.receipts import SUFFIX, make_way
-from lightfield.planning.phases import KINDS
 from lightfield.stages.registry import VERSIONS
-from lightfield.workflow import job_settings, presence, run_lock
+from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
+from lightfield.workflow.jobs import FIGURES, PAGE, RENDER, Job
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -49,15 +50,15 @@ class Wanted(NamedTuple):
 
 
 class PlannedJob(NamedTuple):
-    """A job: its name with wildcards, and the wildcards."""
+    """A job: its record, and its wildcards."""
 
-    job: str
+    job: Job
     names: Wildcards
 
     @property
     def name(self) -> str:
         """Its name, as its receipt and its log have it."""
-        return self.job.format(**self.names)
+        return self.job.name.format(**self.names)
 
 
 class JobPlan:
@@ -81,8 +82,8 @@ class JobPlan:
         self.mark = f"{run.work}/check.txt"
         # The jobs that Snakemake asked about, by receipt.
         self.asked: dict[str, PlannedJob] = {}
-        # The names of jobs, with wildcards, and the functions that return what they read.
-        self._jobs: list[tuple[str, Callable[[HasWildcards], Wanted]]] = []
+        # The jobs of the rules, and the functions that return what they read.
+        self._jobs: list[tuple[Job, Callable[[HasWildcards], Wanted]]] = []
         # The settings that differ from their files. They are written when a run starts.
         self._new_settings: dict[str, str] = {}
         # The settings by their files' paths, which a job writes each: see rules/settings.smk. Empty
@@ -98,33 +99,29 @@ class JobPlan:
 
     # What a rule asks for.
 
-    def receipt_of(self, job: str) -> Any:
-        """Return the output that is the receipt of a job. ``job`` is its name, with wildcards."""
-        return self.run.marks.update(self.receipt_path(job))
+    def receipt_of(self, job: Job) -> Any:
+        """Return the output that is the receipt of a job, with wildcards."""
+        return self.run.marks.update(self.receipt_path(job.name))
 
-    def bundle_of(self, job: str) -> str | list[str]:
+    def bundle_of(self, job: Job) -> str | list[str]:
         """Return the output that is the bundle of a job. Empty if jobs share a folder."""
         return []
 
-    def reads(
-        self, job: str, stage: str | None = None, are_noted: bool = False, **inputs: Any
-    ) -> Any:
+    def reads(self, job: Job, are_noted: bool = False, **inputs: Any) -> Any:
         """Return the inputs of a rule: its files, its settings, and the mark that makes it run.
 
-        ``job`` is the name of the job, with wildcards, as `receipt_of` has it. ``stage`` is the
-        name of its settings. ``inputs`` are paths with wildcards, lists of them, or input
-        functions. ``are_noted`` says that the job must run if its receipt lacks one of them. A
-        receipt may have more of them, which other runs chose.
+        ``inputs`` are paths with wildcards, lists of them, or input functions. ``are_noted`` says
+        that the job must run if its receipt lacks one of them. A receipt may have more of them,
+        which other runs chose.
         """
 
         def wanted(wildcards: HasWildcards) -> Wanted:
             """Return the job's inputs by name, and the path and content of its settings."""
             files = {name: paths_of(each, wildcards) for name, each in inputs.items()}
-            if not stage:
+            if job.settings is None:
                 return Wanted(files, None, {})
-            path, content = self.run.asked(
-                lambda names: job_settings.settings_file(stage, self.run.build, names), wildcards
-            )
+            settings_of = functools.partial(job.settings, self.run.build)
+            path, content = self.run.asked(settings_of, wildcards)
             if "inputs" in content:
                 content["inputs"] = [*flat(files.values())]
             return Wanted(files, path, content)
@@ -168,8 +165,8 @@ class JobPlan:
             # Snakemake would name read-only files in many lines, or end with a traceback.
             for folder in self._folders_of(planned):
                 self._end_unless_writable(folder)
-            name = planned.name
-            self._wait_until_past([receipt, self.run.log_of(name), self.run.times_of(name)])
+            written = (self.run.log_of(planned.job), self.run.times_of(planned.job))
+            self._wait_until_past([receipt, *(path.format(**planned.names) for path in written)])
         if not os.path.exists(self.mark):  # noqa: PTH110, a `Path` is slow for many jobs
             self.new_mark()
         files = {name: self._unless_newer(receipt, each) for name, each in wanted.files.items()}
@@ -182,11 +179,11 @@ class JobPlan:
         """Return folders in which a job writes."""
         job, names = planned
         run, paths = self.run, self.run.paths
-        written = [f"{run.results}/{job}", f"{run.work}/{job}", f"{self.receipts}/{job}"]
+        written = [f"{folder}/{job.name}" for folder in (run.results, run.work, self.receipts)]
         written += [run.log_of(job), run.times_of(job)]
-        if KINDS[job].stage == "render":
+        if job is RENDER:
             written.append(f"{paths.views}/{{first}}")
-        elif job in ("{scene}/{rig}/figures", "{scene}/{rig}/page"):
+        elif job in (FIGURES, PAGE):
             written.append(paths.page)
         return [os.path.dirname(path.format(**names)) for path in written]  # noqa: PTH120
 
@@ -250,17 +247,17 @@ class JobPlan:
     def _wanted_settings(self, receipt: str) -> Content | None:
         """Return the wanted settings of a receipt's job. None if no job of this plan makes it."""
         for job, wanted in self._jobs:
-            if found := re.fullmatch(self._expression_of(job), self._job_of(receipt)):
+            if found := re.fullmatch(self._expression_of(job.name), self._job_of(receipt)):
                 # A job that the configuration no longer has would end the run.
                 with contextlib.suppress(SystemExit):
                     return wanted(found.groupdict()).settings
         return None
 
-    def _expression_of(self, job: str) -> str:
-        """Return the regular expression that the names of jobs match."""
-        if job not in self._expressions:
-            self._expressions[job] = _expression(job, self.run.constraints)
-        return self._expressions[job]
+    def _expression_of(self, pattern: str) -> str:
+        """Return the regular expression that a name or path with wildcards stands for."""
+        if pattern not in self._expressions:
+            self._expressions[pattern] = _expression(pattern, self.run.constraints)
+        return self._expressions[pattern]
 
     # The jobs that run.
 
@@ -369,7 +366,8 @@ class JobPlan:
 
     def is_outdated(self, dataset: Dataset) -> bool:
         """Return whether this run makes the light field of a dataset again."""
-        return self.check.will_run(self.receipt_path(f"{dataset.name}/lightfield"))
+        receipt = self.receipt_path(f"{dataset.name}/lightfield")
+        return self.check.will_run(receipt)
 
     def is_valid(self, dataset: Dataset) -> bool:
         """Return whether the validation of a finished dataset says that it is valid."""
@@ -422,9 +420,9 @@ def text_of(settings: Content) -> str:
     return json.dumps(settings, indent=1, allow_nan=False) + "\n"
 
 
-def _expression(job: str, constraints: Mapping[str, str]) -> str:
-    """Return the regular expression that the names of jobs match."""
-    parts = re.split(r"\{(\w+)\}", job)
+def _expression(pattern: str, constraints: Mapping[str, str]) -> str:
+    """Return the regular expression that a name or path with wildcards stands for."""
+    parts = re.split(r"\{(\w+)\}", pattern)
     texts = map(re.escape, parts[::2])
     wildcards = [f"(?P<{name}>{constraints[name]})" for name in parts[1::2]]
     return "".join(itertools.chain(*itertools.zip_longest(texts, wildcards, fillvalue="")))

@@ -1,9 +1,11 @@
 """The cores, memory and time that jobs ask for, by what they are expected to cost."""
 
 from collections.abc import Callable
+from functools import partial
 
 from lightfield.core.gpus import CUDA
-from lightfield.planning.cost import Cost, cost, shard_threads
+from lightfield.planning.cost import Cost, rendering, shard_threads
+from lightfield.workflow.jobs import Job
 from lightfield.workflow.run import HasWildcards, Run
 
 
@@ -13,23 +15,24 @@ class JobRequests:
     def __init__(self, run: Run) -> None:
         self._run = run
 
-    def cost_at(self, stage: str, wildcards: HasWildcards) -> Cost:
-        """Return the cost of a dataset's job at a stage."""
-        return self._run.asked(lambda names: self._run.build.job_cost(stage, names), wildcards)
+    def memory_of(self, job: Job) -> Callable[[HasWildcards, int], int]:
+        """Return the resource function of a job's memory in MB. Each new attempt gets more."""
+        return lambda wildcards, attempt: self._cost_of(job, wildcards).megabytes(attempt)
 
-    def memory_of(self, stage: str) -> Callable[[HasWildcards, int], int]:
-        """Return the resource function of a stage's memory in MB. Each new attempt gets more."""
-        return lambda wildcards, attempt: self.cost_at(stage, wildcards).megabytes(attempt)
+    def minutes_of(self, job: Job) -> Callable[[HasWildcards, int], int]:
+        """Return the resource function of a job's time limit in minutes."""
+        return lambda wildcards, threads: self._cost_of(job, wildcards).most_minutes(threads)
 
-    def minutes_of(self, stage: str) -> Callable[[HasWildcards, int], int]:
-        """Return the resource function of a stage's time limit in minutes."""
-        return lambda wildcards, threads: self.cost_at(stage, wildcards).most_minutes(threads)
+    def _cost_of(self, job: Job, wildcards: HasWildcards) -> Cost:
+        """Return the cost of a job."""
+        assert job.cost
+        return self._run.asked(partial(job.cost, self._run.build), wildcards)
 
     def threads_of_shard(self, wildcards: HasWildcards) -> int:
         """Return the cores of each shard, so that the shards at work fit this machine."""
         run = self._run
         shards = sum(len(dataset.shards) for dataset in run.chosen)
-        need = self.cost_at("render", wildcards).memory_bytes
+        need = rendering(run.asked(run.build.dataset, wildcards)).memory_bytes
         threads = shard_threads(run.cores, shards, need, run.memory)
         # Cycles may be unable to use an AMD GPU, unless the user names its kind.
         is_hip = run.settings.device == "hip"
@@ -48,5 +51,5 @@ class JobRequests:
 
         On this machine it is 0, which means never: the user may suspend and continue a build.
         """
-        a_view = cost("render", self._run.asked(self._run.build.dataset, wildcards), views=1)
+        a_view = rendering(self._run.asked(self._run.build.dataset, wildcards), views=1)
         return 0 if self._run.runs_here else a_view.stall_seconds

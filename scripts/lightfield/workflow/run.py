@@ -23,6 +23,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.memory import available
 from lightfield.workflow import presence
 from lightfield.workflow.build import Build, Wildcards
+from lightfield.workflow.jobs import Job
 from lightfield.workflow.run_config import NOTES, RunConfig, ending_run
 
 Answer = TypeVar("Answer")
@@ -164,13 +165,13 @@ class Run:
         """The folder to which damaged files are moved, so that nobody loses anything."""
         return f"{self.work}/removed"
 
-    def log_of(self, job: str) -> str:
-        """Return the log of a job. ``job`` is its path, with wildcards."""
-        return f"{self.work}/logs/{job}.log"
+    def log_of(self, job: Job | str) -> str:
+        """Return the log of a job, with wildcards. A job without a record has a name."""
+        return f"{self.work}/logs/{job if isinstance(job, str) else job.name}.log"
 
-    def times_of(self, job: str) -> str:
-        """Return the TSV in which Snakemake writes a job's time and memory."""
-        return f"{self.work}/benchmarks/{job}.tsv"
+    def times_of(self, job: Job) -> str:
+        """Return the TSV in which Snakemake writes a job's time and memory, with wildcards."""
+        return f"{self.work}/benchmarks/{job.times or job.name}.tsv"
 
     @cached_property
     def blends(self) -> dict[str, str]:

@@ -14,12 +14,12 @@ from lightfield.core.disk_space import Need, check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.planning.cost import light_group_count, temporary_bytes, view_cost
-from lightfield.planning.phases import KINDS
 from lightfield.stages.measurement import RENDERS_ON
 from lightfield.workflow import presence
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.job_plan import JobPlan, PlannedJob
 from lightfield.workflow.job_requests import JobRequests
+from lightfield.workflow.jobs import BUILD_MEMBERS, CHECK_BLEND, GPU_CHECK, INVENTORY, RENDER
 from lightfield.workflow.run import Run
 from lightfield.workflow.run_config import NOTES
 
@@ -28,22 +28,12 @@ LEAST_ADDRESS_SPACE = 1.5e9
 # A built scene takes at most so many bytes.
 BUILT_SCENE = 1e8
 
-# The jobs that render on the device.
-RENDERING = (
-    "{scene}/{rig}/render/{first}-{end}",
-    "{scene}/{rig}/panorama/render",
-    "{scene}/{rig}/probe",
-    "{scene}/calibrate",
-    "{scene}/error_vs_time",
-    "{scene}/gpu_check",
-    "{family}/batches/{batch}",
-)
-
 
 def is_import(run: Run, planned: PlannedJob) -> bool:
     """Return whether a job imports views instead of rendering them."""
-    is_render = KINDS[planned.job].stage == "render"
-    return is_render and run.asked(run.build.dataset, planned.names).imported is not None
+    if planned.job is not RENDER:
+        return False
+    return run.asked(run.build.dataset, planned.names).imported is not None
 
 
 class StartChecks:
@@ -88,9 +78,9 @@ class StartChecks:
         run = self._run
         jobs = [each.job for each in self._plan.planned_jobs() if not is_import(run, each)]
         device: str = run.settings.device
-        if device == "auto" and "{scene}/gpu_check" in jobs:
+        if device == "auto" and GPU_CHECK in jobs:
             device = "gpu"
-        renders = any(job in RENDERING for job in jobs)
+        renders = any(job.renders for job in jobs)
         if not (renders and run.runs_here and (run.gpus or device == "gpu")):
             return
         command = [sys.executable, str(run.folder / "scripts/check_device.py"), device]
@@ -122,8 +112,8 @@ class StartChecks:
         """Return the disk space that the jobs of this run need."""
         run, build = self._run, self._run.build
         jobs = self._plan.planned_jobs()
-        renders = [names for job, names in jobs if KINDS[job].stage == "render"]
-        batches = [names for job, names in jobs if KINDS[job].stage == "build_members"]
+        renders = [names for job, names in jobs if job is RENDER]
+        batches = [names for job, names in jobs if job is BUILD_MEMBERS]
         datasets = {
             d.paths.folder: d for d in (run.asked(build.dataset, names) for names in renders)
         }
@@ -169,12 +159,11 @@ class StartChecks:
     def _check_input(self, planned: PlannedJob) -> None:
         """Raise `UserError` for a user's file that a job would refuse."""
         run, names = self._run, planned.names
-        stage = KINDS[planned.job].stage
-        if stage == "check_blend":
+        if planned.job is CHECK_BLEND:
             blend = Path(str(run.asked(run.build.scene, names).source.blend))
             if blend.is_file():
                 expected_blend(names["name"], blend, sha256(blend))
-        elif stage == "inventory":
+        elif planned.job is INVENTORY:
             presence.check_external_files(run.asked(run.build.scene, names))
         elif is_import(run, planned):
             presence.check_imported(run.asked(run.build.dataset, names))

@@ -15,8 +15,8 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.core import bundles
 from lightfield.core.errors import UserError
-from lightfield.core.receipts import SUFFIX
-from lightfield.workflow.build import has_bundle
+from lightfield.core.receipts import SUFFIX, is_receipt
+from lightfield.workflow.build import Wildcards
 from lightfield.workflow.job_plan import (
     Content,
     Files,
@@ -27,6 +27,7 @@ from lightfield.workflow.job_plan import (
     is_in_storage,
     text_of,
 )
+from lightfield.workflow.jobs import JOBS, Job
 from lightfield.workflow.run import HasWildcards, Run
 from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.storage import Storage
@@ -50,6 +51,7 @@ class StoredPlan(JobPlan):
         self.storage = Storage(self.url)
         provider, _, place = self.url.rpartition("://")
         self.copies = f".snakemake/storage/{provider or 'fs'}/{place.strip('/')}/"
+        self._makers: dict[str, tuple[str, Job] | None] = {}
         self.settings_paths = rf"{re.escape(run.work)}/(.+/)?settings/.+\.json"
         with ending_run():
             self._check_paths(run)
@@ -107,8 +109,8 @@ class StoredPlan(JobPlan):
 
     # What a rule asks for.
 
-    def bundle_of(self, job: str) -> str | list[str]:
-        return f"{self.receipts}/{job}{bundles.SUFFIX}"
+    def bundle_of(self, job: Job) -> str | list[str]:
+        return f"{self.receipts}/{job.name}{bundles.SUFFIX}"
 
     def only_stored(self, files: Any) -> Any:
         return files
@@ -140,12 +142,41 @@ class StoredPlan(JobPlan):
         makers: list[str] = []
         packed: list[str] = []
         for name, each in files.items():
-            found = [self.run.build.receipt_of_file(path) for path in flat([each])]
-            makers += filter(None, found)
+            found = [*filter(None, map(self._maker_of, flat([each])))]
+            makers += [receipt for receipt, _ in found]
             if name not in ("receipts", "lists"):
-                packed += [path for path in found if path and has_bundle(path)]
+                packed += [receipt for receipt, job in found if job.has_bundle]
         bundled = [path.removesuffix(SUFFIX) + bundles.SUFFIX for path in packed]
         return {"makers": [*dict.fromkeys(makers)], "bundles": [*dict.fromkeys(bundled)]}
+
+    def _maker_of(self, path: str) -> tuple[str, Job] | None:
+        """Return the receipt and the record of the job that made a file.
+
+        A receipt stands for itself. None for a file by which no reader knows a job.
+        """
+        if path not in self._makers:
+            self._makers[path] = self._find_maker(path)
+        return self._makers[path]
+
+    def _find_maker(self, path: str) -> tuple[str, Job] | None:
+        if is_receipt(path):
+            return next(
+                (path, job) for job in JOBS if self._names(self.receipt_path(job.name), path)
+            )
+        for job in JOBS:
+            names = job.file and self._names(job.file(self.run.paths), path)
+            if names and job.is_of_sequence == self._is_of_sequence(names):
+                return self.receipt_path(job.name.format(**names)), job
+        return None
+
+    def _names(self, pattern: str, path: str) -> Wildcards | None:
+        """Return the wildcards of a path. None if it does not match the pattern."""
+        found = re.fullmatch(self._expression_of(pattern), path)
+        return found.groupdict() if found else None
+
+    def _is_of_sequence(self, names: Wildcards) -> bool:
+        """Return whether a file belongs to all frames of a sequence."""
+        return "rig" in names and f"{names['scene']}/{names['rig']}" not in self.run.build.datasets
 
     # What the end of a run says. The storage has all receipts, which nobody looks at again.
 
