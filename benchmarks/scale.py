@@ -37,7 +37,7 @@ from lightfield.core.names import ROOT
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
-from lightfield.workflow.loading import chosen_families, load_datasets
+from lightfield.planning.loading import chosen_families, load_datasets
 
 SCENE = """
 scene: {{builder: room}}

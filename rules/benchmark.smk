@@ -1,7 +1,8 @@
 # Measurements that anybody can repeat. They are not part of a dataset: name the target.
+from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import GPU_CHECK
 
-
-MEASURED = f"{RESULTS}/benchmarks"
+MEASURED = f"{RUN.results}/benchmarks"
 
 
 rule reprojection_benchmark:
@@ -13,15 +14,16 @@ rule reprojection_benchmark:
             caption="../captions/reprojection_benchmark.rst",
         ),
     log:
-        log_of("reprojection_benchmark"),
+        RUN.log_of("reprojection_benchmark"),
     # Alone on the machine, so that nothing else is in the figures.
-    threads: ALL_CORES
+    threads: RUN.cores
     params:
         folder=subpath(output[0], parent=True),
     message:
         "Measuring the error of reprojection against its run time"
     shell:
-        f"python {BENCHMARKS}/reprojection.py" " {params.folder} --batch 8 > {log} 2>&1"
+        f"python {RUN.benchmarks}/reprojection.py"
+        " {params.folder} --batch 8 > {log} 2>&1"
 
 
 rule stability:
@@ -33,71 +35,70 @@ rule stability:
             caption="../captions/stability.rst",
         ),
     log:
-        log_of("stability"),
+        RUN.log_of("stability"),
     params:
         folder=subpath(output[0], parent=True),
     message:
         "Taking every pair of lenses to its extremes"
     shell:
-        f"python {BENCHMARKS}/stability.py" " --output {params.folder} > {log} 2>&1"
+        f"python {RUN.benchmarks}/stability.py" " --output {params.folder} > {log} 2>&1"
 
 
 rule extremes:
     output:
         multiext(f"{MEASURED}/extremes", ".csv", ".md"),
     log:
-        log_of("extremes"),
+        RUN.log_of("extremes"),
     params:
         folder=subpath(output[0], parent=True),
     message:
         "Rendering what is hard for a renderer"
     shell:
-        f"python {BENCHMARKS}/extremes.py" " --output {params.folder} > {log} 2>&1"
+        f"python {RUN.benchmarks}/extremes.py" " --output {params.folder} > {log} 2>&1"
 
 
 rule render_overhead:
     output:
         f"{MEASURED}/render_overhead.md",
     log:
-        log_of("render_overhead"),
-    threads: ALL_CORES
+        RUN.log_of("render_overhead"),
+    threads: RUN.cores
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
-        f"python {BENCHMARKS}/render_overhead.py" " > {output} 2> {log}"
+        f"python {RUN.benchmarks}/render_overhead.py" " > {output} 2> {log}"
 
 
 rule check_gpu:
     input:
-        reads(
-            "{scene}/gpu_check",
-            "gpu_check",
-            check=of_first("blend_check"),
-            blend=of_first("blend"),
-            inventory=of_first("inventory"),
-            lightfield=PATHS.probes,
-            calibration=of_first("calibration"),
+        PLAN.reads(
+            GPU_CHECK,
+            check=RUN.of_first("blend_check"),
+            blend=RUN.of_first("blend"),
+            inventory=RUN.of_first("inventory"),
+            lightfield=RUN.paths.probes,
+            calibration=RUN.of_first("calibration"),
         ),
     output:
         multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
-        receipt=receipt_of("{scene}/gpu_check"),
+        receipt=PLAN.receipt_of(GPU_CHECK),
     log:
-        log_of("{scene}/gpu_check"),
+        RUN.log_of(GPU_CHECK),
     # Alone on the machine, so that nothing else is in the times.
-    threads: ALL_CORES
+    threads: RUN.cores
     resources:
-        **GPU,
+        **RUN.gpu,
         mem_mb=6000,
         runtime=60,
     params:
-        device=SETTINGS.device,
-        cache=of_first("paths.trials"),
+        device=RUN.settings.device,
+        cache=RUN.of_first("paths.trials"),
         calibration=optional("calibration"),
         stem=subpath(output[0], strip_suffix=".json"),
     message:
-        "Comparing what the GPU and the processor make of {wildcards.scene}"
+        "Comparing what the RUN.gpu and the processor make of {wildcards.scene}"
     shell:
-        f"python {SCRIPTS}/gpu_check.py"
+        f"python {RUN.scripts}/gpu_check.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device}"
         " --threads {threads} --settings {input.settings}"
@@ -105,8 +106,8 @@ rule check_gpu:
         " > {log} 2>&1"
 
 
-# Without a GPU the run ends before its first job.
+# Without a RUN.gpu the run ends before its first job.
 rule gpu_check:
     input:
-        [f"{MEASURED}/gpu_check/{name}.json" for name in RENDERED_SCENES],
-        PROBES,
+        [f"{MEASURED}/gpu_check/{name}.json" for name in RUN.rendered_scenes],
+        RUN.probes,

@@ -1,27 +1,24 @@
 # Error: against render time, measured on request, and below a scene's target, which a scene YAML
 # may give instead of samples.
-
-
-# The probe cameras of the chosen scenes. Target rules name them, so that missing ones are made again.
-PROBES = [f"{WORK}/{name}/probes.json" for name in RENDERED_SCENES]
+from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CALIBRATE, ERROR_VS_TIME, PROBE_CAMERAS
 
 
 use rule lightfield as probe_cameras with:
     input:
-        reads(
-            "{scene}/probe_cameras",
-            "probes",
-            inventory=of_first("lightfield_inventory"),
-            model=of_first("model_record"),
-            places=of_first("places"),
+        PLAN.reads(
+            PROBE_CAMERAS,
+            inventory=RUN.of_first("lightfield_inventory"),
+            model=RUN.of_first("model_record"),
+            places=RUN.of_first("places"),
         ),
     output:
-        lightfield=update(PATHS.probes),
-        receipt=receipt_of("{scene}/probe_cameras"),
+        lightfield=update(RUN.paths.probes),
+        receipt=PLAN.receipt_of(PROBE_CAMERAS),
     log:
-        log_of("{scene}/probe_cameras"),
+        RUN.log_of(PROBE_CAMERAS),
     benchmark:
-        times_of("{scene}/probe_cameras")
+        RUN.times_of(PROBE_CAMERAS)
     localrule: True
     message:
         "Placing the probe cameras of {wildcards.scene}"
@@ -30,33 +27,33 @@ use rule lightfield as probe_cameras with:
 # Only scenes with a target error need this. Its output is reproducible, except for --seconds.
 rule calibrate:
     input:
-        reads(
-            "{scene}/calibrate",
-            check=of_first("blend_check"),
-            blend=of_first("blend"),
-            inventory=of_first("inventory"),
-            lightfield=PATHS.probes,
+        PLAN.reads(
+            CALIBRATE,
+            check=RUN.of_first("blend_check"),
+            blend=RUN.of_first("blend"),
+            inventory=RUN.of_first("inventory"),
+            lightfield=RUN.paths.probes,
         ),
     output:
-        calibration=update(PATHS.calibration),
-        receipt=receipt_of("{scene}/calibrate"),
+        calibration=update(RUN.paths.calibration),
+        receipt=PLAN.receipt_of(CALIBRATE),
     log:
-        log_of("{scene}/calibrate"),
+        RUN.log_of(CALIBRATE),
     benchmark:
-        times_of("{scene}/calibrate")
-    threads: ALL_CORES
+        RUN.times_of(CALIBRATE)
+    threads: RUN.cores
     resources:
-        **GPU,
+        **RUN.gpu,
         mem_mb=6000,
         runtime=240,
     params:
-        device=SETTINGS.device,
-        cache=of_first("paths.trials"),
-        seconds=PATHS.calibration_seconds,
+        device=RUN.settings.device,
+        cache=RUN.of_first("paths.trials"),
+        seconds=RUN.paths.calibration_seconds,
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
     shell:
-        f"python {SCRIPTS}/calibrate.py"
+        f"python {RUN.scripts}/calibrate.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --threads {threads}"
         " --cache {params.cache} --output {output.calibration} --seconds {params.seconds}"
@@ -65,41 +62,41 @@ rule calibrate:
 
 rule measure_error:
     input:
-        reads(
-            "{scene}/error_vs_time",
-            check=of_first("blend_check"),
-            blend=of_first("blend"),
-            inventory=of_first("inventory"),
-            lightfield=PATHS.probes,
-            calibration=of_first("calibration"),
+        PLAN.reads(
+            ERROR_VS_TIME,
+            check=RUN.of_first("blend_check"),
+            blend=RUN.of_first("blend"),
+            inventory=RUN.of_first("inventory"),
+            lightfield=RUN.paths.probes,
+            calibration=RUN.of_first("calibration"),
         ),
     output:
         multiext(
-            f"{RESULTS}/benchmarks/error_vs_time/{{scene}}",
+            f"{RUN.results}/benchmarks/error_vs_time/{{scene}}",
             ".json",
             ".csv",
             ".md",
             ".svg",
             ".png",
         ),
-        receipt=receipt_of("{scene}/error_vs_time"),
+        receipt=PLAN.receipt_of(ERROR_VS_TIME),
     log:
-        log_of("{scene}/error_vs_time"),
+        RUN.log_of(ERROR_VS_TIME),
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
-    threads: ALL_CORES
+    threads: RUN.cores
     resources:
-        **GPU,
+        **RUN.gpu,
         mem_mb=6000,
         runtime=240,
     params:
-        device=SETTINGS.device,
-        cache=of_first("paths.trials"),
+        device=RUN.settings.device,
+        cache=RUN.of_first("paths.trials"),
         calibration=optional("calibration"),
         stem=subpath(output[0], strip_suffix=".json"),
     message:
         "Measuring error against render time in {wildcards.scene}"
     shell:
-        f"python {SCRIPTS}/error_vs_time.py"
+        f"python {RUN.scripts}/error_vs_time.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
         " --cache {params.cache} --output {params.stem}"
@@ -108,5 +105,8 @@ rule measure_error:
 
 rule error_vs_time:
     input:
-        [f"{RESULTS}/benchmarks/error_vs_time/{name}.json" for name in RENDERED_SCENES],
-        PROBES,
+        [
+            f"{RUN.results}/benchmarks/error_vs_time/{name}.json"
+            for name in RUN.rendered_scenes
+        ],
+        RUN.probes,

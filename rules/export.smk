@@ -1,52 +1,52 @@
 # Files with which trainers open a dataset.
 from lightfield.configuration.exports import SEQUENCE_EXPORTS
+from lightfield.workflow.jobs import EXPORT, EXPORT_INSTANT_NGP, EXPORT_SEQUENCE
+from lightfield.workflow.run import one_of
 
 
 rule export_to_instant_ngp:
     input:
-        reads(
-            "{scene}/{rig}/{source}export_instant_ngp",
-            "instant_ngp",
-            views=of_build(BUILD.receipts),
-            lightfield=PATHS.source_lightfield(),
-            trained=of_build(BUILD.training_transforms),
+        PLAN.reads(
+            EXPORT_INSTANT_NGP,
+            views=RUN.of_build(RUN.build.receipts),
+            lightfield=RUN.paths.source_lightfield(),
+            trained=RUN.of_build(RUN.build.training_transforms),
         ),
     output:
-        transforms=update(PATHS.transforms()),
-        receipt=receipt_of("{scene}/{rig}/{source}export_instant_ngp"),
-        bundle=bundle_of("{scene}/{rig}/{source}export_instant_ngp"),
+        transforms=update(RUN.paths.transforms()),
+        receipt=PLAN.receipt_of(EXPORT_INSTANT_NGP),
+        bundle=PLAN.bundle_of(EXPORT_INSTANT_NGP),
     log:
-        log_of("{scene}/{rig}/{source}export_instant_ngp"),
+        RUN.log_of(EXPORT_INSTANT_NGP),
     benchmark:
-        times_of("{scene}/{rig}/export/{source}instant_ngp")
+        RUN.times_of(EXPORT_INSTANT_NGP)
     localrule: True
     params:
-        views=of_build(BUILD.folder_of_views),
+        views=RUN.of_build(RUN.build.folder_of_views),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
     shell:
-        f"python {SCRIPTS}/export_instant_ngp.py"
+        f"python {RUN.scripts}/export_instant_ngp.py"
         " --settings {input.settings} --input-cfg {input.lightfield} --image-dir {params.views}"
         " --output {output.transforms} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule export:
     input:
-        reads(
-            "{scene}/{rig}/{source}export_{format}",
-            "export",
-            views=of_build(BUILD.exported_views),
-            lightfield=PATHS.source_lightfield(),
-            dataset=PATHS.lightfield,
+        PLAN.reads(
+            EXPORT,
+            views=RUN.of_build(RUN.build.exported_views),
+            lightfield=RUN.paths.source_lightfield(),
+            dataset=RUN.paths.lightfield,
         ),
     output:
-        update(PATHS.export_list()),
-        receipt=receipt_of("{scene}/{rig}/{source}export_{format}"),
-        bundle=bundle_of("{scene}/{rig}/{source}export_{format}"),
+        update(RUN.paths.export_list()),
+        receipt=PLAN.receipt_of(EXPORT),
+        bundle=PLAN.bundle_of(EXPORT),
     log:
-        log_of("{scene}/{rig}/{source}export_{format}"),
+        RUN.log_of(EXPORT),
     benchmark:
-        times_of("{scene}/{rig}/export/{source}{format}")
+        RUN.times_of(EXPORT)
     wildcard_constraints:
         format=rf"(?!(?:{one_of([* SEQUENCE_EXPORTS, 'instant_ngp'])})[/.])[a-z0-9_]+",
     resources:
@@ -58,7 +58,7 @@ rule export:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
-        f"python {SCRIPTS}/export.py"
+        f"python {RUN.scripts}/export.py"
         " {wildcards.format} --settings {input.settings} --dataset {params.dataset}"
         " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"
 
@@ -66,17 +66,16 @@ rule export:
 # The frames of a sequence lie in the rig's folder, beside the exports of all of them.
 use rule export as export_sequence with:
     input:
-        reads(
-            "{scene}/{rig}/{source}sequence_{format}",
-            "export_sequence",
-            views=of_build(BUILD.exported_frames),
+        PLAN.reads(
+            EXPORT_SEQUENCE,
+            views=RUN.of_build(RUN.build.exported_frames),
         ),
     output:
-        update(PATHS.export_list()),
-        receipt=receipt_of("{scene}/{rig}/{source}sequence_{format}"),
-        bundle=bundle_of("{scene}/{rig}/{source}sequence_{format}"),
+        update(RUN.paths.export_list()),
+        receipt=PLAN.receipt_of(EXPORT_SEQUENCE),
+        bundle=PLAN.bundle_of(EXPORT_SEQUENCE),
     log:
-        log_of("{scene}/{rig}/{source}sequence_{format}"),
+        RUN.log_of(EXPORT_SEQUENCE),
     wildcard_constraints:
         rig="[A-Za-z0-9_.-]+",
         format=one_of(SEQUENCE_EXPORTS),
@@ -84,6 +83,6 @@ use rule export as export_sequence with:
         mem_mb=4000,
         runtime=240,
     params:
-        dataset=PATHS.folder,
+        dataset=RUN.paths.folder,
     message:
         "Exporting the sequence {wildcards.scene}/{wildcards.rig} for {wildcards.format}"

@@ -1,54 +1,55 @@
 # Families of scenes. One job builds a batch of members, with all stages of each.
 from lightfield.configuration.corpus import CORPUS_FILES
+from lightfield.workflow.jobs import BUILD_MEMBERS, CORPUS, COUNT_MEMBERS
 
 
 rule build_members:
     input:
-        reads("{family}/batches/{batch}", "batch"),
+        PLAN.reads(BUILD_MEMBERS),
     output:
-        receipt=receipt_of("{family}/batches/{batch}"),
-        bundle=bundle_of("{family}/batches/{batch}"),
+        receipt=PLAN.receipt_of(BUILD_MEMBERS),
+        bundle=PLAN.bundle_of(BUILD_MEMBERS),
     log:
-        log_of("{family}/batches/{batch}"),
+        RUN.log_of(BUILD_MEMBERS),
     benchmark:
-        times_of("{family}/batches/{batch}")
+        RUN.times_of(BUILD_MEMBERS)
     # With a store, model files lie where Snakemake runs.
-    localrule: bool(STORE) and any(family.models for family in BUILD.families.values())
+    localrule: PLAN.is_stored and any(family.models for family in RUN.build.families.values())
     # One core, or more if there are fewer batches than cores.
-    threads: lambda wildcards: max(1, ALL_CORES // BUILD.batch_count)
+    threads: REQUESTS.threads_of_batch
     resources:
-        **GPU,
+        **RUN.gpu,
         mem_mb=8000,
         runtime=1440,
     params:
-        device=SETTINGS.device,
+        device=RUN.settings.device,
     message:
         "Building the members {wildcards.batch} of {wildcards.family}"
     shell:
-        f"python {SCRIPTS}/build_members.py"
+        f"python {RUN.scripts}/build_members.py"
         " --settings {input.settings} --device {params.device} --threads {threads}"
         " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule corpus:
     input:
-        reads("{family}/corpus", "corpus", batches=of_build(BUILD.batch_receipts)),
+        PLAN.reads(CORPUS, batches=RUN.of_build(RUN.build.batch_receipts)),
     output:
-        [update(f"{RESULTS}/{{family}}/{name}") for name in CORPUS_FILES],
-        receipt=receipt_of("{family}/corpus"),
-        bundle=bundle_of("{family}/corpus"),
+        [update(f"{RUN.results}/{{family}}/{name}") for name in CORPUS_FILES],
+        receipt=PLAN.receipt_of(CORPUS),
+        bundle=PLAN.bundle_of(CORPUS),
     log:
-        log_of("{family}/corpus"),
+        RUN.log_of(CORPUS),
     benchmark:
-        times_of("{family}/corpus")
+        RUN.times_of(CORPUS)
     localrule: True
     params:
-        folder=f"{RESULTS}/{{family}}",
-        cache=f"{WORK}/{{family}}/looks.json",
+        folder=f"{RUN.results}/{{family}}",
+        cache=f"{RUN.work}/{{family}}/looks.json",
     message:
         "Collecting the members of {wildcards.family}"
     shell:
-        f"python {SCRIPTS}/corpus.py"
+        f"python {RUN.scripts}/corpus.py"
         " {params.folder} --settings {input.settings} --cache {params.cache}"
         " --receipt {output.receipt} > {log} 2>&1"
 
@@ -56,22 +57,21 @@ rule corpus:
 # It fails if a member has failed, after all others are built and collected.
 rule count_members:
     input:
-        reads(
-            "{family}/members",
-            "members",
-            corpus=f"{RESULTS}/{{family}}/corpus.json",
+        PLAN.reads(
+            COUNT_MEMBERS,
+            corpus=f"{RUN.results}/{{family}}/corpus.json",
         ),
     output:
-        members=update(f"{WORK}/{{family}}/members.json"),
-        receipt=receipt_of("{family}/members"),
+        members=update(f"{RUN.work}/{{family}}/members.json"),
+        receipt=PLAN.receipt_of(COUNT_MEMBERS),
     log:
-        log_of("{family}/members"),
+        RUN.log_of(COUNT_MEMBERS),
     localrule: True
     params:
-        failed=f"{RESULTS}/{{family}}/failed.txt",
+        failed=f"{RUN.results}/{{family}}/failed.txt",
     message:
         "Counting the members of {wildcards.family}"
     shell:
-        f"python {SCRIPTS}/count_members.py"
+        f"python {RUN.scripts}/count_members.py"
         " --settings {input.settings} --corpus {input.corpus} --failed {params.failed}"
         " --output {output.members} --receipt {output.receipt} > {log} 2>&1"

@@ -1,30 +1,30 @@
 # The optical flow from each view to its neighbour.
+from lightfield.workflow.jobs import FLOW
 
 
 rule flow:
     input:
         # A neighbour may belong to another shard.
-        reads(
-            "{scene}/{rig}/flow/{first}-{end}",
-            "flow",
-            views=of_build(BUILD.receipts),
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            FLOW,
+            views=RUN.of_build(RUN.build.receipts),
+            lightfield=RUN.paths.lightfield,
         ),
     output:
-        receipt=receipt_of("{scene}/{rig}/flow/{first}-{end}"),
-        bundle=bundle_of("{scene}/{rig}/flow/{first}-{end}"),
+        receipt=PLAN.receipt_of(FLOW),
+        bundle=PLAN.bundle_of(FLOW),
     log:
-        log_of("{scene}/{rig}/flow/{first}-{end}"),
+        RUN.log_of(FLOW),
     benchmark:
-        times_of("{scene}/{rig}/flow/{first}-{end}")
+        RUN.times_of(FLOW)
     resources:
         mem_mb=2000,
     params:
-        folder=PATHS.reprojected("flow"),
+        folder=RUN.paths.reprojected("flow"),
     message:
         "Computing the flow of views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/flow.py"
+        f"python {RUN.scripts}/flow.py"
         " --settings {input.settings} --lightfield {input.lightfield} --views {wildcards.first}:{wildcards.end}"
         " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"

@@ -1,23 +1,23 @@
 # The surface that cameras can see, as meshes.
+from lightfield.workflow.jobs import MESH
 
 
 rule mesh:
     input:
-        reads(
-            "{scene}/{rig}/mesh",
-            "mesh",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("inventory"),
+        PLAN.reads(
+            MESH,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("inventory"),
         ),
     output:
-        update(PATHS.mesh_list),
-        receipt=receipt_of("{scene}/{rig}/mesh"),
-        bundle=bundle_of("{scene}/{rig}/mesh"),
+        update(RUN.paths.mesh_list),
+        receipt=PLAN.receipt_of(MESH),
+        bundle=PLAN.bundle_of(MESH),
     log:
-        log_of("{scene}/{rig}/mesh"),
+        RUN.log_of(MESH),
     benchmark:
-        times_of("{scene}/{rig}/mesh")
+        RUN.times_of(MESH)
     resources:
         mem_mb=8000,
         runtime=60,
@@ -26,6 +26,6 @@ rule mesh:
     message:
         "Writing the surface of {wildcards.scene}/{wildcards.rig} as meshes"
     shell:
-        f"python {SCRIPTS}/surface.py"
+        f"python {RUN.scripts}/surface.py"
         " --blend {input.blend:q} --settings {input.settings} --inventory {input.inventory}"
         " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"

@@ -1,51 +1,50 @@
 # A dataset as archives with a card, as SILVR publishes its own.
+from lightfield.workflow.jobs import PACK, PUBLISH
 
 
 rule pack:
     input:
-        reads(
-            "{scene}/{rig}/package",
-            "pack",
-            sums=of_build(BUILD.packed_sums),
-            files=of_build(BUILD.packed_lists) if STORE else [],
+        PLAN.reads(
+            PACK,
+            sums=RUN.of_build(RUN.build.packed_sums),
+            files=PLAN.only_stored(RUN.of_build(RUN.build.packed_lists)),
         ),
     output:
-        archive=PATHS.package,
-        card=update(PATHS.card),
-        receipt=receipt_of("{scene}/{rig}/package"),
-        bundle=bundle_of("{scene}/{rig}/package"),
+        archive=RUN.paths.package,
+        card=update(RUN.paths.card),
+        receipt=PLAN.receipt_of(PACK),
+        bundle=PLAN.bundle_of(PACK),
     log:
-        log_of("{scene}/{rig}/package"),
+        RUN.log_of(PACK),
     params:
-        folder=PATHS.folder,
+        folder=RUN.paths.folder,
     message:
         "Packing {output.archive}"
     shell:
-        f"python {SCRIPTS}/package.py"
+        f"python {RUN.scripts}/package.py"
         " --settings {input.settings} --folder {params.folder} --output {output.archive}"
         " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule publish:
     input:
-        reads(
-            "{scene}/{rig}/publish",
-            "pack",
-            sums=of_build(BUILD.packed_sums),
-            files=of_build(BUILD.packed_lists) if STORE else [],
+        PLAN.reads(
+            PUBLISH,
+            sums=RUN.of_build(RUN.build.packed_sums),
+            files=PLAN.only_stored(RUN.of_build(RUN.build.packed_lists)),
         ),
     output:
-        [update(document) for document in PATHS.documents],
-        receipt=receipt_of("{scene}/{rig}/publish"),
-        bundle=bundle_of("{scene}/{rig}/publish"),
+        [update(document) for document in RUN.paths.documents],
+        receipt=PLAN.receipt_of(PUBLISH),
+        bundle=PLAN.bundle_of(PUBLISH),
     log:
-        log_of("{scene}/{rig}/publish"),
+        RUN.log_of(PUBLISH),
     params:
-        folder=PATHS.folder,
+        folder=RUN.paths.folder,
         output=subpath(output[0], parent=True),
     message:
         "Publishing {wildcards.scene}/{wildcards.rig} in {params.output}"
     shell:
-        f"python {SCRIPTS}/publish.py"
+        f"python {RUN.scripts}/publish.py"
         " --settings {input.settings} --folder {params.folder} --output {params.output}"
         " --receipt {output.receipt} > {log} 2>&1"

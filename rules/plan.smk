@@ -1,31 +1,34 @@
 # A table before rendering: the estimated time and size of the views.
 import shlex
 
+from lightfield.workflow.arguments import equal_error_arguments
+from lightfield.workflow.jobs import PROBE
+
 
 rule probe:
     input:
-        reads(
-            "{scene}/{rig}/probe",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("inventory"),
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            PROBE,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("inventory"),
+            lightfield=RUN.paths.lightfield,
         ),
     output:
-        probe=update(PATHS.probe),
-        receipt=receipt_of("{scene}/{rig}/probe"),
+        probe=update(RUN.paths.probe),
+        receipt=PLAN.receipt_of(PROBE),
     log:
-        log_of("{scene}/{rig}/probe"),
+        RUN.log_of(PROBE),
     resources:
-        **GPU,
+        **RUN.gpu,
         mem_mb=6000,
         runtime=60,
     params:
-        device=SETTINGS.device,
+        device=RUN.settings.device,
     message:
         "Measuring the time and size of the views of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/probe.py"
+        f"python {RUN.scripts}/probe.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --output {output.probe}"
         " --receipt {output.receipt} > {log} 2>&1"
@@ -34,23 +37,23 @@ rule probe:
 # It has no output, and answers on the terminal.
 rule plan:
     input:
-        [probe for _, _, probe in BUILD.probes],
+        [probe for _, _, probe in RUN.build.probes],
     log:
-        log_of("plan"),
+        RUN.log_of("plan"),
     localrule: True
     params:
         datasets=" ".join(
             f"--dataset {name} {frames} {probe}"
-            for name, frames, probe in BUILD.probes
+            for name, frames, probe in RUN.build.probes
         ),
-        families=shlex.join(f"--family={folder}" for folder in BUILD.family_names),
-        equal_error=equal_error_arguments(),
-        watts=SETTINGS.energy.watts,
-        cores=SETTINGS.energy.core_count,
-        table=f"{RESULTS}/tables/plan.md",
+        families=shlex.join(f"--family={folder}" for folder in RUN.build.family_names),
+        equal_error=equal_error_arguments(RUN),
+        watts=RUN.settings.energy.watts,
+        cores=RUN.settings.energy.core_count,
+        table=f"{RUN.results}/tables/plan.md",
     message:
         "Adding up the time and size of the chosen datasets"
     shell:
-        f"python {SCRIPTS}/plan.py"
+        f"python {RUN.scripts}/plan.py"
         " {params.datasets} {params.families} {params.equal_error}"
         " --watts {params.watts} --cores {params.cores} --output {params.table} 2>&1 | tee {log}"

@@ -1,4 +1,6 @@
 # The views. One job renders one shard, and keeps every finished view.
+from lightfield.workflow.jobs import RENDER
+from lightfield.workflow.run import one_of
 
 
 # Views that somebody else has rendered are imported unchanged.
@@ -7,23 +9,25 @@ ruleorder: import_views > render
 
 rule import_views:
     input:
-        reads("{scene}/{rig}/render/{first}-{end}", lightfield=PATHS.lightfield),
+        PLAN.reads(RENDER, lightfield=RUN.paths.lightfield),
     output:
-        receipt=receipt_of("{scene}/{rig}/render/{first}-{end}"),
-        bundle=bundle_of("{scene}/{rig}/render/{first}-{end}"),
+        receipt=PLAN.receipt_of(RENDER),
+        bundle=PLAN.bundle_of(RENDER),
     log:
-        log_of("{scene}/{rig}/render/{first}-{end}"),
+        RUN.log_of(RENDER),
     wildcard_constraints:
-        scene=one_of({d.scene_folder for d in DATASETS.values() if d.imported}),
+        scene=one_of(
+            {d.scene_folder for d in RUN.build.datasets.values() if d.imported}
+        ),
     # With a store, the views to import are on the machine that runs Snakemake.
-    localrule: bool(STORE)
+    localrule: PLAN.is_stored
     params:
-        dataset=of_dataset("imported"),
-        folder=PATHS.views,
+        dataset=RUN.of_dataset("imported"),
+        folder=RUN.paths.views,
     message:
         "Importing views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/import_views.py"
+        f"python {RUN.scripts}/import_views.py"
         " --dataset {params.dataset:q} --lightfield {input.lightfield}"
         " --views {wildcards.first}:{wildcards.end} --output {params.folder} --receipt {output.receipt}"
         " > {log} 2>&1"
@@ -31,36 +35,34 @@ rule import_views:
 
 rule render:
     input:
-        reads(
-            "{scene}/{rig}/render/{first}-{end}",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("inventory"),
-            lightfield=PATHS.lightfield,
-            cameras=PATHS.cameras,
+        PLAN.reads(
+            RENDER,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("inventory"),
+            lightfield=RUN.paths.lightfield,
+            cameras=RUN.paths.cameras,
         ),
     output:
-        receipt=receipt_of("{scene}/{rig}/render/{first}-{end}"),
-        bundle=bundle_of("{scene}/{rig}/render/{first}-{end}"),
+        receipt=PLAN.receipt_of(RENDER),
+        bundle=PLAN.bundle_of(RENDER),
     log:
-        log_of("{scene}/{rig}/render/{first}-{end}"),
+        RUN.log_of(RENDER),
     benchmark:
-        times_of("{scene}/{rig}/render/{first}-{end}")
-    threads: threads_of_shard
+        RUN.times_of(RENDER)
+    threads: REQUESTS.threads_of_shard
     resources:
-        **GPU,
-        mem_mb=memory_of("render"),
-        runtime=lambda wildcards, threads: cost_at("render", wildcards).most_minutes(
-            threads
-        ),
-        stall_seconds=stall_seconds,
+        **RUN.gpu,
+        mem_mb=REQUESTS.memory_of(RENDER),
+        runtime=REQUESTS.minutes_of(RENDER),
+        stall_seconds=REQUESTS.stall_seconds,
     params:
-        folder=PATHS.views,
-        device=SETTINGS.device,
+        folder=RUN.paths.views,
+        device=RUN.settings.device,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/render_shard.py"
+        f"python {RUN.scripts}/render_shard.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"

@@ -1,23 +1,30 @@
 # Pictures and pages of datasets.
 from lightfield.configuration.dataset_paths import PICTURES, PLOTS
+from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import (
+    FIGURES,
+    INDEX,
+    PAGE,
+    PANORAMA_LIGHTFIELD,
+    RENDER_PANORAMA,
+)
 
 
 use rule lightfield as panorama_lightfield with:
     input:
-        reads(
-            "{scene}/{rig}/panorama/lightfield",
-            "panorama",
-            inventory=of_dataset("blend_inventory"),
-            model=of_dataset("model_record"),
-            calibration=of_dataset("calibration"),
+        PLAN.reads(
+            PANORAMA_LIGHTFIELD,
+            inventory=RUN.of_dataset("blend_inventory"),
+            model=RUN.of_dataset("model_record"),
+            calibration=RUN.of_dataset("calibration"),
         ),
     output:
-        lightfield=update(PATHS.panorama_lightfield),
-        receipt=receipt_of("{scene}/{rig}/panorama/lightfield"),
+        lightfield=update(RUN.paths.panorama_lightfield),
+        receipt=PLAN.receipt_of(PANORAMA_LIGHTFIELD),
     log:
-        log_of("{scene}/{rig}/panorama/lightfield"),
+        RUN.log_of(PANORAMA_LIGHTFIELD),
     benchmark:
-        times_of("{scene}/{rig}/panorama/lightfield")
+        RUN.times_of(PANORAMA_LIGHTFIELD)
     localrule: True
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
@@ -25,33 +32,31 @@ use rule lightfield as panorama_lightfield with:
 
 rule render_panorama:
     input:
-        reads(
-            "{scene}/{rig}/panorama/render",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("inventory"),
-            lightfield=PATHS.panorama_lightfield,
+        PLAN.reads(
+            RENDER_PANORAMA,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("inventory"),
+            lightfield=RUN.paths.panorama_lightfield,
         ),
     output:
-        update(PATHS.panorama),
-        receipt=receipt_of("{scene}/{rig}/panorama/render"),
+        update(RUN.paths.panorama),
+        receipt=PLAN.receipt_of(RENDER_PANORAMA),
     log:
-        log_of("{scene}/{rig}/panorama/render"),
+        RUN.log_of(RENDER_PANORAMA),
     benchmark:
-        times_of("{scene}/{rig}/panorama/render")
+        RUN.times_of(RENDER_PANORAMA)
     resources:
-        **GPU,
-        mem_mb=memory_of("render_panorama"),
-        runtime=lambda wildcards, threads: cost_at(
-            "render_panorama", wildcards
-        ).most_minutes(threads),
+        **RUN.gpu,
+        mem_mb=REQUESTS.memory_of(RENDER_PANORAMA),
+        runtime=REQUESTS.minutes_of(RENDER_PANORAMA),
     params:
-        folder=PATHS.panorama_views,
-        device=SETTINGS.device,
+        folder=RUN.paths.panorama_views,
+        device=RUN.settings.device,
     message:
         "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/render_shard.py"
+        f"python {RUN.scripts}/render_shard.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
         " --device {params.device} --threads {threads} --output {params.folder}"
@@ -60,36 +65,35 @@ rule render_panorama:
 
 rule figures:
     input:
-        reads(
-            "{scene}/{rig}/figures",
-            "figures",
-            views=of_build(BUILD.receipts),
-            lightfield=PATHS.lightfield,
-            panorama=of_dataset("panorama"),
+        PLAN.reads(
+            FIGURES,
+            views=RUN.of_build(RUN.build.receipts),
+            lightfield=RUN.paths.lightfield,
+            panorama=RUN.of_dataset("panorama"),
         ),
     output:
         [
             report(
-                f"{PATHS.folder}/report/{picture}.png",
+                f"{RUN.paths.folder}/report/{picture}.png",
                 category="{scene}",
                 subcategory="{rig}",
                 caption=f"../captions/{picture}.rst",
             )
             for picture in PICTURES
         ],
-        [update(f"{PATHS.folder}/report/{plot}.svg") for plot in PLOTS],
-        receipt=receipt_of("{scene}/{rig}/figures"),
+        [update(f"{RUN.paths.folder}/report/{plot}.svg") for plot in PLOTS],
+        receipt=PLAN.receipt_of(FIGURES),
     log:
-        log_of("{scene}/{rig}/figures"),
+        RUN.log_of(FIGURES),
     benchmark:
-        times_of("{scene}/{rig}/report/figures")
+        RUN.times_of(FIGURES)
     localrule: True
     params:
         dataset=subpath(output[0], ancestor=2),
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/report_figures.py"
+        f"python {RUN.scripts}/report_figures.py"
         " --dataset {params.dataset} --settings {input.settings}"
         " --panorama {input.panorama} --output {params.dataset}/report"
         " --receipt {output.receipt} > {log} 2>&1"
@@ -97,23 +101,22 @@ rule figures:
 
 rule page:
     input:
-        reads(
-            "{scene}/{rig}/page",
-            "page",
-            published=of_dataset("published"),
-            views=of_dataset("all_receipts") if STORE else [],
-            pictures=PATHS.pictures,
-            validation=PATHS.validation,
-            costs=PATHS.costs,
-            inventory=of_dataset("blend_inventory"),
+        PLAN.reads(
+            PAGE,
+            published=RUN.of_dataset("published"),
+            views=PLAN.only_stored(RUN.of_dataset("all_receipts")),
+            pictures=RUN.paths.pictures,
+            validation=RUN.paths.validation,
+            costs=RUN.paths.costs,
+            inventory=RUN.of_dataset("blend_inventory"),
         ),
     output:
-        page=update(PATHS.page),
-        receipt=receipt_of("{scene}/{rig}/page"),
+        page=update(RUN.paths.page),
+        receipt=PLAN.receipt_of(PAGE),
     log:
-        log_of("{scene}/{rig}/page"),
+        RUN.log_of(PAGE),
     benchmark:
-        times_of("{scene}/{rig}/report/page")
+        RUN.times_of(PAGE)
     localrule: True
     params:
         dataset=subpath(output.page, ancestor=2),
@@ -121,7 +124,7 @@ rule page:
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/report_html.py"
+        f"python {RUN.scripts}/report_html.py"
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --settings {input.settings}"
         " {params.inventory} --output {output.page} --receipt {output.receipt} > {log} 2>&1"
@@ -130,23 +133,23 @@ rule page:
 # Runs of other scenes make it, too: its receipt has the pages of all datasets.
 rule index:
     input:
-        reads(
-            "index",
+        PLAN.reads(
+            INDEX,
             are_noted=True,
-            pages=[dataset.paths.page for dataset in CHOSEN_DATASETS],
-            corpora=BUILD.corpus_lists,
+            pages=[dataset.paths.page for dataset in RUN.chosen],
+            corpora=RUN.build.corpus_lists,
         ),
     output:
-        page=update(f"{RESULTS}/index.html"),
-        receipt=receipt_of("index"),
+        page=update(f"{RUN.results}/index.html"),
+        receipt=PLAN.receipt_of(INDEX),
     log:
-        log_of("index"),
+        RUN.log_of(INDEX),
     localrule: True
     params:
         results=subpath(output.page, parent=True),
     message:
         "Making the page of all datasets"
     shell:
-        f"python {SCRIPTS}/report_index.py"
+        f"python {RUN.scripts}/report_index.py"
         " --results {params.results} --output {output.page}"
         " --receipt {output.receipt} > {log} 2>&1"

@@ -1,29 +1,29 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.workflow.jobs import LENS_MAP, REPROJECT, REPROJECTED_LIGHTFIELD
 
 
 rule reprojected_lightfield:
     input:
-        reads(
-            "{scene}/{rig}/{reprojection}/lightfield",
-            "reproject",
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            REPROJECTED_LIGHTFIELD,
+            lightfield=RUN.paths.lightfield,
         ),
     output:
-        lightfield=update(PATHS.source_lightfield("{reprojection}/")),
-        receipt=receipt_of("{scene}/{rig}/{reprojection}/lightfield"),
+        lightfield=update(RUN.paths.source_lightfield("{reprojection}/")),
+        receipt=PLAN.receipt_of(REPROJECTED_LIGHTFIELD),
     log:
-        log_of("{scene}/{rig}/{reprojection}/lightfield"),
+        RUN.log_of(REPROJECTED_LIGHTFIELD),
     benchmark:
-        times_of("{scene}/{rig}/{reprojection}/lightfield")
+        RUN.times_of(REPROJECTED_LIGHTFIELD)
     localrule: True
     params:
-        views=PATHS.views,
-        folder=PATHS.reprojected(),
+        views=RUN.paths.views,
+        folder=RUN.paths.reprojected(),
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        f"python {SCRIPTS}/reproject.py"
+        f"python {RUN.scripts}/reproject.py"
         " --dry-run --settings {input.settings}"
         " --input-cfg {input.lightfield} --output-cfg {output.lightfield}"
         " --input-dir {params.views} --output-dir {params.folder} --receipt {output.receipt}"
@@ -32,25 +32,24 @@ rule reprojected_lightfield:
 
 rule lens_map:
     input:
-        reads(
-            "{scene}/{rig}/{reprojection}/lens_map",
-            "lens_map",
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            LENS_MAP,
+            lightfield=RUN.paths.lightfield,
         ),
     output:
-        PATHS.lens_map(),
-        receipt=receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
+        RUN.paths.lens_map(),
+        receipt=PLAN.receipt_of(LENS_MAP),
     log:
-        log_of("{scene}/{rig}/{reprojection}/lens_map"),
+        RUN.log_of(LENS_MAP),
     benchmark:
-        times_of("{scene}/{rig}/{reprojection}/lens_map")
+        RUN.times_of(LENS_MAP)
     localrule: True
     params:
-        file=PATHS.lens_map(),
+        file=RUN.paths.lens_map(),
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        f"python {SCRIPTS}/lens_map.py"
+        f"python {RUN.scripts}/lens_map.py"
         " {params.file} --settings {input.settings} --input-cfg {input.lightfield}"
         " --receipt {output.receipt} > {log} 2>&1"
 
@@ -58,39 +57,38 @@ rule lens_map:
 # For a cube map, the program adds the name of each face to the path.
 use rule lens_map as lens_maps with:
     output:
-        [PATHS.lens_map(face=face) for face in CUBE_FACES],
-        receipt=receipt_of("{scene}/{rig}/{reprojection}/lens_map"),
+        [RUN.paths.lens_map(face=face) for face in CUBE_FACES],
+        receipt=PLAN.receipt_of(LENS_MAP),
     # Snakemake does not take this from the other rule.
     localrule: True
 
 
 rule reproject:
     input:
-        reads(
-            "{scene}/{rig}/{reprojection}/{first}-{end}",
-            "reproject",
-            views=PATHS.receipt("render"),
-            lightfield=PATHS.lightfield,
-            lens_maps=of_build(BUILD.lens_maps),
+        PLAN.reads(
+            REPROJECT,
+            views=RUN.paths.receipt("render"),
+            lightfield=RUN.paths.lightfield,
+            lens_maps=RUN.of_build(RUN.build.lens_maps),
         ),
     output:
-        receipt=receipt_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
-        bundle=bundle_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
+        receipt=PLAN.receipt_of(REPROJECT),
+        bundle=PLAN.bundle_of(REPROJECT),
     log:
-        log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
+        RUN.log_of(REPROJECT),
     benchmark:
-        times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
+        RUN.times_of(REPROJECT)
     resources:
         mem_mb=2000,
     params:
-        views=PATHS.views,
-        lens_map=PATHS.lens_map(),
-        folder=PATHS.reprojected(),
+        views=RUN.paths.views,
+        lens_map=RUN.paths.lens_map(),
+        folder=RUN.paths.reprojected(),
     message:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        f"python {SCRIPTS}/reproject.py"
+        f"python {RUN.scripts}/reproject.py"
         " --settings {input.settings}"
         " --lens-map {params.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"

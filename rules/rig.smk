@@ -1,23 +1,24 @@
 # The places of the cameras, and their lens.
+from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CHECK_CAMERAS, FREE_PLACES, LIGHTFIELD, SPLITS
 
 
 # Only a random rig's places depend on the scene.
 rule free_places:
     input:
-        reads(
-            "{scene}/{rig}/free_places",
-            "free_places",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("blend_inventory"),
+        PLAN.reads(
+            FREE_PLACES,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("blend_inventory"),
         ),
     output:
-        places=update(PATHS.places),
-        receipt=receipt_of("{scene}/{rig}/free_places"),
+        places=update(RUN.paths.places),
+        receipt=PLAN.receipt_of(FREE_PLACES),
     log:
-        log_of("{scene}/{rig}/free_places"),
+        RUN.log_of(FREE_PLACES),
     benchmark:
-        times_of("{scene}/{rig}/cameras/free_places")
+        RUN.times_of(FREE_PLACES)
     resources:
         mem_mb=8000,
         runtime=60,
@@ -26,55 +27,54 @@ rule free_places:
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/free_places.py"
+        f"python {RUN.scripts}/free_places.py"
         " --blend {input.blend:q} --settings {input.settings} {params.inventory}"
         " --output {output.places} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule lightfield:
     input:
-        reads(
-            "{scene}/{rig}/lightfield",
-            "lightfield",
-            inventory=of_dataset("lightfield_inventory"),
-            model=of_dataset("model_record"),
-            calibration=of_dataset("calibration"),
-            places=of_dataset("places"),
+        PLAN.reads(
+            LIGHTFIELD,
+            inventory=RUN.of_dataset("lightfield_inventory"),
+            model=RUN.of_dataset("model_record"),
+            calibration=RUN.of_dataset("calibration"),
+            places=RUN.of_dataset("places"),
         ),
     output:
-        lightfield=update(PATHS.lightfield),
-        receipt=receipt_of("{scene}/{rig}/lightfield"),
+        lightfield=update(RUN.paths.lightfield),
+        receipt=PLAN.receipt_of(LIGHTFIELD),
     log:
-        log_of("{scene}/{rig}/lightfield"),
+        RUN.log_of(LIGHTFIELD),
     benchmark:
-        times_of("{scene}/{rig}/cameras/lightfield")
+        RUN.times_of(LIGHTFIELD)
     localrule: True
     params:
         optional=optional("calibration", "places", "inventory", "model"),
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/make_lightfield.py"
+        f"python {RUN.scripts}/make_lightfield.py"
         " --settings {input.settings} {params.optional} --output {output.lightfield}"
         " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule check_cameras:
     input:
-        reads(
-            "{scene}/{rig}/check_cameras",
-            check=of_dataset("blend_check"),
-            blend=of_dataset("blend"),
-            inventory=of_dataset("blend_inventory"),
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            CHECK_CAMERAS,
+            check=RUN.of_dataset("blend_check"),
+            blend=RUN.of_dataset("blend"),
+            inventory=RUN.of_dataset("blend_inventory"),
+            lightfield=RUN.paths.lightfield,
         ),
     output:
-        cameras=update(PATHS.cameras),
-        receipt=receipt_of("{scene}/{rig}/check_cameras"),
+        cameras=update(RUN.paths.cameras),
+        receipt=PLAN.receipt_of(CHECK_CAMERAS),
     log:
-        log_of("{scene}/{rig}/check_cameras"),
+        RUN.log_of(CHECK_CAMERAS),
     benchmark:
-        times_of("{scene}/{rig}/cameras/check_cameras")
+        RUN.times_of(CHECK_CAMERAS)
     resources:
         mem_mb=8000,
         runtime=60,
@@ -83,22 +83,22 @@ rule check_cameras:
     message:
         "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
     shell:
-        f"python {SCRIPTS}/check_cameras.py"
+        f"python {RUN.scripts}/check_cameras.py"
         " --blend {input.blend:q} --lightfield {input.lightfield} {params.inventory}"
         " --output {output.cameras} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule splits:
     input:
-        reads("{scene}/splits", lightfields=of_build(BUILD.split_lightfields)),
+        PLAN.reads(SPLITS, lightfields=RUN.of_build(RUN.build.split_lightfields)),
     output:
-        splits=update(PATHS.splits),
-        receipt=receipt_of("{scene}/splits"),
+        splits=update(RUN.paths.splits),
+        receipt=PLAN.receipt_of(SPLITS),
     log:
-        log_of("{scene}/splits"),
+        RUN.log_of(SPLITS),
     localrule: True
     message:
         "Listing what the views of {wildcards.scene} are for"
     shell:
-        f"python {SCRIPTS}/splits.py"
+        f"python {RUN.scripts}/splits.py"
         " --output {output.splits} --receipt {output.receipt} {input.lightfields} > {log} 2>&1"

@@ -1,143 +1,130 @@
 # A .blend: built by a scene builder, made of a model file, or brought by the user and checked.
-from pathlib import Path
+from lightfield.workflow.jobs import BUILD_SCENE, CHECK_BLEND, IMPORT_MODEL, INVENTORY
+from lightfield.workflow.run import one_of
 
 
 rule build_scene:
     input:
-        reads(
-            "{name}/build_scene",
-            "build_scene",
+        PLAN.reads(
+            BUILD_SCENE,
             # With a store, each job's folder has a user's own builder, as it has the scene YAMLs.
-            builder=lambda wildcards: (
-                [] if STORE else asked(BUILD.scene, wildcards).builder_files
-            ),
+            builder=PLAN.only_shared(RUN.builder_of),
         ),
     output:
         # Snakemake copies a file before it is updated, and this one is large.
-        blend=PATHS.built_blend,
-        receipt=receipt_of("{name}/build_scene"),
+        blend=RUN.paths.built_blend,
+        receipt=PLAN.receipt_of(BUILD_SCENE),
     log:
-        log_of("{name}/build_scene"),
+        RUN.log_of(BUILD_SCENE),
     benchmark:
-        times_of("{name}/build_scene")
+        RUN.times_of(BUILD_SCENE)
     resources:
         mem_mb=8000,
         runtime=30,
     message:
         "Building the scene {wildcards.name}"
     shell:
-        f"python {SCRIPTS}/build_scene.py"
+        f"python {RUN.scripts}/build_scene.py"
         " --settings {input.settings} --output {output.blend} --receipt {output.receipt}"
         " > {log} 2>&1"
 
 
 rule import_model:
     input:
-        reads(
-            "{name}/import_model",
-            "import_model",
-            model=lambda wildcards: local(asked(BUILD.scene, wildcards).source.model),
-            light=light_of,
+        PLAN.reads(
+            IMPORT_MODEL,
+            model=RUN.model_of,
+            light=RUN.light_of,
         ),
     output:
-        blend=PATHS.model_blend,
-        record=update(PATHS.model_record),
-        receipt=receipt_of("{name}/import_model"),
+        blend=RUN.paths.model_blend,
+        record=update(RUN.paths.model_record),
+        receipt=PLAN.receipt_of(IMPORT_MODEL),
     log:
-        log_of("{name}/import_model"),
+        RUN.log_of(IMPORT_MODEL),
     benchmark:
-        times_of("{name}/import_model")
+        RUN.times_of(IMPORT_MODEL)
     # With a store a user's files lie where Snakemake runs.
-    localrule: bool(STORE)
+    localrule: PLAN.is_stored
     resources:
         mem_mb=8000,
         runtime=30,
     message:
         "Importing {input.model}"
     shell:
-        f"python {SCRIPTS}/import_model.py"
+        f"python {RUN.scripts}/import_model.py"
         " --settings {input.settings} --output {output.blend} --record {output.record}"
         " --receipt {output.receipt} > {log} 2>&1"
 
 
 rule check_blend:
     input:
-        reads(
-            "{name}/check_blend",
-            "check_blend",
-            blend=lambda wildcards: local(asked(BUILD.scene, wildcards).blend),
+        PLAN.reads(
+            CHECK_BLEND,
+            blend=RUN.checked_blend_of,
         ),
     output:
-        check=update(PATHS.blend_check),
-        receipt=receipt_of("{name}/check_blend"),
+        check=update(RUN.paths.blend_check),
+        receipt=PLAN.receipt_of(CHECK_BLEND),
     log:
-        log_of("{name}/check_blend"),
+        RUN.log_of(CHECK_BLEND),
     benchmark:
-        times_of("{name}/check_blend")
+        RUN.times_of(CHECK_BLEND)
     localrule: True
     message:
         "Checking {input.blend}"
     shell:
-        f"python {SCRIPTS}/check_blend.py"
+        f"python {RUN.scripts}/check_blend.py"
         " --scene {wildcards.name} --blend {input.blend:q} --settings {input.settings}"
         " --output {output.check} --receipt {output.receipt} > {log} 2>&1"
 
 
 rule inventory:
     input:
-        reads(
-            "{name}/inventory",
-            "inventory",
-            check=lambda wildcards: asked(BUILD.scene, wildcards).blend_check or [],
-            blend=blend_of,
+        PLAN.reads(
+            INVENTORY,
+            check=RUN.blend_check_of,
+            blend=RUN.blend_of,
         ),
     output:
-        inventory=update(PATHS.inventory),
-        receipt=receipt_of("{name}/inventory"),
-        bundle=bundle_of("{name}/inventory"),
+        inventory=update(RUN.paths.inventory),
+        receipt=PLAN.receipt_of(INVENTORY),
+        bundle=PLAN.bundle_of(INVENTORY),
     log:
-        log_of("{name}/inventory"),
+        RUN.log_of(INVENTORY),
     benchmark:
-        times_of("{name}/inventory")
+        RUN.times_of(INVENTORY)
     # With a store a user's files lie where Snakemake runs.
-    localrule: bool(STORE) and any(d.source.blend or d.source.model for d in BUILD.scenes.values())
+    localrule:
+        PLAN.is_stored
+        and any(d.source.blend or d.source.model for d in RUN.build.scenes.values())
     resources:
         mem_mb=8000,
         runtime=30,
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:
-        f"python {SCRIPTS}/inventory.py"
+        f"python {RUN.scripts}/inventory.py"
         " --scene {wildcards.name} --blend {input.blend:q} --settings {input.settings}"
         " --output {output.inventory} --receipt {output.receipt} > {log} 2>&1"
 
 
-# The users' .blend files, by path. Several scenes may share one.
-BLENDS = {d.source.blend: name for name, d in BUILD.scenes.items() if d.source.blend}
-# Only a file that is missing is downloaded. Snakemake removes a rule's output before it makes it
-# again, as with --forceall, and a user's file may be the work of weeks.
-MISSING = [
-    blend
-    for blend, name in BLENDS.items()
-    if BUILD.scenes[name].source.url and not Path(blend).exists()
-]
-
-
+# Only a file that is missing is downloaded.
 rule fetch_blend:
     output:
         local("{blend}"),
     log:
-        log_of("fetch_blend/{blend}"),
+        RUN.log_of("fetch_blend/{blend}"),
     wildcard_constraints:
-        blend=one_of(MISSING),
+        blend=one_of(RUN.missing_blends),
     # Run beside Snakemake, because a cluster's nodes may not reach the Internet.
     localrule: True
     params:
-        name=lambda wildcards: BLENDS[wildcards.blend],
+        name=lambda wildcards: RUN.blends[wildcards.blend],
     message:
         "Downloading {output}"
     shell:
-        f"python {SCRIPTS}/fetch_blend.py"
+        f"python {RUN.scripts}/fetch_blend.py"
         " --scene {params.name} --output {output:q} > {log} 2>&1"
 
 
@@ -145,14 +132,16 @@ rule fetch_blend:
 rule store_blend:
     input:
         # The checked file may have changed, although it is older than the copy.
-        check=lambda wildcards: BUILD.scenes[BLENDS[wildcards.blend]].blend_check,
+        check=lambda wildcards: RUN.build.scenes[
+            RUN.blends[wildcards.blend]
+        ].blend_check,
         blend=local("{blend}"),
     output:
         "{blend}",
     log:
-        log_of("store_blend/{blend}"),
+        RUN.log_of("store_blend/{blend}"),
     wildcard_constraints:
-        blend=one_of(BLENDS if STORE else ()),
+        blend=one_of(PLAN.only_stored(RUN.blends)),
     localrule: True
     message:
         "Storing {input.blend}"

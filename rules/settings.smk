@@ -5,16 +5,16 @@ from lightfield.core.files import write_text
 # Settings reach other machines as an output.
 rule write_settings:
     input:
-        mark_of_settings,
+        PLAN.mark_of_settings,
     output:
         "{path}",
     log:
-        log_of("{path}"),
+        RUN.log_of("{path}"),
     wildcard_constraints:
-        path=rf"{re.escape(WORK)}/(.+/)?settings/.+\.json" if STORE else one_of([]),
+        path=PLAN.settings_paths,
     localrule: True
     params:
-        text=lambda wildcards: STORED_SETTINGS[wildcards.path],
+        text=lambda wildcards: PLAN.settings_texts[wildcards.path],
     message:
         "Storing {output}"
     run:

@@ -1,22 +1,25 @@
 # The quality of views synthesised inside a light field. It is not part of a dataset: name the target.
+from lightfield.workflow.jobs import SYNTHESIS
 
 
 rule measure_synthesis:
     input:
-        reads(
-            "{scene}/{rig}/synthesis",
-            "synthesis",
-            views=of_build(BUILD.rendered_receipts),
-            truth=of_build(BUILD.truth_receipts),
-            lightfield=PATHS.lightfield,
+        PLAN.reads(
+            SYNTHESIS,
+            views=RUN.of_build(RUN.build.rendered_receipts),
+            truth=RUN.of_build(RUN.build.truth_receipts),
+            lightfield=RUN.paths.lightfield,
         ),
     output:
         multiext(
-            f"{RESULTS}/benchmarks/synthesis/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
+            f"{RUN.results}/benchmarks/synthesis/{{scene}}/{{rig}}",
+            ".csv",
+            ".svg",
+            ".png",
         ),
-        receipt=receipt_of("{scene}/{rig}/synthesis"),
+        receipt=PLAN.receipt_of(SYNTHESIS),
     log:
-        log_of("{scene}/{rig}/synthesis"),
+        RUN.log_of(SYNTHESIS),
     resources:
         mem_mb=4000,
     params:
@@ -25,7 +28,7 @@ rule measure_synthesis:
     message:
         "Measuring how well views of {wildcards.scene}/{wildcards.rig} are synthesised"
     shell:
-        f"python {SCRIPTS}/synthesis_quality.py"
+        f"python {RUN.scripts}/synthesis_quality.py"
         " {params.dataset} --settings {input.settings} --output {params.stem}"
         " --receipt {output.receipt} > {log} 2>&1"
 
@@ -33,7 +36,7 @@ rule measure_synthesis:
 rule synthesis:
     input:
         [
-            f"{RESULTS}/benchmarks/synthesis/{dataset.name}.csv"
-            for dataset in CHOSEN_DATASETS
+            f"{RUN.results}/benchmarks/synthesis/{dataset.name}.csv"
+            for dataset in RUN.chosen
             if dataset.depth
         ],

@@ -1,40 +1,41 @@
 # Validation of datasets, and the checksums of all published files.
+from lightfield.workflow.arguments import optional
+from lightfield.workflow.jobs import CHECKSUMS, VALIDATE, VALIDATE_SEQUENCE
 
 
 # An invalid dataset is an outcome too: it gets its validation.json, and fails below. It also gets its
 # page, because the profile lets a run go on with other jobs after a failure (`keep-going`).
 rule validate:
     input:
-        reads(
-            "{scene}/{rig}/validate",
-            "validate",
-            views=of_dataset("all_receipts"),
-            published=of_dataset("published"),
-            cameras=of_dataset("cameras"),
-            inventory=of_dataset("inventory"),
-            splits=of_dataset("splits"),
+        PLAN.reads(
+            VALIDATE,
+            views=RUN.of_dataset("all_receipts"),
+            published=RUN.of_dataset("published"),
+            cameras=RUN.of_dataset("cameras"),
+            inventory=RUN.of_dataset("inventory"),
+            splits=RUN.of_dataset("splits"),
         ),
     output:
-        validation=update(PATHS.validation),
-        receipt=receipt_of("{scene}/{rig}/validate"),
+        validation=update(RUN.paths.validation),
+        receipt=PLAN.receipt_of(VALIDATE),
     log:
-        log_of("{scene}/{rig}/validate"),
+        RUN.log_of(VALIDATE),
     benchmark:
-        times_of("{scene}/{rig}/validate")
+        RUN.times_of(VALIDATE)
     wildcard_constraints:
-        scene=SCENE_OF_DATASET,
+        scene=RUN.scene_of_dataset,
     threads: 2
     resources:
         mem_mb=4000,
         runtime=120,
     params:
-        dataset=PATHS.folder,
+        dataset=RUN.paths.folder,
         optional=optional("inventory", "splits", clearance="cameras"),
-        removed=REMOVED,
+        removed=RUN.removed,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/validate.py"
+        f"python {RUN.scripts}/validate.py"
         " {params.dataset} --settings {input.settings} {params.optional} --processes {threads}"
         " --removed {params.removed}"
         " --output {output.validation} --receipt {output.receipt} > {log} 2>&1"
@@ -42,27 +43,26 @@ rule validate:
 
 rule checksums:
     input:
-        reads(
-            "{scene}/{rig}/checksums",
-            "checksums",
-            validation=PATHS.validation,
-            receipts=of_dataset("all_receipts"),
-            lists=of_dataset("published"),
+        PLAN.reads(
+            CHECKSUMS,
+            validation=RUN.paths.validation,
+            receipts=RUN.of_dataset("all_receipts"),
+            lists=RUN.of_dataset("published"),
         ),
     output:
-        sums=update(PATHS.sums),
-        receipt=receipt_of("{scene}/{rig}/checksums"),
+        sums=update(RUN.paths.sums),
+        receipt=PLAN.receipt_of(CHECKSUMS),
     log:
-        log_of("{scene}/{rig}/checksums"),
+        RUN.log_of(CHECKSUMS),
     wildcard_constraints:
-        scene=SCENE_OF_DATASET,
+        scene=RUN.scene_of_dataset,
     localrule: True
     params:
-        page=PATHS.page,
+        page=RUN.paths.page,
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/publish_checksums.py"
+        f"python {RUN.scripts}/publish_checksums.py"
         " --settings {input.settings} --validation {input.validation} --page {params.page}"
         " --output {output.sums} --receipt {output.receipt} > {log} 2>&1"
 
@@ -70,33 +70,32 @@ rule checksums:
 # The frames of a sequence are datasets. This is for the exports of all of them.
 rule validate_sequence:
     input:
-        reads(
-            "{scene}/{rig}/validate_sequence",
-            "validate_sequence",
-            exports=of_build(BUILD.sequence_exports),
-            views=of_build(BUILD.validated_frames),
+        PLAN.reads(
+            VALIDATE_SEQUENCE,
+            exports=RUN.of_build(RUN.build.sequence_exports),
+            views=RUN.of_build(RUN.build.validated_frames),
         ),
     output:
-        validation=update(PATHS.validation),
-        sums=update(PATHS.sums),
-        receipt=receipt_of("{scene}/{rig}/validate_sequence"),
+        validation=update(RUN.paths.validation),
+        sums=update(RUN.paths.sums),
+        receipt=PLAN.receipt_of(VALIDATE_SEQUENCE),
     log:
-        log_of("{scene}/{rig}/validate_sequence"),
+        RUN.log_of(VALIDATE_SEQUENCE),
     benchmark:
-        times_of("{scene}/{rig}/validate")
+        RUN.times_of(VALIDATE_SEQUENCE)
     wildcard_constraints:
-        scene=SCENE_OF_SEQUENCE,
+        scene=RUN.scene_of_sequence,
         rig="[A-Za-z0-9_.-]+",
     resources:
         mem_mb=4000,
         runtime=120,
     params:
-        rig=PATHS.folder,
-        removed=REMOVED,
+        rig=RUN.paths.folder,
+        removed=RUN.removed,
     message:
         "Validating the sequence {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/validate_sequence.py"
+        f"python {RUN.scripts}/validate_sequence.py"
         " {params.rig} --settings {input.settings} --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} --receipt {output.receipt}"
         " > {log} 2>&1"
@@ -106,9 +105,9 @@ rule validate_sequence:
 # unfinished build. With a storage, it takes the finished datasets from there.
 rule verify:
     log:
-        log_of("verify"),
+        RUN.log_of("verify"),
     params:
-        verify=verify_command,
+        verify=PLAN.verify_command,
     message:
         "Checking every byte of the chosen datasets"
     shell:

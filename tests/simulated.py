@@ -19,7 +19,7 @@ from lightfield.core.files import sha256, write_json, write_text
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 WHEN = 1_700_000_000
 

@@ -19,8 +19,8 @@ from lightfield.core import yaml_files
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.geometry.rigs import as_written
-from lightfield.stages import job_settings
-from lightfield.workflow.loading import datasets_of, load_datasets, scene_datasets
+from lightfield.planning.loading import datasets_of, load_datasets, scene_datasets
+from lightfield.workflow import job_settings
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 

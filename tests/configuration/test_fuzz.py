@@ -42,14 +42,14 @@ from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.planning import cost as planning
-from lightfield.planning.cost import cost
+from lightfield.planning.cost import rendering
+from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import calibrated
 from lightfield.reprojection import lens_map
 from lightfield.stages.registry import VERSIONS
 from lightfield.validation import splits_check
 from lightfield.workflow import history
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.loading import scene_datasets
 from lightfield.workflow.presence import check_external_files
 
 TIMES = itertools.count(10**18, 10**6)
@@ -242,7 +242,7 @@ def inventory(_):
 
 
 def read_scene_inventory(path, dataset):
-    cost("render", dataset)
+    rendering(dataset)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
         read_inventory(path, key)
@@ -361,7 +361,7 @@ def calibration(_):
 
 def read_calibration(path, dataset):
     calibrated(RenderBlock(target_error=0.01, seed=0), path)
-    cost("render", dataset)
+    rendering(dataset)
 
 
 def probe(_):
@@ -376,7 +376,7 @@ def probe(_):
 
 
 def read_probe(path, dataset):
-    cost("render", dataset)
+    rendering(dataset)
     dataset.shards  # noqa: B018
     plan.table([("a/b", 1, planning.read_probe(path))], {}, Energy())
 

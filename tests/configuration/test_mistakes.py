@@ -18,10 +18,10 @@ from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.core.settings import read_settings
 from lightfield.geometry.rigs import from_settings
+from lightfield.planning.loading import load_datasets
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import CostSettings
 from lightfield.stages.scene import ImportSettings
-from lightfield.workflow.loading import load_datasets
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 SETTINGS = {

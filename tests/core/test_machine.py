@@ -12,7 +12,7 @@ from lightfield.core import machine
 from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 LIBRARY = ctypes.CDLL(None).gnu_get_libc_version
 LIBRARY.restype = ctypes.c_char_p

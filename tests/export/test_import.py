@@ -24,10 +24,10 @@ from lightfield.core.settings import checked
 from lightfield.formats.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.planning.loading import scene_datasets
 from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import ImportViews
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.loading import scene_datasets
 
 RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "center": [0.3, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [48, 48]}

@@ -22,9 +22,9 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import rigs
+from lightfield.planning.loading import scene_datasets
 from lightfield.validation import splits_check
 from lightfield.validation.files import read_sets
-from lightfield.workflow.loading import scene_datasets
 
 PERSPECTIVE = {"lens": "rectilinear", "fov": 70, "resolution": [32, 24]}
 PLANE = {"type": "plane", "cameras": [4, 3], "size": 1.2}

@@ -20,10 +20,10 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
-from lightfield.planning.cost import cost, view_cost
+from lightfield.planning.cost import rendering, reprojecting, view_cost
+from lightfield.planning.loading import scene_datasets
 from lightfield.reprojection.filters import FILTERS
 from lightfield.validation.validate import validate
-from lightfield.workflow.loading import scene_datasets
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
 
@@ -385,7 +385,7 @@ def test_more_groups_need_more_memory_and_more_disk_space(tmp_path, monkeypatch)
         for count in (1, 100)
     )
     pixels = 16**2
-    rendered = [cost("render", dataset, views=1) for dataset in (few, many)]
+    rendered = [rendering(dataset, views=1) for dataset in (few, many)]
     more_memory = rendered[1].memory_bytes - rendered[0].memory_bytes
     # At least Cycles' own buffers and halves.
     assert more_memory > 99 * 12 * pixels
@@ -422,7 +422,7 @@ def test_reprojected_groups_take_time_and_disk_space(tmp_path, monkeypatch):
     assert 0.5 * 11 * 6 * 16**2 < added <= 11 * 6 * 16**2
     # So many views that the start of the job hardly counts.
     views = 10**6
-    seconds = [cost("reproject", each, views, "flat").seconds for each in (without, with_groups)]
+    seconds = [reprojecting(each, "flat", views).seconds for each in (without, with_groups)]
     assert seconds[1] > 11 * seconds[0]
 
 

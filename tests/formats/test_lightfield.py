@@ -17,7 +17,7 @@ from lightfield.core.files import write_json
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses, rigs, rotations
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
 WIDE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 181})

@@ -15,7 +15,7 @@ from lightfield.core.errors import UserError
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rigs import poses as rig_of_poses
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 CORNER = [[0, 0, 0], [1, 0, 0], [1, 2, 0.5], [-3, 2, 0.5]]

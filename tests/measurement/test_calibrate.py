@@ -16,9 +16,9 @@ from lightfield.formats.render_block import MeasuredTargetError
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search
 from lightfield.measurement.effort import effort_for, effort_within
-from lightfield.planning.cost import cost
+from lightfield.planning.cost import calibrating
+from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import PLAIN
-from lightfield.workflow.loading import scene_datasets
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
@@ -187,7 +187,7 @@ def test_the_calibration_of_many_samples_costs_what_its_references_take(tmp_path
     (dataset,) = scene_datasets("aimed")
     # 16 windows of 24² pixels, 6 µs a sample: two references of 1280 samples, 85 samples of plain
     # path tracing, and 640 of the search. Add 70 ms for each of 25 renders, and a start.
-    assert cost("calibrate", dataset).seconds == pytest.approx(3 + 16 * (11.35 + 1.75), rel=1e-3)
+    assert calibrating(dataset).seconds == pytest.approx(3 + 16 * (11.35 + 1.75), rel=1e-3)
 
 
 def simulated(whole_error, bias=0.0):

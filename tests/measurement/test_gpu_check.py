@@ -22,9 +22,9 @@ from lightfield.measurement.equal_error import EqualError
 from lightfield.measurement.trials import Trial
 from lightfield.planning import cost as planning
 from lightfield.planning.cost import cost, read_probe
+from lightfield.planning.loading import scene_datasets
 from lightfield.stages.measurement import FullSize
 from lightfield.workflow import history
-from lightfield.workflow.loading import scene_datasets
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 RIG = {"type": "plane", "cameras": [2, 1], "size": 0.3}

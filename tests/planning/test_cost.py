@@ -7,8 +7,16 @@ from checkouts import ROOT
 
 from lightfield.configuration.config_file import load_config, read_config
 from lightfield.planning import cost as planning
-from lightfield.planning.cost import Cost, cost, kwh, view_cost
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.cost import (
+    Cost,
+    computing_flow,
+    kwh,
+    rendering,
+    rendering_panorama,
+    reprojecting,
+    view_cost,
+)
+from lightfield.planning.loading import scene_datasets
 
 GB = 10**9
 
@@ -36,12 +44,12 @@ def test_a_job_requests_the_measured_memory_of_the_scene(tmp_path):
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * planning.PIXEL_MEMORY
     tiled_pixels = 2048 * 2048 * planning.TILED_PIXEL_MEMORY
-    assert cost("render", dataset).memory_bytes == planning.UNKNOWN_SCENE + pixels
+    assert rendering(dataset).memory_bytes == planning.UNKNOWN_SCENE + pixels
     (tmp_path / "garden").mkdir()
     (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
-    assert cost("render", dataset).memory_bytes == 2.4 * GB + pixels
+    assert rendering(dataset).memory_bytes == 2.4 * GB + pixels
     # Four pixels for each pixel of a view, up to 4096 × 2048.
-    assert cost("render_panorama", dataset).memory_bytes == 2.4 * GB + pixels + tiled_pixels
+    assert rendering_panorama(dataset).memory_bytes == 2.4 * GB + pixels + tiled_pixels
 
 
 def test_a_view_of_8192_pixels_fits_a_machine_on_which_it_was_rendered():
@@ -63,9 +71,9 @@ def test_costs_of_jobs_add_up_but_only_one_is_in_memory():
 def test_the_stages_of_a_dataset_write_together_what_a_view_takes():
     """A run checks the disk by the cost of a view, and prints the size of each stage."""
     for dataset in (*scene_datasets("smoke"), *scene_datasets("object")):
-        written = cost("render", dataset).disk_bytes + cost("flow", dataset).disk_bytes
+        written = rendering(dataset).disk_bytes + computing_flow(dataset).disk_bytes
         for name in dataset.reprojections:
-            written += cost("reproject", dataset, reprojection=name).disk_bytes
+            written += reprojecting(dataset, name).disk_bytes
         assert written == pytest.approx(dataset.view_count * view_cost(dataset).disk_bytes)
 
 

@@ -17,13 +17,13 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.measurement.equal_error import of_measurement
-from lightfield.planning.cost import ProbedViews, cost, read_probe
+from lightfield.planning.cost import ProbedViews, read_probe, rendering
 from lightfield.planning.forecast import Request, requests_table
+from lightfield.planning.loading import scene_datasets
 from lightfield.rendering import shard
 from lightfield.stages.measurement import Plan, Probe, ProbeSettings
 from lightfield.workflow import shard_log
 from lightfield.workflow.history import History
-from lightfield.workflow.loading import scene_datasets
 
 SILVR = ("garden", "lone_monk", "barbershop")
 
@@ -112,7 +112,7 @@ def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
     probe |= {"views": 9, "view_seconds": [6.0, 8.0], "view_bytes": [1e7]}
     write_json(Path(frames[0].paths.probe), probe)
     for frame in frames:
-        ten_views, twenty_views = (cost("render", frame, views) for views in (10, 20))
+        ten_views, twenty_views = (rendering(frame, views) for views in (10, 20))
         assert twenty_views.seconds - ten_views.seconds == pytest.approx(70)
         assert ten_views.disk_bytes == pytest.approx(1e8)
 

@@ -1,15 +1,18 @@
 """The packages are those of docs/explanation/architecture.md, and import only those above them."""
 
 import ast
+import io
 import itertools
 import re
 import subprocess
 import sys
+import tokenize
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
-from lightfield.planning.phases import KINDS
+from lightfield.workflow import jobs
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "scripts" / "lightfield"
@@ -102,7 +105,7 @@ def test_reading_the_rules_imports_nothing_heavy():
     modules = subprocess.run(
         [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
     ).stdout.split()
-    assert "lightfield.workflow.loading" in modules
+    assert "lightfield.planning.loading" in modules
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
 
 
@@ -113,7 +116,7 @@ MECHANISMS = [
     "lightfield.workflow.history",
     "lightfield.workflow.member_record",
     "lightfield.workflow.presence",
-    "lightfield.workflow.shard_counts",
+    "lightfield.planning.shard_counts",
     "lightfield.workflow.shard_log",
     "lightfield.validation.verification",
 ]
@@ -170,23 +173,74 @@ def test_one_module_writes_times_and_sizes():
     assert {file for file in files if UNITS.search(file.read_text())} == WRITES_UNITS
 
 
-def test_each_job_with_a_receipt_has_a_phase_and_a_log_of_its_name():
-    rules = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
-    jobs = set(re.findall(r'receipt_of\(\s*"(.+?)"', rules))
-    assert jobs == set(KINDS)
-    assert jobs <= set(re.findall(r'log_of\(\s*"(.+?)"', rules))
+# The records of jobs, by their names in the rules.
+RECORDS = {name: record for name, record in vars(jobs).items() if isinstance(record, jobs.Job)}
+
+
+def rules_of_records():
+    """Yield the text of each rule whose job has a record, and the record."""
+    text = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
+    for rule in re.split(r"^(?=rule |use rule )", text, flags=re.M):
+        if named := re.search(r"PLAN\.receipt_of\((\w+)\)", rule):
+            yield rule, RECORDS[named[1]]
+
+
+def test_each_record_of_a_job_has_a_rule():
+    assert {record.name for _, record in rules_of_records()} == {job.name for job in jobs.JOBS}
+
+
+def test_a_rule_names_one_record_in_all_its_directives():
+    for rule, record in rules_of_records():
+        named = re.findall(r"(?:reads|receipt_of|bundle_of|log_of|times_of)\(\s*(\w+)", rule)
+        assert {RECORDS[name].name for name in named} == {record.name}, rule
+        declares_bundle = "PLAN.bundle_of" in rule
+        assert declares_bundle == record.has_bundle, record.name
+
+
+def test_the_command_of_a_rule_runs_the_stage_of_its_record():
+    programs = defaultdict(set)
+    for rule, record in rules_of_records():
+        programs[record] |= set(re.findall(r"RUN\.scripts}/(\w+)\.py", rule))
+    # Two rules make views.
+    programs[jobs.RENDER].remove("import_views")
+    # These rules use the command of another one.
+    using = {jobs.PROBE_CAMERAS, jobs.PANORAMA_LIGHTFIELD, jobs.EXPORT_SEQUENCE}
+    for record in jobs.JOBS:
+        assert programs[record] == ({record.stage.name} if record not in using else set())
 
 
 def test_the_jobs_that_run_beside_snakemake_are_known():
-    text = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
-    rules = re.split(r"^(?=rule |use rule )", text, flags=re.M)
     local_jobs = {
-        job
-        for rule in rules
+        record.name
+        for rule, record in rules_of_records()
         if re.search(r"^    localrule: True$", rule, re.M)
-        for job in re.findall(r'receipt_of\(\s*"(.+?)"', rule)
     }
-    assert local_jobs == {job for job, kind in KINDS.items() if kind.is_local}
+    assert local_jobs == {job.name for job in jobs.JOBS if job.is_local}
+
+
+def test_the_files_of_rules_define_no_functions():
+    """The Python of a run is in scripts/lightfield/workflow, where mypy and imports find it."""
+    for file in (ROOT / "Snakefile", *(ROOT / "rules").glob("*.smk")):
+        assert not re.search(r"^\s*(?:def|class|try|with|@)\b", file.read_text(), re.M), file
+
+
+# What the Snakefile and rules/common.smk make for all rules.
+SHARED = {"CONFIG", "FOLDER", "HANDLERS", "IS_MAIN_PROCESS", "PLAN", "REQUESTS", "RUN"}
+
+
+def test_the_files_of_rules_share_only_the_run():
+    for file in (ROOT / "rules").glob("*.smk"):
+        text = file.read_text()
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        constants = {
+            token.string
+            for before, token in itertools.pairwise(tokens)
+            if token.type == tokenize.NAME and token.string.isupper() and before.string != "."
+        }
+        own = set(re.findall(r"^(\w+) = ", text, re.M))
+        imports = re.findall(r"^from \S+ import (\([^)]*\)|.*)", text, re.M)
+        own |= {name for names in imports for name in re.findall(r"\w+", names)}
+        assert constants <= own | SHARED, file
 
 
 # Snakemake's documentation allows a Snakefile these.

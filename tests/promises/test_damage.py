@@ -22,7 +22,7 @@ from faults import CUBOID, FAULTS, KINDS, flip, spoil
 from waiting import wait_until
 
 from lightfield.core.files import sha256
-from lightfield.workflow.loading import scene_datasets
+from lightfield.planning.loading import scene_datasets
 
 BATCHES = range(len(FAULTS))
 # These may keep the size and the time of a file.

@@ -11,7 +11,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
-from lightfield.workflow.loading import datasets_of
+from lightfield.planning.loading import datasets_of
 
 pytestmark = pytest.mark.slow
 

@@ -13,8 +13,8 @@ from lightfield.configuration import config_file, scene_yaml
 from lightfield.core import download, names
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
+from lightfield.planning.loading import load_datasets, scene_datasets
 from lightfield.stages.scene import CheckBlend
-from lightfield.workflow.loading import load_datasets, scene_datasets
 from lightfield.workflow.presence import check_presence
 
 CONTENT = bytes(range(256)) * 12345

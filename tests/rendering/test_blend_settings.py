@@ -17,10 +17,10 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
+from lightfield.planning.loading import datasets_of
 from lightfield.rendering import lightfield_file
-from lightfield.stages import job_settings
 from lightfield.stages.lenses import Reproject
-from lightfield.workflow.loading import datasets_of
+from lightfield.workflow import job_settings
 
 CASES = [
     pytest.param(case, case.outcome or row.outcome, id=f"{row.settings}-{case.name}")

@@ -18,9 +18,9 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
+from lightfield.planning.loading import datasets_of
 from lightfield.rendering import lightfield_file
 from lightfield.validation.validate import validate
-from lightfield.workflow.loading import datasets_of
 
 # What follows, and what the note names.
 BY_NAME = {

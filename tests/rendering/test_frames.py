@@ -10,7 +10,7 @@ from lightfield.configuration import scene_yaml
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.workflow.loading import rendered_frames, scene_datasets
+from lightfield.planning.loading import rendered_frames, scene_datasets
 
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 

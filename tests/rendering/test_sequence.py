@@ -11,7 +11,7 @@ from checkouts import checkout, planned, snakemake
 from lightfield.configuration import config_file, scene_yaml
 from lightfield.core.errors import UserError
 from lightfield.imaging import images
-from lightfield.workflow.loading import load_datasets, scene_datasets
+from lightfield.planning.loading import load_datasets, scene_datasets
 
 SCENE = """
 scene: {builder: garden, parameters: {detail: 0.02}, frame: 5}

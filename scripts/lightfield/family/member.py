@@ -23,10 +23,10 @@ from lightfield.core.receipts import OpenReceipt
 from lightfield.family.stages import StageRun, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.geometry.rigs import Poses
+from lightfield.planning.loading import datasets_of
 from lightfield.rendering import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device
-from lightfield.workflow.loading import datasets_of
 from lightfield.workflow.member_record import read_member
 
 # What a member is made of does not depend on these keys of a scene YAML.

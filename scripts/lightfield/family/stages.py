@@ -18,7 +18,6 @@ from lightfield.configuration.exports import InstantNgp
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.names import VIEWS
 from lightfield.core.stage import Stage
-from lightfield.stages import job_settings
 from lightfield.stages.checks import Validate
 from lightfield.stages.exports import ExportInstantNgp, ExportViews
 from lightfield.stages.lenses import Reproject
@@ -26,6 +25,7 @@ from lightfield.stages.publishing import PublishChecksums
 from lightfield.stages.rig import CheckCameras, FreePlaces, MakeLightfield
 from lightfield.stages.scene import BuildScene, ImportModel, ImportSettings, Inventory
 from lightfield.stages.views import Device, ListSplits, RenderShard
+from lightfield.workflow import job_settings
 
 # The names of stages in a member's log and record. Other stages have the names of their programs.
 NAMES: dict[type[Stage[Any]], str] = {

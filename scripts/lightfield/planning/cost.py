@@ -1,7 +1,7 @@
 """What a job costs before it runs: seconds of one core, memory and disk space.
 
-`cost` answers for each stage of a dataset, in the units that this module's table lists. A probe, a
-calibration and an inventory replace guesses as soon as they exist.
+The functions answer for each job of a dataset, in the units that this module's table lists. A
+probe, a calibration and an inventory replace guesses as soon as they exist.
 
 Every job reads this module with the rules, so it must import nothing that takes long.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -125,8 +125,10 @@ class Cost:
         return 1800 + math.ceil(10 * self.seconds)
 
 
-_JOB = Cost(JOB_SECONDS)
-_BLENDER = Cost(START_UP_SECONDS)
+JOB = Cost(JOB_SECONDS)
+"""The cost of a small job."""
+BLENDER = Cost(START_UP_SECONDS)
+"""The cost of a job that starts Blender, and does little more."""
 
 
 @dataclass(frozen=True)
@@ -148,22 +150,43 @@ class Rate:
         return pixels * cost_samples * self.sample_seconds + pixels * self.pixel_seconds
 
 
-def cost(
-    stage: str,
-    dataset: Dataset | None = None,
-    views: int | None = None,
-    reprojection: str = "",
-) -> Cost:
-    """Return the cost of a job.
+def rendering(dataset: Dataset, views: int | None = None) -> Cost:
+    """Return the cost of a job that renders this many views, by default all of the dataset."""
+    return BLENDER + _count(dataset, views) * _rendered_view(dataset)
 
-    ``stage`` is the name of its rule. The job makes this many ``views`` of the dataset, by default
-    all of them. A job that reprojects has the name of a ``reprojection``.
-    """
-    if stage in _BLENDER_STAGES:
-        return _BLENDER
-    if dataset is None or stage not in _STAGES:
-        return _JOB
-    return _STAGES[stage](dataset, dataset.view_count if views is None else views, reprojection)
+
+def importing(dataset: Dataset, views: int | None = None) -> Cost:
+    """Return the cost of a job that imports this many views, by default all of the dataset."""
+    return JOB + _count(dataset, views) * _imported_view(dataset)
+
+
+def computing_flow(dataset: Dataset, views: int | None = None) -> Cost:
+    """Return the cost of a job that computes the optical flow of views, by default of all."""
+    return JOB + _count(dataset, views) * _flow_of_view(dataset)
+
+
+def reprojecting(dataset: Dataset, name: str, views: int | None = None) -> Cost:
+    """Return the cost of a job of the reprojection ``name`` of views, by default of all."""
+    return JOB + _count(dataset, views) * _reprojected_view(dataset, name)
+
+
+def checking(dataset: Dataset) -> Cost:
+    """Return the cost of a job that validates or exports all views and reprojections."""
+    return JOB + _checks(dataset)
+
+
+def drawing(dataset: Dataset) -> Cost:
+    """Return the cost of a job that draws the figures, or writes the page."""
+    return JOB + _pictures(dataset)
+
+
+def rendering_panorama(dataset: Dataset) -> Cost:
+    """Return the cost of the job that renders the panorama."""
+    return BLENDER + _panorama(dataset)
+
+
+def _count(dataset: Dataset, views: int | None) -> int:
+    return dataset.view_count if views is None else views
 
 
 def view_cost(dataset: Dataset) -> Cost:
@@ -177,7 +200,7 @@ def members_cost(datasets: Iterable[Dataset], members: int) -> Cost:
     member = Cost(_MEMBER_SECONDS)
     for dataset in datasets:
         member += dataset.view_count * view_cost(dataset) + _checks(dataset)
-    return _BLENDER + members * member
+    return BLENDER + members * member
 
 
 def cost_in_samples(samples: float, denoise: bool) -> float:
@@ -495,7 +518,7 @@ def _panorama(dataset: Dataset) -> Cost:
     return Cost(seconds, _memory(dataset, pixels))
 
 
-def _calibration(dataset: Dataset) -> Cost:
+def calibrating(dataset: Dataset) -> Cost:
     """Return the cost of the calibration of a scene, whose first rig's dataset this is.
 
     The estimate takes the error of N samples a pixel as 1 / N. It is 0.4 / N in the courtyard,
@@ -536,31 +559,4 @@ def _calibration_of(
     renders = 2 * seeds + _SEARCH_RENDERS
     pixels = min(*resolution, sampling.WINDOW_SIZE) ** 2
     window = renders * _WINDOW_SECONDS + pixels * samples * SAMPLE_SECONDS
-    return _BLENDER + sampling.PROBES * Cost(window)
-
-
-# Rules that start Blender, beside those that render.
-_BLENDER_STAGES = (
-    "build_scene",
-    "check_blend",
-    "check_cameras",
-    "free_places",
-    "import_model",
-    "inventory",
-    "mesh",
-    "probe_cameras",
-)
-# The cost of a job, from its dataset, its number of views, and the name of its reprojection.
-_STAGES: dict[str, Callable[[Dataset, int, str], Cost]] = {
-    "calibrate": lambda dataset, views, name: _calibration(dataset),
-    "render": lambda dataset, views, name: _BLENDER + views * _rendered_view(dataset),
-    "import_views": lambda dataset, views, name: _JOB + views * _imported_view(dataset),
-    "flow": lambda dataset, views, name: _JOB + views * _flow_of_view(dataset),
-    "reproject": lambda dataset, views, name: _JOB + views * _reprojected_view(dataset, name),
-    "export": lambda dataset, views, name: _JOB + _checks(dataset),
-    "export_to_instant_ngp": lambda dataset, views, name: _JOB + _checks(dataset),
-    "validate": lambda dataset, views, name: _JOB + _checks(dataset),
-    "render_panorama": lambda dataset, views, name: _BLENDER + _panorama(dataset),
-    "figures": lambda dataset, views, name: _JOB + _pictures(dataset),
-    "page": lambda dataset, views, name: _JOB + _pictures(dataset),
-}
+    return BLENDER + sampling.PROBES * Cost(window)

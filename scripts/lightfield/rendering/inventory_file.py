@@ -19,6 +19,7 @@ from lightfield.core.read_files import changed_since_plan
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera
+from lightfield.planning.loading import rendered_frames, scene_datasets
 from lightfield.rendering import (
     blend_facts,
     blend_file,
@@ -33,9 +34,8 @@ from lightfield.rendering import (
     unknown_colours,
 )
 from lightfield.rendering.inventory import FEATURES, inventory
-from lightfield.stages import job_settings
 from lightfield.stages.scene import Inventory
-from lightfield.workflow.loading import rendered_frames, scene_datasets
+from lightfield.workflow import job_settings
 
 
 def make(job: Inventory) -> None:

@@ -59,7 +59,7 @@ class SceneAndRig(ByHand):
     )
 
     def settings(self, given: Mapping[str, Any]) -> LightfieldSettings:
-        from lightfield.workflow.loading import rig_dataset
+        from lightfield.planning.loading import rig_dataset
 
         dataset = rig_dataset(self.scene, self.rig)
         return LightfieldSettings.of_capture(dataset, flow=bool(dataset.flow))

@@ -7,7 +7,6 @@ A job has the wildcards of its output's path: ``scene`` and ``rig`` name the fol
 
 import difflib
 import math
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,17 +17,15 @@ from typing import TypeVar
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
-from lightfield.configuration.exports import SEQUENCE_EXPORTS, Export
+from lightfield.configuration.exports import Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import load_scene, mistake
 from lightfield.core.errors import UserError
-from lightfield.core.names import CORPUS, MESH, VIEWS, scene_folder
-from lightfield.core.receipts import FOLDER, SUFFIX, is_receipt
-from lightfield.formats.export_lists import MANIFEST
-from lightfield.formats.layout import VALIDATION
-from lightfield.planning.cost import Cost, cost, members_cost
-from lightfield.workflow.loading import (
+from lightfield.core.names import CORPUS, VIEWS, scene_folder
+from lightfield.core.receipts import FOLDER, SUFFIX
+from lightfield.planning.cost import Cost, members_cost
+from lightfield.planning.loading import (
     chosen_families,
     load_datasets,
     scene_datasets,
@@ -38,12 +35,6 @@ Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
-# The jobs that make files of a dataset, as their receipts are named.
-_JOBS = {
-    "lightfield.json": "lightfield",
-    "transforms.json": "export_instant_ngp",
-    VALIDATION: "validate",
-}
 RENDER = "render"
 """The stage that makes the rendered views. A reprojection's stage has its name."""
 
@@ -89,6 +80,10 @@ class Build:
     def smoke(self) -> list[Dataset]:
         """The datasets of the smoke scene. Raises `UserError` if its YAML is missing or wrong."""
         return [self.datasets[d.name] for d in scene_datasets(SMOKE, settings=self.config)]
+
+    def smoke_files(self, wildcards: Wildcards) -> list[str]:
+        """Return all files of the smoke scene. Raises `UserError` as `smoke` does."""
+        return [path for d in self.smoke for path in (*d.files, *d.intermediates)]
 
     @cached_property
     def scenes(self) -> dict[str, Dataset]:
@@ -272,14 +267,6 @@ class Build:
             files += [dataset.paths.validation, *dataset.published, *dataset.all_receipts]
         return files
 
-    def job_cost(self, stage: str, wildcards: Wildcards) -> Cost:
-        """Return the cost of a job that makes a dataset, or a shard of it, at a stage."""
-        views = None
-        if "first" in wildcards:
-            views = int(wildcards["end"]) - int(wildcards["first"])
-        dataset = self.dataset(wildcards)
-        return cost(stage, dataset, views, wildcards.get("reprojection", ""))
-
     def truth_receipts(self, wildcards: Wildcards) -> list[str]:
         """Return the receipts of the views with which synthesised views are compared."""
         truths = self.held_out(self.dataset(wildcards))
@@ -307,31 +294,6 @@ class Build:
             for dataset in self.datasets.values()
             if dataset.scene_folder == wildcards["scene"] and dataset.splits
         ]
-
-    def receipt_of_file(self, path: str) -> str | None:
-        """Return the receipt of the job that made a file of a dataset, or an inventory.
-
-        A receipt stands for itself. None for another file.
-        """
-        if is_receipt(path):
-            return path
-        folder, _, name = path.rpartition("/")
-        results, work = f"{self.config.results}/", f"{self.config.work}/"
-        job = None
-        if folder.startswith(work) and name == INVENTORY:
-            job = f"{folder.removeprefix(work)}/inventory"
-        elif folder.startswith(results):
-            place = folder.removeprefix(results)
-            above, _, last = place.rpartition("/")
-            if name == MANIFEST and last != MESH:
-                kind = "sequence" if last in SEQUENCE_EXPORTS else "export"
-                job = f"{above.removesuffix('exports')}{kind}_{last}"
-            elif name in _JOBS:
-                is_sequence = name == VALIDATION and place not in self.datasets
-                job = f"{place}/validate_sequence" if is_sequence else f"{place}/{_JOBS[name]}"
-            elif name == MANIFEST:
-                job = place
-        return f"{work}{FOLDER}/{job}{SUFFIX}" if job else None
 
     # Families.
 
@@ -425,12 +387,6 @@ class Build:
         for folder in self.family_names:
             files += [f"{self.config.work}/{folder}/members.json", *self._batch_receipts(folder)]
         return files
-
-
-def has_bundle(receipt: str) -> bool:
-    """Return whether the job of a receipt makes files that no rule declares."""
-    job = receipt.removesuffix(SUFFIX)
-    return bool(re.search(r"/(\d+-\d+|inventory|mesh|(export|sequence)_\w+|batches/\w+)$", job))
 
 
 @cache

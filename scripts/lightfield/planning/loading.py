@@ -18,7 +18,7 @@ from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
-from lightfield.workflow.shard_counts import shard_count
+from lightfield.planning.shard_counts import shard_count
 
 # A rig with one of these splits tests models that were trained on another rig's views.
 _TESTED_WITH = ("validation", "test")

@@ -1,19 +1,19 @@
 """The settings files of all jobs: what the plan writes, and the programs read with --settings.
 
-`settings_file` is the only provider of the rules. Each stage has an entry in one of its tables, by
-what the stage works on: a scene, a dataset, a reprojection, or something else with wildcards of its
-own. The functions that need no build also serve the stages of a family's members.
+The record of a job in `lightfield.workflow.jobs` names the function of this module that returns its
+settings, by what the job works on: a scene, a dataset, a reprojection, or something else with
+wildcards of its own. The functions that need no build also serve the stages of a family's members.
 """
 
 import os
 import re
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lightfield.configuration import keys
 from lightfield.configuration.capture import LightfieldSettings
@@ -29,6 +29,7 @@ from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
+from lightfield.planning.loading import rendered_frames, scene_datasets
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings
@@ -48,40 +49,71 @@ from lightfield.stages.scene import (
     InventorySettings,
 )
 from lightfield.workflow.build import Build, Wildcards, full_datasets, source_of
-from lightfield.workflow.loading import rendered_frames, scene_datasets
 
 Content = dict[str, Any]
 
 
-def settings_file(stage: str, build: Build, wildcards: Wildcards) -> tuple[str, Content]:
-    """Return the path and the content of the settings file of a stage's job.
+class SettingsFile(NamedTuple):
+    """The settings file of a job: its path and its content."""
 
-    Raises `UserError` for a job that no scene YAML asks for.
-    """
-    if stage in _OF_SCENE:
+    path: str
+    content: Content
+
+
+SettingsOf = Callable[[Build, Wildcards], SettingsFile]
+"""Returns the settings file of a job. Raises `UserError` for a job that no scene YAML asks for."""
+
+
+def of_scene(name: str, settings_of: Callable[[Dataset], Settings]) -> SettingsOf:
+    """Return the settings file ``name`` of a scene's job, by any dataset of the scene."""
+
+    def settings_file(build: Build, wildcards: Wildcards) -> SettingsFile:
         dataset = build.scene(wildcards)
-        path = f"{dataset.paths.scene_work}/settings/{stage}.json"
-        return path, _content(_OF_SCENE[stage](dataset))
-    if stage in _OF_DATASET:
+        path = f"{dataset.paths.scene_work}/settings/{name}.json"
+        return SettingsFile(path, settings_of(dataset).as_json())
+
+    return settings_file
+
+
+def of_dataset(name: str, settings_of: Callable[[Dataset], Settings]) -> SettingsOf:
+    """Return the settings file ``name`` of a dataset's job."""
+    return of_dataset_in(name, lambda build, dataset: settings_of(dataset))
+
+
+def of_dataset_in(name: str, settings_of: Callable[[Build, Dataset], Settings]) -> SettingsOf:
+    """Return the settings file ``name`` of a dataset's job, which depends on the build, too."""
+
+    def settings_file(build: Build, wildcards: Wildcards) -> SettingsFile:
         dataset = build.dataset(wildcards)
-        return dataset.paths.settings(stage), _OF_DATASET[stage](dataset).as_json()
-    if stage in _OF_DATASET_AND_BUILD:
-        dataset = build.dataset(wildcards)
-        settings = _OF_DATASET_AND_BUILD[stage](build, dataset)
-        return dataset.paths.settings(stage), settings.as_json()
-    if stage in _OF_REPROJECTION:
+        return SettingsFile(dataset.paths.settings(name), settings_of(build, dataset).as_json())
+
+    return settings_file
+
+
+def of_reprojection(name: str, content_of: Callable[[Reprojection], Content]) -> SettingsOf:
+    """Return the settings file ``name`` of a reprojection's job."""
+
+    def settings_file(build: Build, wildcards: Wildcards) -> SettingsFile:
         dataset = build.dataset(wildcards)
         reprojection = build.reprojection(wildcards)
         assert reprojection
-        path = dataset.paths.settings(f"{wildcards['reprojection']}/{stage}")
-        return path, _OF_REPROJECTION[stage](reprojection)
-    name, others = _OTHERS[stage](build, wildcards)
-    folder = "/".join(wildcards[key] for key in ("scene", "rig", "family") if key in wildcards)
-    return os.path.normpath(f"{build.config.work}/{folder}/settings/{name}.json"), _content(others)
+        path = dataset.paths.settings(f"{wildcards['reprojection']}/{name}")
+        return SettingsFile(path, content_of(reprojection))
+
+    return settings_file
 
 
-def _content(settings: Settings | Content) -> Content:
-    return settings.as_json() if isinstance(settings, Settings) else settings
+def of_others(named_settings: Callable[[Build, Wildcards], tuple[str, Settings]]) -> SettingsOf:
+    """Return the settings file of a job with wildcards of its own, by its name and its settings."""
+
+    def settings_file(build: Build, wildcards: Wildcards) -> SettingsFile:
+        name, settings = named_settings(build, wildcards)
+        keys_of_folder = [key for key in ("scene", "rig", "family") if key in wildcards]
+        folder = "/".join(wildcards[key] for key in keys_of_folder)
+        path = os.path.normpath(f"{build.config.work}/{folder}/settings/{name}.json")
+        return SettingsFile(path, settings.as_json())
+
+    return settings_file
 
 
 # Of a scene.
@@ -97,14 +129,14 @@ def build_scene(dataset: Dataset) -> BuildSettings:
     )
 
 
-def _import_model(dataset: Dataset) -> ImportSettings:
+def import_model(dataset: Dataset) -> ImportSettings:
     source = load_scene(dataset.scene_name).scene
     if source.model is None:
         raise UserError(f"{dataset.paths.model_blend}: the scene YAML has no model that makes it")
     return ImportSettings.of_source(source)
 
 
-def _check_blend(dataset: Dataset) -> CheckBlendSettings:
+def check_blend(dataset: Dataset) -> CheckBlendSettings:
     return CheckBlendSettings.of(
         sha256=load_scene(dataset.scene_name).scene.sha256, bpy=version("bpy")
     )
@@ -132,14 +164,6 @@ def inventory(dataset: Dataset) -> InventorySettings:
         followed_camera=source.followed_camera,
         light_groups=written.render.light_groups or None,
     )
-
-
-_OF_SCENE: Mapping[str, Callable[[Dataset], Settings | Content]] = {
-    "build_scene": build_scene,
-    "import_model": _import_model,
-    "check_blend": _check_blend,
-    "inventory": inventory,
-}
 
 
 # Of a dataset.
@@ -173,7 +197,7 @@ def lightfield(dataset: Dataset) -> LightfieldSettings:
     )
 
 
-def _panorama(dataset: Dataset) -> LightfieldSettings:
+def panorama(dataset: Dataset) -> LightfieldSettings:
     return LightfieldSettings.of_capture(
         dataset,
         panorama_width=dataset.panorama_width,
@@ -181,7 +205,7 @@ def _panorama(dataset: Dataset) -> LightfieldSettings:
     )
 
 
-def _mesh(dataset: Dataset) -> MeshSettings:
+def mesh(dataset: Dataset) -> MeshSettings:
     if not dataset.mesh:
         raise UserError(f"{dataset.paths.folder}/{MESH}: the scene YAML asks for no mesh of it")
     source = dataset.source
@@ -202,7 +226,7 @@ def validate(dataset: Dataset) -> ValidationSettings:
     )
 
 
-def _figures(dataset: Dataset) -> FiguresSettings:
+def figures(dataset: Dataset) -> FiguresSettings:
     exports = [*dataset.exports.selected.values()]
     chooses_tests = any(_chooses_tests(dataset, export) for export in exports)
     return FiguresSettings.of(rig=dataset.placed_rig, chooses_tests=chooses_tests or None)
@@ -213,22 +237,28 @@ def _chooses_tests(dataset: Dataset, export: Export) -> bool:
     return export.chooses_tests and dataset.rig.split is None
 
 
-_OF_DATASET: Mapping[str, Callable[[Dataset], Settings]] = {
-    "free_places": free_places,
-    "lightfield": lightfield,
-    "panorama": _panorama,
-    "mesh": _mesh,
-    "flow": lambda dataset: ReaderSettings(),
-    "validate": validate,
-    "checksums": lambda dataset: ReaderSettings(),
-    "figures": _figures,
-}
+def reader(dataset: Dataset) -> ReaderSettings:
+    """Return the settings of a job that depends only on files, which its rule names."""
+    return ReaderSettings()
+
+
+# Of a reprojection.
+
+
+def lens_map(reprojection: Reprojection) -> Content:
+    """Return what a lens map depends on."""
+    return reprojection.lens_map_settings
+
+
+def reproject(reprojection: Reprojection) -> Content:
+    """Return the settings of a reprojection."""
+    return reprojection.as_json()
 
 
 # Of a dataset in a build.
 
 
-def _costs(build: Build, dataset: Dataset) -> CostSettings:
+def costs(build: Build, dataset: Dataset) -> CostSettings:
     return CostSettings(
         energy=build.config.energy,
         full=_full_size(dataset),
@@ -250,7 +280,7 @@ def _full_size(dataset: Dataset) -> FullSize:
     )
 
 
-def _page(build: Build, dataset: Dataset) -> PageSettings:
+def page(build: Build, dataset: Dataset) -> PageSettings:
     measured = [
         MeasurementFile(file=str(path), sha256=sha256(path))
         for path in _measurements(build, dataset)
@@ -297,25 +327,9 @@ def _rebuilding(dataset: Dataset) -> str:
     return shlex.join(["snakemake", *arguments])
 
 
-def _synthesis(build: Build, dataset: Dataset) -> SynthesisSettings:
+def synthesis(build: Build, dataset: Dataset) -> SynthesisSettings:
     truths = build.held_out(dataset)
     return SynthesisSettings(truth=[truth.paths.folder for truth in truths])
-
-
-_OF_DATASET_AND_BUILD: Mapping[str, Callable[[Build, Dataset], Settings]] = {
-    "costs": _costs,
-    "page": _page,
-    "synthesis": _synthesis,
-}
-
-
-# Of a reprojection.
-
-
-_OF_REPROJECTION: Mapping[str, Callable[[Reprojection], Content]] = {
-    "lens_map": lambda reprojection: reprojection.lens_map_settings,
-    "reproject": lambda reprojection: reprojection.as_json(),
-}
 
 
 # Of an export.
@@ -355,13 +369,13 @@ def _export_settings(
 # Others. Each returns the name of the settings file, and its content.
 
 
-def _export(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def export_of(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     name, source = wildcards["format"], source_of(wildcards)
     settings = export(build.dataset(wildcards), name, build.export(wildcards), source)
     return f"exports/{source}/{name}", settings
 
 
-def _export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     name, source = wildcards["format"], source_of(wildcards)
     frames = build.frames(wildcards)
     first = frames[0]
@@ -378,12 +392,12 @@ def _export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]
     return f"exports/{source}/{name}", settings
 
 
-def _instant_ngp(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def instant_ngp_of(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     source = source_of(wildcards)
     return f"exports/{source}/instant_ngp", instant_ngp(build.dataset(wildcards), source)
 
 
-def _validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     frames = build.frames(wildcards)
     settings = SequenceValidationSettings(
         frames=[Path(frame.paths.folder).name for frame in frames],
@@ -392,12 +406,12 @@ def _validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Setting
     return "validate", settings
 
 
-def _probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     """Return the settings of a scene's probe cameras. They are its first rig's settings."""
     return "probes", lightfield(build.first_of_scene(wildcards["scene"]))
 
 
-def _gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     """Return the settings of a scene's GPU check: the full sizes of its rigs."""
     sizes = {
         rig: FullSize(views=dataset.view_count, resolution=[*dataset.rig.camera.resolution])
@@ -406,7 +420,7 @@ def _gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "gpu_check", GpuCheckSettings(full=sizes)
 
 
-def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     datasets = build.rig(wildcards)
     settings = PackSettings.of(
         datasets=[dataset.name for dataset in datasets],
@@ -417,7 +431,7 @@ def _pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "pack", settings
 
 
-def _batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def batch(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     name = build.family_names[folder]
     values = build.families[name].values
@@ -460,27 +474,13 @@ def _source_fingerprint(source: SceneSource, has_drawn_light: bool) -> str | Non
     return str(import_version) if import_version > 1 else None
 
 
-def _members(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def members(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     return "members", CountSettings(family=build.family_names[wildcards["family"]])
 
 
-def _corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+def corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     options = build.families[build.family_names[folder]].corpus
     members = [member.name for batch in build.batches[folder].values() for member in batch]
     settings = CorpusSettings(**dict(options), family=folder, members=sorted(members))
     return "corpus", settings
-
-
-_OTHERS: Mapping[str, Callable[[Build, Wildcards], tuple[str, Settings | Content]]] = {
-    "export": _export,
-    "export_sequence": _export_sequence,
-    "instant_ngp": _instant_ngp,
-    "validate_sequence": _validate_sequence,
-    "probes": _probes,
-    "gpu_check": _gpu_check,
-    "pack": _pack,
-    "batch": _batch,
-    "members": _members,
-    "corpus": _corpus,
-}

@@ -1,0 +1,270 @@
+"""What the terminal shows of a run: its start, its progress, its ends, and a dry run's forecast."""
+
+import os
+import resource
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from lightfield.configuration.dataset import Dataset
+from lightfield.core.terminal import was_interrupted
+from lightfield.core.units import duration
+from lightfield.planning.cost import Cost
+from lightfield.planning.forecast import Work, forecast, requests_table
+from lightfield.planning.phases import SENSOR_PHASE
+from lightfield.workflow import run_lock
+from lightfield.workflow.job_plan import JobPlan, PlannedJob
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    CALIBRATE,
+    COUNT_MEMBERS,
+    ORDER,
+    PACK,
+    RENDER,
+    Job,
+)
+from lightfield.workflow.run_config import ending_run
+from lightfield.workflow.run_display import RunDisplay, Task
+from lightfield.workflow.start import StartChecks, explain_full_disk
+
+# For more datasets than this, only the page of all datasets is named.
+MOST_PAGES = 12
+# What stands below the table of what jobs request of a cluster.
+REQUESTS_NOTE = (
+    "mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the "
+    "cluster's default.\n"
+    "A limit is several times the expected time. Jobs of seconds run beside Snakemake, and are "
+    "not listed.\n"
+    "To change one: --set-resources render:mem_mb=16000. See docs/how-to/tune-a-cluster.md."
+)
+# The message if a run ends early, and no job has failed.
+UNFINISHED = "error: the run was stopped before its last job: the same command goes on"
+
+IsLeft = Callable[[str], bool]
+"""Whether the job of a receipt, or a job before it, must still run."""
+
+
+class Handlers:
+    """What the Snakefile calls when a run starts, and when it ends.
+
+    Snakemake's logger plugin tells ``display`` what Snakemake does.
+    """
+
+    def __init__(self, plan: JobPlan) -> None:
+        self._plan = plan
+        self._run = plan.run
+        self._checks = StartChecks(plan)
+        self.display = RunDisplay(self._print_forecast, plan.find_log)
+        if self._run.is_main:
+            self._use_plugin()
+
+    def _use_plugin(self) -> None:
+        """Let the logger plugin tell the display. Without it, Snakemake shows the run itself."""
+        with suppress(ImportError):
+            import snakemake_logger_plugin_plenoforge as plugin
+
+            plugin.display = self.display
+            self.display.is_told = plugin.is_used
+
+    # What Snakemake calls.
+
+    def start(self) -> None:
+        """Check and note what must be before the first job. End the run if it cannot work."""
+        plan = self._plan
+        with ending_run():
+            plan.announce_changes()
+            plan.make_ways()
+            run_lock.take(plan.scene_folders())
+            self.display.at_close(explain_full_disk)
+            self._checks.check(self.display.uses_slurm)
+            plan.write_new_settings()
+            self._checks.remove_leftovers()
+            self._begin_display()
+            announce_stop()
+
+    def succeed(self) -> None:
+        """Print the end of a run that made all that it should."""
+        self.display.at_close(self._print_results)
+
+    def fail(self) -> None:
+        """Print the end of a run that did not make all that it should."""
+        self.display.at_close(self._print_failures)
+
+    # The progress.
+
+    def _begin_display(self) -> None:
+        """Show the progress of the run from now on."""
+        self._announce_calibrations()
+        tasks = [self._task_of(planned) for planned in self._plan.planned_jobs()]
+        self.display.begin({task.log: task for task in tasks}, self._run.cores)
+        self.display.start()
+
+    def _announce_calibrations(self) -> None:
+        """Print the estimated time of each calibration, and of the datasets that depend on it."""
+        seconds: dict[str, dict[Job, float]] = {}
+        for planned in self._plan.planned_jobs():
+            if planned.job in (CALIBRATE, RENDER):
+                costs = seconds.setdefault(planned.names["scene"], {CALIBRATE: 0.0, RENDER: 0.0})
+                costs[planned.job] += (self._cost_of(planned) or Cost()).seconds
+        for scene, costs in seconds.items():
+            if costs[CALIBRATE]:
+                print(
+                    f"calibrating {scene} takes some {duration(costs[CALIBRATE])} of a core,"
+                    f" and rendering it then some {duration(costs[RENDER])}",
+                    file=sys.stderr,
+                )
+
+    def _task_of(self, planned: PlannedJob) -> Task:
+        """Return the display's task for a job."""
+        expected = self._cost_of(planned)
+        # The display counts only the dataset's own views.
+        views = 0 if "batch" in planned.names else self._rendered_views(planned)
+        return Task(
+            planned.name,
+            self._phase_of(planned),
+            Path(self._run.log_of(planned.name)),
+            views=views,
+            seconds=expected.seconds if expected else None,
+        )
+
+    def _phase_of(self, planned: PlannedJob) -> str:
+        """Return the phase of a job."""
+        if "reprojection" in planned.names:
+            reprojection = self._run.asked(self._run.build.reprojection, planned.names)
+            if reprojection and reprojection.sensor:
+                return SENSOR_PHASE
+        return planned.job.phase
+
+    def _rendered_views(self, planned: PlannedJob) -> int:
+        """Return the number of the dataset's views that a job renders."""
+        job, names = planned
+        if job is BUILD_MEMBERS:
+            return self._run.asked(self._run.build.batch_views, names)
+        return int(names["end"]) - int(names["first"]) if job is RENDER else 0
+
+    def _cost_of(self, planned: PlannedJob) -> Cost | None:
+        """Return the cost of a job. None if it is unknown."""
+        job, names = planned
+        if job.cost is None:
+            return None
+        return self._run.asked(partial(job.cost, self._run.build), names)
+
+    # The ends.
+
+    def _print_results(self) -> None:
+        """Print what the run took, and what it has finished.
+
+        A run with --until or --touch leaves jobs out, and ends without an error, too.
+        """
+        self._print_summary()
+        is_left = self._plan.left_out()
+        self._print_pages(is_left)
+        self._print_packages(is_left)
+        self._print_families(is_left)
+
+    def _print_failures(self) -> None:
+        """Print what the run took, and why it ended."""
+        self._print_summary()
+        failures = "" if was_interrupted() else self.display.failures()
+        print(failures or UNFINISHED, file=sys.stderr, flush=True)
+
+    def _print_summary(self) -> None:
+        """Print what the run took."""
+        if summary := self.display.summary(self._cpu_seconds()):
+            print(summary, file=sys.stderr)
+
+    def _cpu_seconds(self) -> float | None:
+        """Return the CPU seconds of all jobs. None on a cluster, or on a graphics card."""
+        if not self._run.runs_here or self._run.gpus:
+            return None
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
+
+    def _print_pages(self, is_left: IsLeft) -> None:
+        """Print the pages of the datasets that this run has finished, and the folders of others."""
+        plan = self._plan
+        ends: dict[str, list[str]] = {"valid": [], "not valid": [], "not finished": []}
+        for dataset in self._run.build.datasets.values():
+            receipt = plan.receipt_path(f"{dataset.name}/page")
+            if receipt in plan.asked and is_left(receipt):
+                ends["not finished"].append(plan.shown(dataset.paths.folder))
+            elif receipt in plan.asked:
+                ends[self._validity(dataset)].append(plan.shown(dataset.paths.page))
+        for state, paths in ends.items():
+            if len(paths) > MOST_PAGES:
+                index = plan.shown(f"{self._run.results}/index.html")
+                paths = [f"{len(paths)} datasets: {index}"]
+            for path in paths:
+                print(f"{state}: {path}", file=sys.stderr)
+
+    def _validity(self, dataset: Dataset) -> str:
+        return "valid" if self._plan.is_valid(dataset) else "not valid"
+
+    def _print_packages(self, is_left: IsLeft) -> None:
+        """Print the paths of the first archives of this run's packages."""
+        for receipt, (job, names) in self._plan.asked.items():
+            if job is PACK:
+                state = "not packed" if is_left(receipt) else "packed"
+                archive = self._run.paths.package.format(**names)
+                print(f"{state}: {self._plan.shown(archive)}", file=sys.stderr)
+
+    def _print_families(self, is_left: IsLeft) -> None:
+        """Print how many members of each family are built, if this run has counted them."""
+        for receipt, planned in self._plan.asked.items():
+            is_count = planned.job is COUNT_MEMBERS
+            if is_count and self._plan.check.will_run(receipt) and not is_left(receipt):
+                log = Path(self._run.log_of(planned.name))
+                print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
+
+    # The forecast of a dry run.
+
+    def _print_forecast(self) -> None:
+        """Print the jobs, views, CPU time and size of a dry run's phases and datasets."""
+        self._plan.announce_changes()
+        self._checks.announce_refusals()
+        jobs = sorted(self._plan.planned_jobs(), key=lambda planned: ORDER[planned.job])
+        print(forecast([self._work_of(planned) for planned in jobs]))
+        if self._run.cluster:
+            self._print_requests(jobs)
+
+    def _work_of(self, planned: PlannedJob) -> Work:
+        """Return a job's part of the forecast."""
+        return Work(
+            self._phase_of(planned),
+            self._dataset_name_of(planned),
+            self._rendered_views(planned),
+            self._cost_of(planned) or Cost(),
+        )
+
+    def _dataset_name_of(self, planned: PlannedJob) -> str | None:
+        """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
+        names, datasets = planned.names, self._run.build.datasets
+        if "rig" not in names:
+            return None
+        name = f"{names['scene']}/{names['rig']}"
+        return datasets[name].sequence_name if name in datasets else name
+
+    def _print_requests(self, jobs: list[PlannedJob]) -> None:
+        """Print what the jobs of a dry run would request of the cluster."""
+        requests = self.display.requests
+        logs = [self._run.log_of(each.name) for each in jobs if not each.job.is_local]
+        found = [requests[log] for log in logs if log in requests]
+        if found:
+            print(f"\n{requests_table(found)}\n\n{REQUESTS_NOTE}")
+
+
+def announce_stop() -> None:
+    """Print a message at SIGTERM, because Snakemake is quiet while it waits for its jobs."""
+    stop: Any = signal.getsignal(signal.SIGTERM)
+
+    def stop_and_say_so(number: int, frame: FrameType | None) -> None:
+        # The signal may interrupt a print(), in which print() cannot be called.
+        os.write(2, b"stopping after SIGTERM: the jobs that run are finished first\n")
+        stop(number, frame)
+
+    signal.signal(signal.SIGTERM, stop_and_say_so)

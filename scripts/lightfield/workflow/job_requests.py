@@ -1,0 +1,55 @@
+"""The cores, memory and time that jobs ask for, by what they are expected to cost."""
+
+from collections.abc import Callable
+from functools import partial
+
+from lightfield.core.gpus import CUDA
+from lightfield.planning.cost import Cost, rendering, shard_threads
+from lightfield.workflow.jobs import Job
+from lightfield.workflow.run import HasWildcards, Run
+
+
+class JobRequests:
+    """The resource functions of a run's rules."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def memory_of(self, job: Job) -> Callable[[HasWildcards, int], int]:
+        """Return the resource function of a job's memory in MB. Each new attempt gets more."""
+        return lambda wildcards, attempt: self._cost_of(job, wildcards).megabytes(attempt)
+
+    def minutes_of(self, job: Job) -> Callable[[HasWildcards, int], int]:
+        """Return the resource function of a job's time limit in minutes."""
+        return lambda wildcards, threads: self._cost_of(job, wildcards).most_minutes(threads)
+
+    def _cost_of(self, job: Job, wildcards: HasWildcards) -> Cost:
+        """Return the cost of a job."""
+        assert job.cost
+        return self._run.asked(partial(job.cost, self._run.build), wildcards)
+
+    def threads_of_shard(self, wildcards: HasWildcards) -> int:
+        """Return the cores of each shard, so that the shards at work fit this machine."""
+        run = self._run
+        shards = sum(len(dataset.shards) for dataset in run.chosen)
+        need = rendering(run.asked(run.build.dataset, wildcards)).memory_bytes
+        threads = shard_threads(run.cores, shards, need, run.memory)
+        # Cycles may be unable to use an AMD GPU, unless the user names its kind.
+        is_hip = run.settings.device == "hip"
+        used_gpus = [each for each in run.local_gpus if each.variable == CUDA or is_hip]
+        if used_gpus:
+            # On each GPU one shard renders, and another one starts. More would only wait.
+            threads = max(threads, run.cores // (2 * len(used_gpus)))
+        return threads
+
+    def threads_of_batch(self, wildcards: HasWildcards) -> int:
+        """Return the cores of each batch: one, or more if there are fewer batches than cores."""
+        return max(1, self._run.cores // self._run.build.batch_count)
+
+    def stall_seconds(self, wildcards: HasWildcards) -> int:
+        """Return the seconds after which a view counts as hung.
+
+        On this machine it is 0, which means never: the user may suspend and continue a build.
+        """
+        a_view = rendering(self._run.asked(self._run.build.dataset, wildcards), views=1)
+        return 0 if self._run.runs_here else a_view.stall_seconds
