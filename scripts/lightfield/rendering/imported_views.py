@@ -6,8 +6,9 @@ from lightfield.configuration import keys
 from lightfield.core import receipts
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.core.files import link_or_copy
+from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.progress import Progress
+from lightfield.core.read_files import changed
 from lightfield.formats.lightfield import LightField
 from lightfield.stages.views import ImportViews
 from lightfield.workflow import shard_log
@@ -29,6 +30,9 @@ def _import_view(path: Path, imported: Path) -> None:
     """Link or copy a view, and note its source."""
     if not path.is_file():
         raise UserError(f"{path}: no such file, but its lightfield.json has the view")
-    if receipt := receipts.current():
-        receipt.add_input(path)
     link_or_copy(path, imported)
+    if receipt := receipts.current():
+        # Now, because the link has given the source another time of change.
+        receipt.add_input(path)
+        if receipt.inputs[receipts.name_of(path)] != sha256(imported):
+            raise changed(path)
