@@ -114,9 +114,10 @@ def unseen():
     layers = bpy.context.view_layer.layer_collection.children
     layers["excluded"].exclude = True
     layers["indirect"].indirect_only = True
-    instancer = add("instancer", size=0.5, location=(0.5, 3, 0.4))
-    instancer.instance_type = "VERTS"
-    instancer.show_instancer_for_render = False
+    emitter = add("emitter", size=0.5, location=(0.5, 3, 0.4))
+    emitter.modifiers.new("dots", "PARTICLE_SYSTEM")
+    emitter.particle_systems[0].settings.render_type = "NONE"
+    emitter.show_instancer_for_render = False
     # Nothing is behind it, so that a pixel of it is empty whether it is there or not.
     add("holdout", size=0.6, location=(0, 7, 2.6)).is_holdout = True
 

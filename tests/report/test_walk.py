@@ -17,6 +17,7 @@ from sphere import BALL, BALL_RADIUS, RADIUS, RED, look, look_at_ball, write_vie
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
+from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import pictures
 from lightfield.stages.report import PageSettings, ReportHtml
 from lightfield.synthesis.view import Sources, reader
@@ -497,27 +498,48 @@ def press(opened, name):
     opened.locator("#walk-controls").get_by_role("button", name=name, exact=True).click()
 
 
+def picture_of(opened, canvas):
+    """Return the pixels (h, w, 3), 0 to 255, of the canvas with an id."""
+    uri = opened.evaluate("(id) => element(id).toDataURL('image/png')", canvas)
+    picture = Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2])))
+    return np.asarray(picture.convert("RGB"), int)
+
+
 def palette_of(opened):
     """Return the colours (256, 3), 0 to 255, of the page's scale of depths, from near to far."""
-    data = opened.evaluate(
-        "[...element('depth-bar').getContext('2d').getImageData(0, 0, 256, 1).data]"
-    )
-    return np.reshape(data, (256, 4))[:, :3]
+    (palette,) = picture_of(opened, "depth-bar")
+    return palette
+
+
+def scale_colour(opened, depth):
+    """Return the colour of a depth on the page's scale, which has its numbers below it."""
+    texts = opened.locator("#depth-ticks span").all_text_contents()
+    ticks = [float(text.split()[0]) for text in texts]
+    assert ticks == sorted(ticks)
+    place = np.interp(np.log(depth), np.log(ticks), np.linspace(0, 255, len(ticks)))
+    return palette_of(opened)[np.rint(np.nan_to_num(place)).astype(int)]
 
 
 def test_depth_has_the_colours_of_the_pages_scale(shared_tab):
     opened = shared_tab()
-    ticks = [
-        float(text.split()[0]) for text in opened.locator("#depth-ticks span").all_inner_texts()
-    ]
-    assert ticks == sorted(ticks)
-    palette = palette_of(opened)
     press(opened, "Depth")
     # The ball is ahead of the middle of the rig, and the sphere behind it.
     for yaw, distance in ((0, BALL[1] - BALL_RADIUS), (math.pi, RADIUS)):
         middle = look_from(opened, [0, 0, 0], yaw, 0)[HEIGHT // 2, WIDTH // 2]
-        place = np.interp(math.log(distance), np.log(ticks), np.linspace(0, 255, len(ticks)))
-        np.testing.assert_allclose(255 * middle, palette[round(place)], atol=8)
+        np.testing.assert_allclose(255 * middle, scale_colour(opened, distance), atol=8)
+
+
+def test_the_open_view_has_the_colours_of_the_pages_scale_of_depths(tab, small):
+    opened = tab()
+    opened.click("#show-depth")
+    name = opened.inner_text("#view-name")
+    (view,) = (v for v in LightField.read(small / "lightfield.json").views if v.name == name)
+    lens = lenses.from_camera(SMALL_CAMERA)
+    _, distance = look_at_ball(lens, view.world_from_camera)
+    expected = scale_colour(opened, z_from_distance(distance, lens.pixel_rays()))
+    off = np.abs(picture_of(opened, "viewer") - expected).max(axis=-1)
+    assert off.shape == (32, 32)
+    assert (off[np.isfinite(distance)] < 8).mean() > 0.95
 
 
 def test_holes_are_pink_and_sources_have_the_colour_of_their_number(tmp_path, show):

@@ -142,3 +142,13 @@ def test_a_file_without_a_receipt_is_finished_only_if_its_sum_is_published():
     write_text(published.parents[1] / SUMS, f"{sha256(published)}  exr/a.exr\n")
     assert not finished("0-1.jsonl", bare)
     assert finished("0-2.jsonl", published)
+
+
+def test_a_link_to_nowhere_in_place_of_a_file_is_moved_aside():
+    file = Path("exr/a.exr")
+    render("0-1.jsonl", file)
+    file.unlink()
+    file.symlink_to("gone.exr")
+    assert not finished("0-1.jsonl", file)
+    assert not file.is_symlink()
+    assert Path("work/removed/exr/a.exr").is_symlink()
