@@ -23,7 +23,7 @@ from lightfield.formats.layout import IMAGES, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
-from lightfield.workflow.build import RENDER
+from lightfield.workflow.build import RENDERED
 from lightfield.workflow.member_record import read_member
 
 # The rate is measured over this many seconds.
@@ -98,7 +98,7 @@ def look(folder: Path, shards: Path, now: float) -> RenderProgress:
     """
     rendering = RenderProgress()
     names: list[str] = []
-    noted = {path: receipts.noted(path) for path in history.shards(shards / RENDER)}
+    noted = {path: receipts.noted(path) for path in history.shards(shards / RENDERED)}
     outputs_of_shards = [outputs for outputs, _ in noted.values()]
     try:
         if (folder / NAME).exists():

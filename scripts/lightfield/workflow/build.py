@@ -35,14 +35,14 @@ Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
-RENDER = "render"
+RENDERED = "render"
 """The stage that makes the rendered views. A reprojection's stage has its name."""
 
 
 def stage_of(wildcards: Wildcards) -> str:
     """Return the stage whose views a job makes or reads."""
     source = wildcards.get("source", "").rstrip("/")
-    return wildcards.get("reprojection", source or RENDER)
+    return wildcards.get("reprojection", source or RENDERED)
 
 
 def source_of(wildcards: Wildcards) -> str:
@@ -103,7 +103,7 @@ class Build:
     def reprojection(self, wildcards: Wildcards) -> Reprojection | None:
         """Return the reprojection that a job concerns. None for the rendered views."""
         stage = stage_of(wildcards)
-        if stage == RENDER:
+        if stage == RENDERED:
             return None
         dataset = self.dataset(wildcards)
         return _entry(dataset.reprojections, stage, dataset.paths.folder, "reprojection of it")
@@ -114,7 +114,7 @@ class Build:
 
     def rendered_receipts(self, wildcards: Wildcards) -> list[str]:
         """Return the receipts of a dataset's rendered views."""
-        return self.dataset(wildcards).receipts(RENDER)
+        return self.dataset(wildcards).receipts(RENDERED)
 
     def lens_maps(self, wildcards: Wildcards) -> list[str]:
         """Return the lens maps of a reprojection. Empty if there is no such reprojection."""
@@ -139,7 +139,7 @@ class Build:
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
-        files = [*dataset.receipts(RENDER), *dataset.receipts(stage_of(wildcards))]
+        files = [*dataset.receipts(RENDERED), *dataset.receipts(stage_of(wildcards))]
         for test in self.testing(dataset, self.export(wildcards)):
             files += _views_of_source(test, wildcards)
         return list(dict.fromkeys(files))
@@ -270,7 +270,7 @@ class Build:
     def truth_receipts(self, wildcards: Wildcards) -> list[str]:
         """Return the receipts of the views with which synthesised views are compared."""
         truths = self.held_out(self.dataset(wildcards))
-        return [record for truth in truths for record in truth.receipts(RENDER)]
+        return [record for truth in truths for record in truth.receipts(RENDERED)]
 
     def held_out(self, dataset: Dataset) -> list[Dataset]:
         """Return the scene's chosen datasets that reach less far than this one.
@@ -398,7 +398,7 @@ def full_datasets(scene: str) -> dict[str, Dataset]:
 def _views_of_source(dataset: Dataset, wildcards: Wildcards) -> list[str]:
     """Return the records and light fields of a dataset's rendered views, and of the source's."""
     return [
-        *dataset.receipts(RENDER),
+        *dataset.receipts(RENDERED),
         *dataset.receipts(stage_of(wildcards)),
         dataset.paths.lightfield,
         dataset.paths.source_lightfield(wildcards["source"]),

@@ -121,7 +121,10 @@ class Run:
 
     @property
     def probes(self) -> list[str]:
-        """The probe cameras of the chosen scenes."""
+        """The probe cameras of the chosen scenes.
+
+        Target rules name them, so that missing ones are made again.
+        """
         return [f"{self.work}/{name}/probes.json" for name in self.rendered_scenes]
 
     @property
