@@ -148,7 +148,8 @@ rigs:
     type: plane
     cameras: [2, 1]
     size: [0.5, 0, 0]
-    center: [0, 0, 1.5]
+    center: [0, -2, 0.5]
+    look_at: [0, 0, 0.5]
     frames: {{first: 1, last: 2}}
     camera: {{lens: rectilinear, fov: 90, resolution: [16, 16]}}
 exports:

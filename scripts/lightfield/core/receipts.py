@@ -185,8 +185,8 @@ def _line(path: str, output: Output) -> dict[str, Any]:
 
 def job_of(path: str | Path) -> str:
     """Return the name of a receipt's job: its path in `FOLDER`, without its suffix."""
-    parts = Path(path).with_suffix("").parts
-    return "/".join(parts[parts.index(FOLDER) + 1 :])
+    _, _, job = f"/{Path(path).with_suffix('').as_posix()}".rpartition(f"/{FOLDER}/")
+    return job
 
 
 def is_receipt(path: str | Path) -> bool:

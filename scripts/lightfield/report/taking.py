@@ -57,7 +57,8 @@ def _bundles(storage: Storage, dataset: Path, work: str) -> Iterator[tuple[str, 
     for part in Path(receipts.name_of(dataset)).parts[:-1]:
         for bundle in storage.below(f"{work}/{receipts.FOLDER}/{part}", bundles.SUFFIX):
             with tempfile.TemporaryDirectory() as folder:
-                copy = Path(folder, "receipt.jsonl")
+                # A receipt names its own place.
+                copy = Path(folder, bundle).with_suffix(receipts.SUFFIX)
                 storage.bring(bundle.removesuffix(bundles.SUFFIX) + receipts.SUFFIX, copy)
                 receipt = receipts.read(copy)
             outputs = receipt.outputs.items() if receipt else ()
