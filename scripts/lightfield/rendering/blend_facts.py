@@ -208,7 +208,7 @@ def _moves(camera: Any, frame: float) -> bool:
         frames.go_to(moment)
         evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
         poses.append(np.array(evaluated.matrix_world))
-    return not np.allclose(*poses, rtol=1e-6, atol=1e-6)
+    return not np.allclose(poses[0], poses[1], rtol=1e-6, atol=1e-6)
 
 
 def _check_pose(name: str, frame: float, world_from_camera: Floats) -> None:
