@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -87,19 +87,23 @@ def outcomes(files: list[tuple[Path, Path]]) -> Iterator[tuple[Path, Outcome]]:
     pool.shutdown()
 
 
+def files_below(folders: Iterable[Path], suffixes: Container[str]) -> list[tuple[Path, Path]]:
+    """Return the files with some suffixes below some folders, each with its folder."""
+    return [
+        (path, folder)
+        for folder in folders
+        for path in sorted(folder.rglob("*"))
+        if path.suffix.lower() in suffixes and path.is_file()
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--suffixes", nargs="+", default=[*MODELS], help="such as .glb")
     parser.add_argument("--list", type=Path, help="JSON to write: what became of each file")
     options = parser.parse_args()
-    files = [
-        (path, folder)
-        for folder in options.folders
-        for path in sorted(folder.rglob("*"))
-        if path.suffix.lower() in options.suffixes and path.is_file()
-    ]
-    results = dict(outcomes(files))
+    results = dict(outcomes(files_below(options.folders, options.suffixes)))
     if options.list:
         write_json(options.list, {str(path): [*result] for path, result in results.items()})
     print(f"| format | files | {' | '.join(VERDICTS)} | CPU s a file |")

@@ -177,6 +177,19 @@ ROWS = [
         "`render: {camera_motion: {rolling: …}}`",
     ),
     Row(
+        "motion blur: movement of the file's camera",
+        IGNORED,
+        [
+            Case(
+                scenes.move_the_camera,
+                scenes.blurred_cube,
+                note="movement of the camera during the exposure ignored",
+            )
+        ],
+        "a view's camera stands still",
+        "`render: {camera_motion: …}`",
+    ),
+    Row(
         "scale of the camera, or one scale of a parent for all axes",
         TAKEN,
         [

@@ -225,7 +225,7 @@ def read_lightfield(path, _):
 def inventory(_):
     lens = {"type": "PERSP", "lens": 50.0, "sensor_fit": "AUTO", "sensor_width": 36.0}
     lens |= {"sensor_height": 24.0, "shift_x": 0.1, "shift_y": 0.0, "depth_of_field": False}
-    camera = {"name": "Camera", "lens": lens, "clip": [0.1, 1000.0]}
+    camera = {"name": "Camera", "lens": lens, "clip": [0.1, 1000.0], "moves": True}
     camera["matrices"] = {"1": np.eye(4).tolist(), "3": np.eye(4).tolist()}
     blend = {"scene": "Scene", "frame": 3, "samples": 64, "camera": camera, "layers": ["a"]}
     blend |= {"motion_blur": True, "shutter": 0.5, "shutter_position": "START", "remapped": [1, 2]}

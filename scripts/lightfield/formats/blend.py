@@ -192,6 +192,8 @@ def _exposure(blend: Settings, render: RenderBlock) -> Iterator[str]:
     if not is_blurred(blend, render):
         return
     yield f"shutter open for {blend['shutter']:g} frames"
+    if blend["camera"] and blend["camera"]["moves"]:
+        yield "movement of the camera during the exposure ignored"
     if blend["shutter_position"] != "CENTER":
         yield f"shutter position {blend['shutter_position'].lower()} ignored, it is centred"
     if blend["shutter_curve"]:

@@ -161,13 +161,15 @@ def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None
     """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
 
     Return None if the scene has no camera. A marker may change the camera with the frame.
-    ``is_taken`` says whether views have the camera's poses. Raises `UserError` if they cannot.
+    ``is_taken`` says whether views have the camera's poses. Only then, ``moves`` says whether the
+    camera moves during a blurred exposure. Raises `UserError` if they cannot.
     """
     scene = bpy.context.scene
     lenses = []
     world_from_cameras = {}
     names = []
     clips = []
+    moves = False
     for frame in sorted(set(camera_frames)):
         frames.go_to(frame)
         # Blender lets any object be the camera. Only a camera has a lens.
@@ -182,13 +184,31 @@ def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None
         world_from_cameras[str(frame)] = [list(row) for row in world_from_camera]
         if is_taken:
             _check_pose(names[-1], frame, np.array(world_from_camera))
+            moves = moves or (motion_blur.is_on() and _moves(scene.camera, frame))
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has a different lens at frame {frame} than at frame "
                 f"{min(camera_frames)}, and all views of a dataset share one lens; choose frames "
                 "with the same lens"
             )
-    return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": world_from_cameras}
+    return {
+        "name": names[0],
+        "lens": lenses[0],
+        "clip": clips[0],
+        "moves": moves,
+        "matrices": world_from_cameras,
+    }
+
+
+def _moves(camera: Any, frame: float) -> bool:
+    """Return whether a camera moves while the shutter is open at a frame."""
+    half = bpy.context.scene.render.motion_blur_shutter / 2
+    poses = []
+    for moment in (frame - half, frame + half):
+        frames.go_to(moment)
+        evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        poses.append(np.array(evaluated.matrix_world))
+    return not np.allclose(poses[0], poses[1], rtol=1e-6, atol=1e-6)
 
 
 def _check_pose(name: str, frame: float, world_from_camera: Floats) -> None:

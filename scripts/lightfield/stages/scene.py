@@ -140,7 +140,7 @@ class Inventory(Stage[InventorySettings]):
 
     name = "inventory"
     function = "lightfield.rendering.inventory_file:make"
-    version = 6
+    version = 7
 
     settings: InventorySettings = InventorySettings()
     scene: str | None = option("name of the file in configs/scenes/ that uses this .blend", None)
