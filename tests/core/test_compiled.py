@@ -1,5 +1,6 @@
 """Kernels: their machine code is kept for the next process, whatever others save meanwhile."""
 
+import os
 import subprocess
 
 import forks
@@ -33,7 +34,7 @@ def test_processes_that_compile_a_kernel_at_the_same_time_keep_it_for_all_types(
     def start(*types):
         return subprocess.Popen(
             [forks.python(), program, *types],
-            env={"PYTHONPATH": str(ROOT / "scripts")},
+            env=os.environ | {"PYTHONPATH": str(ROOT / "scripts")},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -40,10 +40,10 @@ def test_a_fork_takes_the_rules_of_its_checkout_and_notices_changes(tmp_path):
     # An unchanged file of rules calls a changed function.
     with (folder / "scripts/lightfield/core/disk_space.py").open("a") as file:
         file.write("def check_folder(folder): raise TypeError('mistaken')\n")
-    (line,) = (n for n, text in enumerate(lines, 1) if "check_folder(Path(" in text)
+    (line,) = (n for n, text in enumerate(lines, 1) if "= RunConfig(" in text)
     error = f'TypeError in file "{snakefile}", line {line}:\nmistaken'
     assert error in snakemake(folder, "--dry-run").stderr
-    snakefile.write_text("\n".join(["assert GIVEN_KEYS", *lines]))
+    snakefile.write_text("\n".join(["assert CONFIG", *lines]))
     error = f'NameError in file "{snakefile}", line 1:'
     assert error in snakemake(folder, "--dry-run").stderr
 
