@@ -150,6 +150,8 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
 
     Raises `UserError` if the file is refused.
     """
+    from lightfield.workflow.loading import datasets_of
+
     from lightfield.configuration.config_file import Preset
     from lightfield.configuration.scene_yaml import Scene
     from lightfield.core.files import sha256
@@ -157,7 +159,6 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
     from lightfield.rendering import inventory_file, lightfield_file
     from lightfield.stages import job_settings
     from lightfield.stages.views import RenderShard
-    from lightfield.workflow.loading import datasets_of
 
     camera = {"lens": "file", "resolution": [SIDE, SIDE]}
     scene = Scene.model_validate(
