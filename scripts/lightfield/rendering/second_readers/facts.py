@@ -5,6 +5,7 @@ Points are in the world of Blender: right-handed, z up.
 """
 
 from collections.abc import Mapping
+from contextlib import ContextDecorator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -78,7 +79,7 @@ class ModelFacts:
 
 
 # Places that are not finite are refused later, by name.
-_QUIETLY = np.errstate(invalid="ignore", over="ignore")
+_QUIETLY: ContextDecorator = np.errstate(invalid="ignore", over="ignore")
 
 
 class Geometry:
@@ -101,24 +102,24 @@ class Geometry:
         pixel shows them, and importers remove them.
         """
         points = np.asarray(places, np.float64).reshape(-1, 3)
-        corners = np.asarray(corners, np.int64).ravel()
-        sizes = np.asarray(sizes, np.int64).ravel()
-        if len(corners) < len(points):
+        indices: NDArray[np.int64] = np.asarray(corners, np.int64).ravel()
+        counts: NDArray[np.int64] = np.asarray(sizes, np.int64).ravel()
+        if len(indices) < len(points):
             # One of many objects of a file, whose vertices stand in one list.
-            used, corners = np.unique(corners, return_inverse=True)
+            used, indices = np.unique(indices, return_inverse=True)
             points = points[used]
         is_used = np.zeros(len(points), bool)
-        is_used[corners] = True
+        is_used[indices] = True
         self._used = points[is_used]
-        has_corners = len(corners) > 0
+        has_corners = len(indices) > 0
         self.colour = (
             colours.mean(0, dtype=np.float64) if colours is not None and has_corners else None
         )
         self.opacity = float(opacities.mean()) if opacities is not None and has_corners else None
-        corners, sizes = _without_repeated(points, corners, sizes)
-        self.faces = len(sizes)
-        self.triangles = int((sizes - 2).sum())
-        self._areas = _vector_areas(points, corners, sizes)
+        indices, counts = _without_repeated(points, indices, counts)
+        self.faces = len(counts)
+        self.triangles = int((counts - 2).sum())
+        self._areas = _vector_areas(points, indices, counts)
 
     def __bool__(self) -> bool:
         return len(self._used) > 0

@@ -69,7 +69,7 @@ class Document:
         stride = view.get("byteStride", kind.itemsize * width)
         start = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
         data = self._buffers[view["buffer"]]
-        array = np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
+        array: NDArray[Any] = np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
         return array.astype(np.float64)
 
     @cached_property

@@ -364,7 +364,8 @@ def _listed(starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> NDArray[np
     if (lengths < 0).any():
         raise ValueError
     ends = np.cumsum(lengths)
-    return np.arange(lengths.sum()) + np.repeat(starts - ends + lengths, lengths)
+    places: NDArray[np.int64] = np.arange(lengths.sum(), dtype=np.int64)
+    return places + np.repeat(starts - ends + lengths, lengths)
 
 
 # ---- what they mean -------------------------------------------------------------------------

@@ -57,7 +57,8 @@ def _world_from_stage(stage: Any) -> Array:
     """Return the matrix (4, 4) from a stage to Blender's metres with z up."""
     geom = openusd().UsdGeom
     metres = np.diag([*[geom.GetStageMetersPerUnit(stage)] * 3, 1])
-    return (_UPRIGHT if geom.GetStageUpAxis(stage) == "Y" else np.eye(4)) @ metres
+    upright = _UPRIGHT if geom.GetStageUpAxis(stage) == "Y" else np.eye(4)
+    return np.asarray(upright @ metres, np.float64)
 
 
 def _bake_skins(stage: Any, frame: float) -> list[str]:
