@@ -21,7 +21,7 @@ from lightfield.measurement import costs, gpu_check, plan
 from lightfield.measurement.equal_error import EqualError
 from lightfield.measurement.trials import Trial
 from lightfield.planning import cost as planning
-from lightfield.planning.cost import cost, read_probe
+from lightfield.planning.cost import read_probe
 from lightfield.planning.loading import scene_datasets
 from lightfield.stages.measurement import FullSize
 from lightfield.workflow import history
@@ -179,7 +179,7 @@ def test_each_estimate_of_one_dataset_gives_the_same_hours(garden, denoise):
     seconds = dataset.view_count * width * height * (samples + 3 * denoise) * SAMPLE_SECONDS
     hours = {"by hand": seconds / 3600}
     # `snakemake -n`, which adds the start of Blender.
-    hours["forecast"] = (cost("render", dataset).seconds - planning.START_UP_SECONDS) / 3600
+    hours["forecast"] = (planning.rendering(dataset).seconds - planning.START_UP_SECONDS) / 3600
     # `snakemake gpu_check`.
     full = FullSize(views=dataset.view_count, resolution=[width, height])
     renderer = Simulated(lenses.from_camera(CAMERA))
@@ -214,7 +214,7 @@ def test_each_estimate_of_one_dataset_gives_the_same_hours(garden, denoise):
     write_json(path, probe)
     expected = plan.Expected("garden", 1, read_probe(path), EqualError())
     hours["plan"] = expected.cost.seconds / 3600
-    probed = cost("render", dataset).seconds - planning.START_UP_SECONDS
+    probed = planning.rendering(dataset).seconds - planning.START_UP_SECONDS
     hours["forecast with a probe"] = probed / 3600
     assert hours == pytest.approx(dict.fromkeys(hours, hours["by hand"]))
 

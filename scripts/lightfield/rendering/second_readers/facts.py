@@ -4,10 +4,9 @@ Lengths are in metres before `unit: box` scales the model, or as in the file if 
 Points are in the world of Blender: right-handed, z up.
 """
 
-from collections.abc import Mapping
-from contextlib import ContextDecorator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,14 +77,18 @@ class ModelFacts:
     unjudged: list[str] = field(default_factory=list)
 
 
-# Places that are not finite are refused later, by name.
-_QUIETLY: ContextDecorator = np.errstate(invalid="ignore", over="ignore")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _quietly(function: _Function) -> _Function:
+    """Let a function compute with places that are not finite. They are refused later, by name."""
+    return np.errstate(invalid="ignore", over="ignore")(function)
 
 
 class Geometry:
     """The faces of a mesh in its own coordinates, ready to be placed as often as it is shown."""
 
-    @_QUIETLY
+    @_quietly
     def __init__(
         self,
         places: ArrayLike,
@@ -124,7 +127,7 @@ class Geometry:
     def __bool__(self) -> bool:
         return len(self._used) > 0
 
-    @_QUIETLY
+    @_quietly
     def placed(self, name: str, world_from_mesh: NDArray[np.float64] | None = None) -> MeshFacts:
         """Return the mesh at a place: (4, 4), or its own coordinates."""
         matrix = np.eye(4) if world_from_mesh is None else np.asarray(world_from_mesh, np.float64)
