@@ -94,6 +94,18 @@ def test_the_receipt_or_list_that_a_file_disagrees_with_is_named(small):
     assert name == receipt
 
 
+def test_a_users_file_that_has_changed_in_secret_is_named_and_not_moved(small, capsys):
+    Path("texture.png").write_text("old")
+    write_receipt(f"work/receipts/{'/'.join(small.parts[1:])}/user.jsonl", {}, ["texture.png"])
+    assert problems_of(small) == {}
+    spoil(Path("texture.png"))
+    assert problems_of(small).keys() == {"texture.png"}
+    with pytest.raises(UserError, match="1 faults"):
+        parsed(Verify, None, [str(small), "--work", "work", "--mend"]).run()
+    assert "texture.png: has changed since a job read it" in capsys.readouterr().out
+    assert Path("texture.png").exists()
+
+
 def test_a_damaged_receipt_is_named_and_no_file_of_it(small):
     receipt = Path("work/receipts", *small.parts[1:], "exr/view_0000f_exr.jsonl")
     receipt.write_text(receipt.read_text()[:-5])

@@ -29,6 +29,7 @@ from lightfield.formats.layout import IMAGES, PACKAGED, REPORT, SUMS, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify
 
+CHANGED = "has changed since a job read it"
 STRAY = "is not a file of this dataset, or has no checksum"
 
 
@@ -76,6 +77,8 @@ class _Verification:
         self.problems: dict[str, str] = {}
         # The SHA-256 that files may have, each with the receipt that says so.
         self.made: dict[str, dict[str, str]] = {}
+        # The SHA-256 with which users' files were read, each with a receipt that says so.
+        self.read: dict[str, tuple[str, str]] = {}
         # The SHA-256 of published files, and the list that says so.
         self.listed: dict[str, tuple[str, str]] = {}
         # The folders that have a list, or must have one. Outer folders come first.
@@ -90,6 +93,8 @@ class _Verification:
         read_homes = [home for home in self.homes if self._read_list(home)]
         for path in {**self.listed, **self.made}:
             self._check_file(path)
+        for path in self.read if self.made else ():
+            self._check_users_file(path)
         self._check_strays(present, read_homes)
         # A list is older than the receipts if the dataset is not finished.
         for home in read_homes if not self.made else ():
@@ -110,6 +115,10 @@ class _Verification:
                 outputs = {**receipt.outputs, **outputs}
                 pending |= {*_makers(receipt, work)} - read
                 strays += [(path, name) for name in receipt.outputs if not lies_below(name, built)]
+                for name, digest in receipt.inputs.items():
+                    is_made = receipts.is_receipt(name) or receipts.find_output(name, work)
+                    if digest and not is_made:
+                        self.read[name] = digest, str(path)
             elif os.path.lexists(path):
                 self.problems[str(path)] = broken(path) or "is damaged"
             for name, output in outputs.items():
@@ -170,6 +179,14 @@ class _Verification:
         else:
             problem = f"its sha256 is {digest}, but {source} says {expected}"
             self.problems[path] = broken(Path(path)) or problem
+
+    def _check_users_file(self, path: str) -> None:
+        """Compare a user's file with the receipt of a job that read it. It may be gone since."""
+        digest, source = self.read[path]
+        if Path(path).is_file() and sha256(path) != digest:
+            self.problems[path] = (
+                f"{CHANGED} ({source}); the next run makes again what depends on it"
+            )
 
     def _is_missed(self, path: str) -> bool:
         """Return whether a missing file that no list has is a fault.
@@ -279,12 +296,12 @@ def _makers(receipt: receipts.Receipt, work: Path) -> Iterator[Path]:
 
 
 def _mend(path: str, problem: str, folder: Path, work: Path) -> None:
-    """Move a faulty file away, so that the next run makes it again.
+    """Move a faulty file away, so that the next run makes it again. A user's file stays.
 
     The next run goes on with a family if it lacks a list of checksums.
     """
     inside = os.path.relpath(path, folder)
-    if problem.startswith(STRAY) and link_above(folder, inside):
+    if problem.startswith(CHANGED) or (problem.startswith(STRAY) and link_above(folder, inside)):
         return
     places = [Path(path)]
     if leads_inside(inside) and any(folder.glob(f"*/{RECORD}")):
