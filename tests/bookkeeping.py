@@ -63,6 +63,11 @@ def named_in_plan(stderr):
     return set(re.findall(r"^([^:\n]+): .*; it is made anew$", stderr, re.M))
 
 
+def outdated_in_plan(stderr):
+    """Return what a plan names as changed, by the jobs that are outdated."""
+    return dict(re.findall(r"^outdated: ([^:\n]+): (.*)$", stderr, re.M))
+
+
 def problems(folders, work="work"):
     """Return what `snakemake verify` finds in datasets, by path.
 
