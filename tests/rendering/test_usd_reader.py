@@ -110,7 +110,7 @@ def test_points_of_another_type_are_refused(tmp_path):
     path = written(
         tmp_path, prim("Mesh", "a", MESH.replace("point3f[] points", "int points = 3\n#"))
     )
-    assert "the mesh a has faces with corners that do not exist" in refusal(path)
+    assert "the mesh a has points of another type than point3f[]" in refusal(path)
 
 
 def test_holes_of_a_mesh_are_refused(tmp_path):

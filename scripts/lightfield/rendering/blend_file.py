@@ -76,7 +76,7 @@ def open_scene(
     check_readable(path)
     if inventory:
         # A texture that changes during a run must not end up in some views only.
-        files = inventory["external_files"]
+        files = inventory.get("external_files", ())
         receipts.note_inputs(path.parent / file["path"] for file in files)
     this_version = bpy.app.version_string
     try:

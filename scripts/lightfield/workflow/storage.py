@@ -51,7 +51,7 @@ class Storage:
                     with temporary.open("wb") as file:
                         shutil.copyfileobj(content, file)
                     os.utime(temporary, (status.st_mtime, status.st_mtime))
-            except FileNotFoundError:
+            except (FileNotFoundError, NotADirectoryError):
                 return False
         return True
 
