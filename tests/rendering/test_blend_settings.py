@@ -259,6 +259,8 @@ def test_each_property_that_blender_has_is_tried_or_accounted_for():
         for name in OWNERS
         for setting in owners[name].bl_rna.properties
         if not setting.is_readonly and setting.type != "COLLECTION"
+        # The import of a glTF in an earlier test adds this one.
+        if setting.identifier != "gltf2_active_variant"
         if (path := f"{name}.{setting.identifier}") not in tried
         if not any(fnmatch(path, pattern) for pattern in patterns)
     ]

@@ -67,7 +67,7 @@ FILES = {
     "mdd": ("mdd.mdd", "modifier's file", "is cut short"),
     "pc2": ("pc2.pc2", "modifier's file", "is cut short"),
     "stl": ("stl.stl", "geometry", "is cut short"),
-    "ply": ("ply.ply", "geometry", "is cut short"),
+    "ply": ("ply.ply", "geometry", "may be cut short"),
     "obj": ("obj.obj", "geometry", "is cut short"),
     "csv": ("csv.csv", "geometry", "row 52 has 1 values of 2"),
     "import_vdb": ("import_vdb.vdb", "geometry", "may be cut short"),

@@ -342,8 +342,8 @@ def test_the_picture_of_a_light_may_be_missing_unless_a_texture_names_it_too(tmp
     """Lights of a model are not imported."""
     model = written(tmp_path / "a.usda", usd(DOME))
     assert [entry["path"] for entry in imported(model)["external_files"]] == ["a.usda"]
-    written(model, usd(DOME + TEXTURED.replace("NAME", "./place.png")))
-    assert "place.png" in refusal(model)
+    textured = written(tmp_path / "b.usda", usd(DOME + TEXTURED.replace("NAME", "./place.png")))
+    assert "place.png" in refusal(textured)
 
 
 @pytest.mark.parametrize("suffix", ["usdc", "usdz"])

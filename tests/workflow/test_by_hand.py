@@ -131,7 +131,7 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
         ("report_html.py", PAGE, {"rig": RIG, "yaml": ""}, "is missing the key command"),
         ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
         ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
-        ("publish.py", PUBLISH, {"scene": {"publish": {}}}, "scene.publish: is missing creators"),
+        ("publish.py", PUBLISH, {"scene": {"publish": {}}}, "scene.publish.licence: is missing"),
         ("validate.py", ["."], {"inputs": {}}, "inputs: is {}; must be a list"),
         (
             "validate_sequence.py",

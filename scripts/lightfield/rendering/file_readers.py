@@ -18,6 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.imaging.images import is_readable
 from lightfield.rendering import model_files, ogawa, usd_files
 from lightfield.rendering.quiet import quiet
+from lightfield.rendering.second_readers import ply, stl
 
 
 class DamagedError(UserError):
@@ -272,12 +273,21 @@ def _read_json(path: Path) -> None:
         raise DamagedError(path, "is cut short, or not JSON") from None
 
 
+# Blender reads garbage from a PLY that is cut short, and nothing from such an STL.
+_CONTENT_READERS: dict[str, Callable[[Path], Any]] = {
+    "STL": stl.read_facets,
+    "PLY": ply.read_content,
+}
+
+
 def _geometry_reader(node: str) -> Callable[[Path], None]:
     """Return a reader of models that geometry nodes import, by the name of their node."""
 
     def read(path: Path) -> None:
         try:
             model_files.check(path)
+            if node in _CONTENT_READERS:
+                _CONTENT_READERS[node](path)
         except UserError as error:
             raise DamagedError(path, str(error).removeprefix(f"{path}: ")) from None
         if node == "OBJ" and _ends_before_faces(path):
