@@ -89,11 +89,15 @@ def replace_folder(
     folder = folder.resolve()
     if not is_own:
         _check_replaceable(folder)
+    is_there = folder.is_dir()
     shutil.rmtree(folder, ignore_errors=True)
     try:
         write(folder)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
+        if is_there:
+            # Snakemake puts the earlier export.json back. Without a folder, it would end.
+            folder.mkdir(parents=True, exist_ok=True)
         raise
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
