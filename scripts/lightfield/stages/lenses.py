@@ -47,7 +47,10 @@ class Reproject(Source, Stage[Reprojection]):
     output_dir: Path = writes("folder to write to", short=["-o"], group=_FILES)
     output_cfg: Path | None = writes("lightfield.json to write", None, metavar="JSON", group=_FILES)
     source_receipt: Path | None = reads(
-        "receipt whose checksums the images must match", None, metavar="JSONL", group=_FILES
+        "with --receipt: receipt of the images, whose checksums they must match",
+        None,
+        metavar="JSONL",
+        group=_FILES,
     )
     lens_map: Path | None = reads(
         "lens map that lens_map.py computed", None, metavar="FILE", group=_FILES
