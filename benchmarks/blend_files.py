@@ -156,7 +156,8 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
     from lightfield.configuration.scene_yaml import Scene
     from lightfield.core.files import sha256
     from lightfield.imaging import images
-    from lightfield.rendering import inventory_file, lightfield_file
+    from lightfield.rendering.inspection import inventory_file
+    from lightfield.rendering.views import lightfield_file
     from lightfield.stages import job_settings
     from lightfield.stages.views import RenderShard
 
@@ -206,7 +207,7 @@ def of_blender(path: Path, folder: Path, seed: int, note: list[str]) -> Array:
     import bpy
 
     from lightfield.imaging import images
-    from lightfield.rendering.quiet import quiet
+    from lightfield.rendering.scenes.quiet import quiet
 
     with quiet():
         bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)

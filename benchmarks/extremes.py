@@ -29,10 +29,13 @@ from lightfield.core.progress import Progress
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.rendering import blend_file, cycles, limits, shard
-from lightfield.rendering.clearance import TOUCHING, surroundings
-from lightfield.rendering.colour_pass import render_colour
-from lightfield.rendering.geometry_pass import render_geometry
+from lightfield.rendering.inspection import limits
+from lightfield.rendering.inspection.clearance import TOUCHING, surroundings
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.setup import cycles
+from lightfield.rendering.views import shard
+from lightfield.rendering.views.colour_pass import render_colour
+from lightfield.rendering.views.geometry_pass import render_geometry
 
 Array = np.ndarray[Any, Any]
 Vector = tuple[float, float, float]

@@ -45,9 +45,10 @@ class Outcome(NamedTuple):
 
 def outcome(path: Path, root: Path) -> Outcome:
     """Import a model file, and compare the saved scene with the file."""
-    from lightfield.rendering import blend_file, model
-    from lightfield.rendering.render_graph import in_render
-    from lightfield.rendering.second_readers import compare, reading
+    from lightfield.rendering.imports import model
+    from lightfield.rendering.models.second_readers import compare, reading
+    from lightfield.rendering.scenes import blend_file
+    from lightfield.rendering.scenes.render_graph import in_render
     from lightfield.stages.scene import ImportSettings
 
     settings = ImportSettings(model=str(path), unit="metres", shared_folder=str(root))

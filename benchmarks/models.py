@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core.cli import run
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.rendering import blend_file
-from lightfield.rendering.quiet import quiet
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.scenes.quiet import quiet
 from scenes.library.architecture import arch_stones, frame, ring_of_stones
 from scenes.library.materials import plain
 from scenes.library.plants import Growth, blade, branches, leaf_cloud, leaves_on, oval_leaf, tuft

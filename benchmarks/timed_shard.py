@@ -30,7 +30,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.imaging import images
-from lightfield.rendering import shard
+from lightfield.rendering.views import shard
 from lightfield.stages.views import RenderShard
 from lightfield.workflow import shard_log
 
@@ -120,7 +120,8 @@ def render(job: TimedShard) -> None:
     """Render the views, and write the seconds of their steps."""
     # Blender's libraries start their threads when they are imported.
     with processors.only(job.threads or processors.available()):
-        from lightfield.rendering import colour_pass, cycles, geometry_pass
+        from lightfield.rendering.setup import cycles
+        from lightfield.rendering.views import colour_pass, geometry_pass
 
     clock = Clock()
     for step, (owner, name) in STEPS.items():

@@ -19,7 +19,14 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 LIBRARY = ROOT / "scripts" / "lightfield"
 # The parts of the library that the extension uses, and all that they import.
-PARTS = ("core", "geometry", "imaging", "formats", "configuration", "rendering/clearance.py")
+PARTS = (
+    "core",
+    "geometry",
+    "imaging",
+    "formats",
+    "configuration",
+    "rendering/inspection/clearance.py",
+)
 # Wheels for the systems that the manifest names, and for the Pythons of Blender 5.0 and later.
 # Linux distributions build Blender with a later Python.
 PACKAGES = "pydantic pydantic-core pyyaml annotated-types typing-extensions typing-inspection"
@@ -64,7 +71,8 @@ def library() -> Iterator[tuple[str, str]]:
     """Yield the library's files, with relative imports: no other add-on can have their names."""
     names = [path for part in PARTS for path in sorted((LIBRARY / part).rglob("*.py"))]
     names += [LIBRARY / part for part in PARTS if part.endswith(".py")]
-    packages = [LIBRARY / "__init__.py", LIBRARY / "rendering" / "__init__.py"]
+    rooms = ("", "rendering", "rendering/inspection")
+    packages = [LIBRARY / room / "__init__.py" for room in rooms]
     for path in (*packages, *names):
         dots = "." * len(path.relative_to(LIBRARY).parts)
         text = path.read_text(encoding="utf-8")

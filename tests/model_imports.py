@@ -10,7 +10,7 @@ from lightfield.stages.scene import ImportSettings
 def imported(path, **settings):
     """Import a model into the open scene, and return its record."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
+    from lightfield.rendering.imports import model
 
     return model.make_scene(ImportSettings(model=str(path), **settings), path.parent)
 
@@ -33,7 +33,7 @@ def seen(folder):
     import bpy
 
     from lightfield.imaging.images import read_image
-    from lightfield.rendering.quiet import quiet
+    from lightfield.rendering.scenes.quiet import quiet
 
     scene = bpy.context.scene
     for material in bpy.data.materials:

@@ -13,7 +13,9 @@ import bpy
 import numpy as np
 from pruned_renders import add, rendered, shader
 
-from lightfield.rendering import blend_file, inventory, pruning
+from lightfield.rendering.inspection import inventory
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.setup import pruning
 from scenes import room
 
 FOLDER = Path(sys.argv[1])

@@ -16,7 +16,7 @@ def studio():
     import bpy
 
     from lightfield.configuration.keys import view_seed
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     scene = bpy.context.scene
@@ -313,7 +313,7 @@ def _world(scene):
 
 
 def _make_linear(block):
-    from lightfield.rendering import animation
+    from lightfield.rendering.scenes import animation
 
     for curve in animation.curves(block):
         for key in curve.keyframe_points:

@@ -13,8 +13,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from lightfield.rendering import blend_file, cycles, model
-from lightfield.rendering.quiet import quiet
+from lightfield.rendering.imports import model
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.scenes.quiet import quiet
+from lightfield.rendering.setup import cycles
 from lightfield.stages.scene import ImportSettings
 from scenes.library.scene import Scene
 from scenes.library.shapes import box, transform

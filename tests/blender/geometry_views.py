@@ -19,9 +19,11 @@ import bpy
 import numpy as np
 
 from lightfield.formats.lightfield import LightField
-from lightfield.rendering import blend_file, cycles, ids, shard
-from lightfield.rendering.colour_pass import render_colour
-from lightfield.rendering.geometry_pass import render_geometry
+from lightfield.rendering.scenes import blend_file, ids
+from lightfield.rendering.setup import cycles
+from lightfield.rendering.views import shard
+from lightfield.rendering.views.colour_pass import render_colour
+from lightfield.rendering.views.geometry_pass import render_geometry
 
 
 def material(name, alpha=1.0):

@@ -12,7 +12,7 @@ from threading import Event
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 
 from lightfield.imaging import images
-from lightfield.rendering import colour_pass
+from lightfield.rendering.views import colour_pass
 
 KIND = sys.argv.pop(1)
 render_colour = colour_pass.render_colour

@@ -16,7 +16,8 @@ from lightfield.core.errors import UserError
 from lightfield.formats.light_groups import resolved
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, inventory, light
+from lightfield.rendering.inspection import inventory, light
+from lightfield.rendering.scenes import blend_file
 
 SIZE = 24
 LENSES = {

@@ -13,8 +13,10 @@ import numpy as np
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, cycles, inventory, light
-from lightfield.rendering.colour_pass import render_colour
+from lightfield.rendering.inspection import inventory, light
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.setup import cycles
+from lightfield.rendering.views.colour_pass import render_colour
 
 FOLDER = Path(sys.argv[1])
 FRAME = 5

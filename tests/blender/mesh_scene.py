@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 
 BEHIND = (0, -5, 0)
 

@@ -15,9 +15,10 @@ from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.geometry.exposure import pose_at, row_times
 from lightfield.measurement.trials import Trials, ViewWindow
-from lightfield.rendering import blend_file, cycles
-from lightfield.rendering.colour_pass import render_colour
-from lightfield.rendering.geometry_pass import render_geometry
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.setup import cycles
+from lightfield.rendering.views.colour_pass import render_colour
+from lightfield.rendering.views.geometry_pass import render_geometry
 
 FOLDER = Path(sys.argv[1])
 SIZE = 64

@@ -20,7 +20,7 @@ from mathutils import Vector
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 
 # The wall's places at the frames 1, 2 and 3. Frame 2 is rendered.
 WALL = [(-0.1, 2.8, 0), (0, 3, 0), (0.25, 3.1, 0.05)]

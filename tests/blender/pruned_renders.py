@@ -13,9 +13,11 @@ import numpy as np
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import animation, blend_file, cycles, inventory, pruning
-from lightfield.rendering.colour_pass import render_colour
-from lightfield.rendering.geometry_pass import render_geometry
+from lightfield.rendering.inspection import inventory
+from lightfield.rendering.scenes import animation, blend_file
+from lightfield.rendering.setup import cycles, pruning
+from lightfield.rendering.views.colour_pass import render_colour
+from lightfield.rendering.views.geometry_pass import render_geometry
 from scenes import room
 
 RENDER = {"adaptive_threshold": 0, "denoise": False, "seed": 0}

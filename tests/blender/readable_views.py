@@ -19,7 +19,7 @@ from lightfield.configuration import keys
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PASSES
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 
 # The view shows rows of square tiles.
 ROW = 12

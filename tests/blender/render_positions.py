@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 
 from lightfield.formats.lightfield import LightField
-from lightfield.rendering import cycles, geometry_pass, shard
-from lightfield.rendering.view import render_view
+from lightfield.rendering.setup import cycles
+from lightfield.rendering.views import geometry_pass, shard
+from lightfield.rendering.views.view import render_view
 
 
 def main(blend: Path, output: Path, cases: Path) -> None:

@@ -14,7 +14,7 @@ import one_shard
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 
 SIZE = 48
 LENSES = {

@@ -25,7 +25,7 @@ import bpy
 # isort: split
 import bmesh
 
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 
 FOLDER = Path(sys.argv[1])
 

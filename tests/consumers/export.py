@@ -21,7 +21,7 @@ from lightfield.core.files import sha256  # noqa: E402
 from lightfield.export.sequence import SourceSequence  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
 from lightfield.formats.lightfield import LightField  # noqa: E402
-from lightfield.report.publish import publish  # noqa: E402
+from lightfield.publishing.publish import publish  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 # Enough views for a radiance field to learn from.

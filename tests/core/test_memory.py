@@ -10,7 +10,7 @@ from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.planning.cost import DENOISED_PIXEL_MEMORY
-from lightfield.rendering import scene_memory
+from lightfield.rendering.inspection import scene_memory
 from lightfield.stages.views import RenderShard
 
 

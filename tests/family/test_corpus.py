@@ -19,9 +19,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
-from lightfield.report import status
 from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.validation.verification import faults
+from lightfield.workflow import status
 
 CAUSE = "models/broken.glb: is empty; must be a model"
 

@@ -26,7 +26,7 @@ from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.rendering import shard
+from lightfield.rendering.views import shard
 from lightfield.validation.validate import validate
 
 

@@ -20,7 +20,7 @@ from lightfield.measurement.equal_error import of_measurement
 from lightfield.planning.cost import ProbedViews, read_probe, rendering
 from lightfield.planning.forecast import Request, requests_table
 from lightfield.planning.loading import scene_datasets
-from lightfield.rendering import shard
+from lightfield.rendering.views import shard
 from lightfield.stages.measurement import Plan, Probe, ProbeSettings
 from lightfield.workflow import shard_log
 from lightfield.workflow.history import History

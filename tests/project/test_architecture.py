@@ -52,6 +52,21 @@ def test_a_package_imports_only_those_above_it(package):
         assert not blenders or package == "rendering", file
 
 
+# The rooms of rendering, in the order in which they may import each other.
+ROOMS = ["models", "scenes", "setup", "inspection", "imports", "views"]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_of_rendering_imports_only_those_before_it(room):
+    rendering = LIBRARY / "rendering"
+    assert {path.parent.name for path in rendering.glob("*/__init__.py")} == set(ROOMS)
+    allowed = {"__init__", *ROOMS[: ROOMS.index(room) + 1]}
+    for file in (rendering / room).rglob("*.py"):
+        prefix = "lightfield.rendering."
+        rooms = {name.split(".")[2] for name in imported(file) if name.startswith(prefix)}
+        assert rooms <= allowed, file
+
+
 def test_no_files_import_each_other_in_a_circle():
     arrows = {}
     for path in LIBRARY.rglob("*.py"):
@@ -147,7 +162,7 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
 OPENS = re.compile(r"\.(?:read_bytes|read_text)\(|(?<!tarfile)\.open\((?!\"[wax])|\bnp\.load\(")
 READERS = (
     *("reading", "reprojection", "validation", "export", "synthesis"),
-    *("measurement", "report"),
+    *("measurement", "report", "publishing"),
 )
 # Templates of the package, and a file whose bytes are compared right before.
 MAY_OPEN = {LIBRARY / "report/page.py", LIBRARY / "reprojection/lens_map.py"}

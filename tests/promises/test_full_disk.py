@@ -13,7 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images, plots
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 from lightfield.report import page
 from lightfield.reprojection import lens_map
 

@@ -54,7 +54,7 @@ def building(request, tmp_path, real_jobs, in_forks):
     The process stands for the run, which is a fork. The function runs Snakemake there.
     """
     folder, arguments = checkout(tmp_path / "checkout", one=SCENE, two=SCENE), BUILD
-    (folder / "scripts/lightfield/rendering/built_scene.py").write_text(WAITING)
+    (folder / "scripts/lightfield/rendering/scenes/built_scene.py").write_text(WAITING)
     if request.param == "own folder":
         own_folder = tmp_path / "own"
         (own_folder / "configs").mkdir(parents=True)

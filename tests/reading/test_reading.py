@@ -26,8 +26,8 @@ from lightfield.formats.passes import FLOW
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
-from lightfield.report import package
-from lightfield.report.publish import publish
+from lightfield.publishing import package
+from lightfield.publishing.publish import publish
 from lightfield.stages.family import Corpus, CorpusSettings
 
 # Off the sphere's centre, and turned about every axis.

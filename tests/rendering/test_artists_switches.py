@@ -19,8 +19,10 @@ def render(tmp_path):
     """Return a function that renders a cube which moves along x, in a scene with some change."""
     import bpy
 
-    from lightfield.rendering import blend_file, cycles, inventory, pruning
-    from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.inspection import inventory
+    from lightfield.rendering.scenes import blend_file
+    from lightfield.rendering.setup import cycles, pruning
+    from lightfield.rendering.views.colour_pass import render_colour
 
     def render(change=None, prunes=False, **settings):
         blend_file.new_scene()
@@ -70,7 +72,7 @@ def test_a_moving_camera_is_blurred_although_the_layer_is_not(render):
 def test_an_empty_in_place_of_a_camera_is_none(render):
     import bpy
 
-    from lightfield.rendering import blend_facts
+    from lightfield.rendering.inspection import blend_facts
 
     render()
     scene = bpy.context.scene
@@ -83,8 +85,8 @@ def test_an_empty_in_place_of_a_camera_is_none(render):
 def test_a_window_of_a_view_of_any_size_has_the_pixels_of_the_whole(render, size):
     import bpy
 
-    from lightfield.rendering import cycles
-    from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.setup import cycles
+    from lightfield.rendering.views.colour_pass import render_colour
 
     render()
     width, height = size
@@ -120,8 +122,8 @@ def cover_with_muted_fog(scene, layer):
 
 
 def test_a_muted_volume_stays_muted_in_all_views(render):
-    from lightfield.rendering.colour_pass import render_colour
-    from lightfield.rendering.geometry_pass import render_geometry
+    from lightfield.rendering.views.colour_pass import render_colour
+    from lightfield.rendering.views.geometry_pass import render_geometry
 
     first = render(cover_with_muted_fog)
     render_geometry(POSE)
@@ -129,7 +131,7 @@ def test_a_muted_volume_stays_muted_in_all_views(render):
 
 
 def test_depth_sees_through_fog_with_a_muted_surface(render):
-    from lightfield.rendering.geometry_pass import render_geometry
+    from lightfield.rendering.views.geometry_pass import render_geometry
 
     def mute_the_surface(scene, layer):
         import bpy
@@ -148,7 +150,7 @@ def test_depth_sees_through_fog_with_a_muted_surface(render):
 def test_depth_sees_through_the_fog_of_a_layers_world(render):
     import bpy
 
-    from lightfield.rendering.geometry_pass import render_geometry
+    from lightfield.rendering.views.geometry_pass import render_geometry
 
     def override(scene, layer):
         layer.world_override = bpy.data.worlds.new("fog")
@@ -164,7 +166,8 @@ def test_depth_sees_through_the_fog_of_a_layers_world(render):
 def test_a_missing_texture_of_a_layers_override_is_found(render, tmp_path, kind):
     import bpy
 
-    from lightfield.rendering import blend_file, inventory
+    from lightfield.rendering.inspection import inventory
+    from lightfield.rendering.scenes import blend_file
 
     def override(scene, layer):
         image = bpy.data.images.new("sky", 4, 4)

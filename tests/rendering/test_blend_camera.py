@@ -21,7 +21,7 @@ def inventory_of_path(path, frames, depth_of_field=False):
 
     Without frames, list it for a rig that only takes its depth of field.
     """
-    from lightfield.rendering import inventory_file
+    from lightfield.rendering.inspection import inventory_file
 
     camera = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
     rig = {"type": "plane", "cameras": [1, 1], "camera": camera}

@@ -18,7 +18,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.planning.loading import datasets_of
-from lightfield.rendering import lightfield_file
+from lightfield.rendering.views import lightfield_file
 from lightfield.stages.lenses import Reproject
 from lightfield.workflow import job_settings
 
@@ -113,7 +113,7 @@ def open_file(path):
 def render_quietly():
     import bpy
 
-    from lightfield.rendering.quiet import quiet
+    from lightfield.rendering.scenes.quiet import quiet
 
     with quiet():
         bpy.ops.render.render(write_still=True)
@@ -135,7 +135,7 @@ def without_change(tmp_path_factory):
 
 def of_plenoforge(path, yaml):
     """Return the picture (height, width, 4), depth, and the note that Plenoforge makes."""
-    from lightfield.rendering import inventory_file
+    from lightfield.rendering.inspection import inventory_file
 
     content = {
         "scene": {

@@ -29,7 +29,7 @@ def folder(made, tmp_path):
 @pytest.fixture
 def listed(folder, tmp_path):
     """Return a function that makes the inventory of a .blend. It returns it, or the error."""
-    from lightfield.rendering import inventory_file
+    from lightfield.rendering.inspection import inventory_file
 
     def listed(name):
         output = tmp_path / "inventory.json"

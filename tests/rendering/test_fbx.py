@@ -51,7 +51,7 @@ def original(folder):
     """Fill the open scene with a textured slab, a turned metal cone on it, and a mirrored arrow."""
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     checks = np.indices((8, 8)).sum(0) % 2
@@ -85,7 +85,7 @@ def original(folder):
 def test_an_fbx_has_the_pixels_of_the_scene_from_which_blender_exported_it(tmp_path, axes):
     import bpy
 
-    from lightfield.rendering import model_light
+    from lightfield.rendering.imports import model_light
 
     original(tmp_path)
     path = tmp_path / "model.fbx"

@@ -19,7 +19,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 from lightfield.planning.loading import datasets_of
-from lightfield.rendering import lightfield_file
+from lightfield.rendering.views import lightfield_file
 from lightfield.validation.validate import validate
 
 # What follows, and what the note names.
@@ -63,7 +63,7 @@ DIFFERENT = 0.01
 
 def dataset(path, folder, change=None, **scene):
     """Render the views of a .blend with a change into ``folder``. Return them and the notes."""
-    from lightfield.rendering import inventory_file
+    from lightfield.rendering.inspection import inventory_file
 
     save(path, blend_scenes.studio, change)
     content = {
@@ -271,7 +271,7 @@ def test_a_file_without_a_camera_is_refused_if_something_would_follow_it(tmp_pat
 
 @pytest.mark.slow
 def test_what_cannot_be_kept_at_the_files_camera_is_refused(tmp_path, monkeypatch):
-    from lightfield.rendering import followed_camera
+    from lightfield.rendering.setup import followed_camera
 
     monkeypatch.setattr(followed_camera, "freeze", lambda camera: None)
     with pytest.raises(UserError, match="Turned: would follow each view's camera"):

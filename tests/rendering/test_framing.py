@@ -102,7 +102,8 @@ def test_a_camera_is_as_clear_as_its_nearest_surface_is_far():
     """A hollow ball around all has a box that holds the cameras, too."""
     import bpy
 
-    from lightfield.rendering import blend_file, clearance
+    from lightfield.rendering.inspection import clearance
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     for name, radius in (("a", 3), ("b", 0.5), ("c", 4)):

@@ -212,8 +212,8 @@ def seen_through():
 
 
 def box():
-    from lightfield.rendering.render_graph import in_render
-    from lightfield.rendering.second_readers import compare
+    from lightfield.rendering.models.second_readers import compare
+    from lightfield.rendering.scenes.render_graph import in_render
 
     (mesh,) = in_render(compare.shown_meshes)
     return mesh.box

@@ -12,7 +12,7 @@ from conftest import BLENDER
 
 from lightfield.core.bundles import VARIABLE
 from lightfield.core.files import sha256
-from lightfield.rendering import pruning
+from lightfield.rendering.setup import pruning
 
 NOTHING = {
     "hidden": [],

@@ -362,7 +362,7 @@ def test_binary_usd_and_archives_obey_the_same_rule(tmp_path, monkeypatch, case,
 
 def converted(path, suffix):
     """Return a USD text as a binary USD, or as an archive of that."""
-    from lightfield.rendering.usd_files import openusd
+    from lightfield.rendering.models.usd_files import openusd
 
     layer = openusd().Sdf.Layer.FindOrOpen(str(path))
     binary = path.with_suffix(".usdc")

@@ -18,7 +18,7 @@ from model_imports import imported
 
 from lightfield.configuration import keys
 from lightfield.core.errors import UserError
-from lightfield.rendering import model_files
+from lightfield.rendering.models import model_files
 
 # The files of `exported_models`.
 FORMATS = ("fbx", "glb", "gltf", "obj", "ply", "stl", "usda", "usdc", "usdz")
@@ -408,7 +408,7 @@ BROKEN = [
 def refusal(path, folder, **settings):
     """Return the message with which the import of a model is refused."""
     # Blender has one global state, so it is not imported with the module.
-    from lightfield.rendering import model
+    from lightfield.rendering.imports import model
     from lightfield.stages.scene import ImportSettings
 
     with pytest.raises(UserError) as caught:
@@ -465,7 +465,7 @@ def test_a_missing_texture_is_named(renders, tmp_path, name):
 
 
 def test_a_missing_texture_may_be_allowed(renders, tmp_path):
-    from lightfield.rendering import model
+    from lightfield.rendering.imports import model
     from lightfield.stages.scene import ImportSettings
 
     shutil.copy(renders.folder / "shape.obj", tmp_path)
@@ -488,7 +488,7 @@ def test_metres_beyond_blenders_precision_are_refused(tmp_path):
     "name", ["a b'c.obj", "stühle—椅.obj", "$(id).OBJ", "-rf.obj", "a" * 200 + ".obj"]
 )
 def test_odd_names_of_files_are_imported(tmp_path, name):
-    from lightfield.rendering import model
+    from lightfield.rendering.imports import model
     from lightfield.stages.scene import ImportSettings
 
     settings = ImportSettings(model=str(written(tmp_path / name, TRIANGLE)))

@@ -5,7 +5,7 @@ import pytest
 
 from lightfield.core import memory
 from lightfield.core.errors import UserError
-from lightfield.rendering.modifiers import faces_of, refuse_too_many_faces
+from lightfield.rendering.scenes.modifiers import faces_of, refuse_too_many_faces
 
 
 @pytest.fixture(params=["cube", "uv_sphere"])

@@ -67,7 +67,7 @@ def write_scene(folder, libraries):
     """Save main.blend: three cubes of one name, two of them linked, whose colours are random."""
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     def add_cube(x):
         bpy.ops.mesh.primitive_cube_add(size=1, location=(x, 0, 0))

@@ -17,7 +17,7 @@ from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.rendering import shard as shards
+from lightfield.rendering.views import shard as shards
 from lightfield.workflow import history
 
 RENDER = {

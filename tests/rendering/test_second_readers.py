@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from lightfield.core.errors import UserError
-from lightfield.rendering.second_readers import reading
-from lightfield.rendering.second_readers.facts import Geometry
+from lightfield.rendering.models.second_readers import reading
+from lightfield.rendering.models.second_readers.facts import Geometry
 
 # A stretched sphere away from the origin, as files in text give it.
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=0.7)
@@ -99,7 +99,7 @@ def test_lists_of_different_lengths_are_read(tmp_path):
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])
 def test_long_files_are_read_in_parts(tmp_path, monkeypatch, suffix):
     """A part of a text ends anywhere, also within a continued line."""
-    from lightfield.rendering.second_readers import text_lines
+    from lightfield.rendering.models.second_readers import text_lines
 
     path = tmp_path / f"a.{suffix}"
     options = {"obj": {}, "ply": {"encoding": "ascii"}, "stl": {"file_type": "stl_ascii"}}

@@ -39,7 +39,7 @@ def write_scene(path):
     import bpy
     from mathutils import Vector
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     bpy.ops.mesh.primitive_plane_add(size=12)
@@ -170,7 +170,7 @@ def test_views_around_it_agree(rendered, reproject_dataset, tmp_path):
 
 
 def test_passes_that_a_shadow_catcher_spoils_are_refused(tmp_path):
-    from lightfield.rendering import cycles
+    from lightfield.rendering.setup import cycles
 
     write_scene(tmp_path / "catcher.blend")
     content = {**lenses.from_camera(CAMERA).to_lightfield(), "frame": 1}
@@ -184,7 +184,7 @@ def test_passes_that_a_shadow_catcher_spoils_are_refused(tmp_path):
 def test_a_holdout_is_no_surface(transparent, tmp_path):
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     path = tmp_path / "holdout.blend"
     write_scene(path)
@@ -233,7 +233,7 @@ def test_views_around_a_holdout_agree(transparent, make, reproject_dataset, tmp_
     """A view shows nothing of the ground that the holdout hides, and other views show it."""
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     path = tmp_path / "holdout.blend"
     write_scene(path)

@@ -55,7 +55,7 @@ def rendered(model, folder, size, count):
     """Render views of a model, without its colours. Return the size of a pixel at the origin."""
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     model()

@@ -25,7 +25,7 @@ TILE = 32
 @pytest.fixture
 def set_up(room):
     """Return a function that opens the room for a view of a camera, and returns the view."""
-    from lightfield.rendering import cycles
+    from lightfield.rendering.setup import cycles
 
     def open_room(camera, path=room, device="cpu", **settings):
         lens = lenses.from_camera(CAMERAS[camera])
@@ -40,8 +40,8 @@ def set_up(room):
 
 def images(lightfield):
     """Return all images of the open scene's first view by name."""
-    from lightfield.rendering.colour_pass import render_colour
-    from lightfield.rendering.geometry_pass import render_geometry
+    from lightfield.rendering.views.colour_pass import render_colour
+    from lightfield.rendering.views.geometry_pass import render_geometry
 
     pose = lightfield.views[0].world_from_camera
     names = [each.name for each in lightfield.passes if not each.of_colour]
@@ -64,7 +64,7 @@ def images(lightfield):
 def test_tiles_change_no_pixel(set_up, camera, window, settings):
     import bpy
 
-    from lightfield.rendering import cycles
+    from lightfield.rendering.setup import cycles
 
     rendered = []
     for tile in (2048, TILE):
@@ -79,7 +79,7 @@ def test_tiles_change_no_pixel(set_up, camera, window, settings):
 def test_a_blends_own_tiles_do_not_change_a_denoised_view(set_up, room, tmp_path):
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     # Tiles of 32² change the last digits of this view after denoising.
     expected = images(set_up("small fisheye", denoise=True))
@@ -93,7 +93,7 @@ def test_a_blends_own_tiles_do_not_change_a_denoised_view(set_up, room, tmp_path
 def test_the_device_that_renders_also_denoises(set_up, tmp_path, monkeypatch, device, is_on_gpu):
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     monkeypatch.setenv("PATH", str(tmp_path))
     devices = importlib.import_module("_cycles")

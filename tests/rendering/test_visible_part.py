@@ -97,7 +97,7 @@ def scene():
     """An empty scene with a camera and a triangle from (−1, 0, −5) to (1, 1, −5)."""
     import bpy
 
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 
     blend_file.new_scene()
     scene = bpy.context.scene
@@ -115,7 +115,7 @@ LENS = from_camera({"lens": "rectilinear", "fov": 90, "resolution": [100, 100]})
 
 @pytest.mark.slow
 def test_a_part_has_the_model_and_a_margin(scene):
-    from lightfield.rendering import visible_part
+    from lightfield.rendering.views import visible_part
 
     part = visible_part.choose(visible_part.places(), np.eye(4), LENS)
     # One fifth to the right of the middle is 10 of the 50 pixels up to the border.
@@ -129,7 +129,7 @@ def test_a_part_has_the_model_and_a_margin(scene):
 
 @pytest.mark.slow
 def test_the_box_of_a_large_mesh_stands_for_its_vertices(scene, monkeypatch):
-    from lightfield.rendering import visible_part
+    from lightfield.rendering.views import visible_part
 
     scene.collection.objects["triangle"].rotation_euler = (0, 0, 0.5)
     exact = visible_part.choose(visible_part.places(), np.eye(4), LENS)
@@ -143,7 +143,7 @@ def test_the_box_of_a_large_mesh_stands_for_its_vertices(scene, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", ["behind", "beside"])
 def test_a_camera_that_does_not_see_all_in_front_renders_the_whole(scene, turn):
-    from lightfield.rendering import visible_part
+    from lightfield.rendering.views import visible_part
 
     matrix = np.eye(4)
     if turn == "behind":
@@ -186,7 +186,7 @@ def focus(scene):
 @pytest.mark.slow
 @pytest.mark.parametrize("change", [see_lamp, see_curve, displace, blur, focus])
 def test_where_something_else_may_be_seen_the_whole_is_rendered(scene, change):
-    from lightfield.rendering import visible_part
+    from lightfield.rendering.views import visible_part
 
     assert visible_part.places() is not None
     change(scene)

@@ -21,8 +21,8 @@ from lightfield.configuration.scene_yaml import Credits
 from lightfield.core.files import sha256, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
-from lightfield.report import package
-from lightfield.report.publish import publish
+from lightfield.publishing import package
+from lightfield.publishing.publish import publish
 
 FRAMES = ("f00001", "f00002", "f00003")
 TUTORIAL = ROOT / "docs/tutorials/first-dataset.md"

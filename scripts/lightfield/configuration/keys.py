@@ -3,9 +3,9 @@
 Two views with equal keys have equal pixels. So a finished view is recognised by its key, and never
 rendered twice. A view of other settings has another key.
 
-Two things are not in the key. Pruning changes no byte (see `lightfield.rendering.pruning`). The
-machine changes last digits (see `lightfield.core.machine`), but a build may be resumed on another.
-So each view names the machine that rendered it, and validation reports differences.
+Two things are not in the key. Pruning changes no byte (see `lightfield.rendering.setup.pruning`).
+The machine changes last digits (see `lightfield.core.machine`), but a build may be resumed on
+another. So each view names the machine that rendered it, and validation reports differences.
 """
 
 import hashlib

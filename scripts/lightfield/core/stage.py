@@ -5,7 +5,7 @@ of a run, such as the number of threads. Its settings decide what it writes, and
 
     class BuildScene(Stage[BuildSettings]):
         name = "build_scene"
-        function = "lightfield.rendering.built_scene:build"
+        function = "lightfield.rendering.scenes.built_scene:build"
         by_hand = BuildSettings
 
         output: Path = writes(".blend to write")

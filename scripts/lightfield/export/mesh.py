@@ -33,7 +33,7 @@ from lightfield.geometry.mesh import (
     box_around,
     to_world,
 )
-from lightfield.rendering.visible_meshes import surface_of
+from lightfield.rendering.inspection.visible_meshes import surface_of
 from lightfield.stages.exports import WriteSurface
 
 GLB = "scene.glb"

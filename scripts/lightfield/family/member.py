@@ -24,7 +24,7 @@ from lightfield.family.stages import StageRun, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.geometry.rigs import Poses
 from lightfield.planning.loading import datasets_of
-from lightfield.rendering import model_files
+from lightfield.rendering.models import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device
 from lightfield.workflow.member_record import read_member

@@ -48,7 +48,7 @@ class MemberInventory(Inventory):
     def run(self) -> None:
         """Write the inventory. Raises `UserError` for a scene that cannot be rendered."""
         # Only now, because the process that starts workers needs no Blender.
-        from lightfield.rendering.inventory_file import write_of_datasets
+        from lightfield.rendering.inspection.inventory_file import write_of_datasets
 
         write_of_datasets(
             self.blend, self.written, self.datasets, self.output, measures_memory=False

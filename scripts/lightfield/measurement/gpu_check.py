@@ -143,7 +143,7 @@ def _gpu_of(job: GpuCheck) -> str:
     """Return the device to check. Raises `UserError` if this machine does not have it."""
     # Without a GPU, nothing is rendered.
     with processors.only(job.threads):
-        from lightfield.rendering import cycles
+        from lightfield.rendering.setup import cycles
 
     device = "gpu" if job.device == "auto" else job.device
     if cycles.device_name(device) == "cpu":

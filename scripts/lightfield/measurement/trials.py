@@ -236,14 +236,14 @@ class Trials:
         if self._device == "cpu":
             return "cpu"
         with processors.only(self._threads):
-            from lightfield.rendering import cycles
+            from lightfield.rendering.setup import cycles
         return cycles.device_name(self._device)
 
     def _render(self, window: ViewWindow, settings: RenderBlock, path: Path, key: str) -> None:
         with processors.only(self._threads):
-            from lightfield.rendering import cycles
-            from lightfield.rendering.colour_pass import render_colour
-            from lightfield.rendering.geometry_pass import render_geometry
+            from lightfield.rendering.setup import cycles
+            from lightfield.rendering.views.colour_pass import render_colour
+            from lightfield.rendering.views.geometry_pass import render_geometry
 
         if not self._started:
             self._start(settings)
@@ -274,7 +274,7 @@ class Trials:
 
     def _surfaces(self, materials: NDArray[np.uint16]) -> dict[str, NDArray[np.float32]]:
         """Return a channel for each of `SURFACES`, 1 or 0, from the numbers of materials (h, w)."""
-        from lightfield.rendering import ids
+        from lightfield.rendering.scenes import ids
 
         numbers = ids.names("material")
         channels = {}
@@ -285,7 +285,8 @@ class Trials:
         return channels
 
     def _start(self, settings: RenderBlock) -> None:
-        from lightfield.rendering import colour_pass, cycles, gpu_kernels
+        from lightfield.rendering.setup import cycles
+        from lightfield.rendering.views import colour_pass, gpu_kernels
 
         self._on = cycles.set_up(
             self._blend,

@@ -135,7 +135,7 @@ class Status(PlainStage):
     """Prints the progress of the chosen datasets."""
 
     name = "status"
-    function = "lightfield.report.status:show"
+    function = "lightfield.workflow.status:show"
 
     results: Path = option("folder of the datasets")
     work: Path = option("folder of intermediate files, with the receipts of the shards")

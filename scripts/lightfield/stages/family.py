@@ -81,7 +81,7 @@ class Corpus(Stage[CorpusSettings]):
     """Writes a family's members as one corpus."""
 
     name = "corpus"
-    function = "lightfield.report.corpus:write"
+    function = "lightfield.family.corpus:write"
 
     folder: Path = writes(
         "folder of the family, which holds a folder for each member", positional=True

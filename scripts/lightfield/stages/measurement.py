@@ -79,7 +79,7 @@ class Probe(Stage[ProbeSettings]):
     """Estimates the time and size of a dataset's views from a few small views."""
 
     name = "probe"
-    function = "lightfield.rendering.probe:write"
+    function = "lightfield.rendering.views.probe:write"
     by_hand = ProbeSettings
 
     blend: Path = reads("the scene's .blend")
@@ -126,7 +126,7 @@ class CheckDevice(PlainStage):
     """Checks that Cycles can render on a device of this machine."""
 
     name = "check_device"
-    function = "lightfield.rendering.cycles:check_device"
+    function = "lightfield.rendering.setup.cycles:check_device"
 
     device: Literal["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"] = option(
         "device to look for", positional=True

@@ -80,7 +80,7 @@ class Package(Stage[PackSettings]):
     """Packs a finished dataset as tar archives with a card."""
 
     name = "package"
-    function = "lightfield.report.package:write"
+    function = "lightfield.publishing.package:write"
     by_hand = PackageByHand
 
     folder: Path = reads(FOLDER)
@@ -91,7 +91,7 @@ class Publish(Stage[PackSettings]):
     """Writes a finished dataset as WebDataset shards, with descriptions of them."""
 
     name = "publish"
-    function = "lightfield.report.publish:write"
+    function = "lightfield.publishing.publish:write"
     by_hand = PublishByHand
 
     folder: Path = reads(FOLDER)
@@ -102,7 +102,7 @@ class TakeDataset(PlainStage):
     """Copies finished datasets from a storage."""
 
     name = "take_dataset"
-    function = "lightfield.report.taking:take_datasets"
+    function = "lightfield.workflow.taking:take_datasets"
 
     datasets: list[Path] = writes("folders to copy, such as results/scene/rig", positional=True)
     store: str = option("URL or folder of the storage")

@@ -91,6 +91,6 @@ class WriteSchemas(PlainStage):
     """Writes the JSON schemas, with which editors complete and check YAML files."""
 
     name = "schema"
-    function = "lightfield.report.schemas:write"
+    function = "lightfield.workflow.schemas:write"
 
     folder: Path = writes("folder to write (default: configs/schema)", ROOT / "configs" / "schema")

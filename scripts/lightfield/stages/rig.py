@@ -41,7 +41,7 @@ class FreePlaces(Stage[FreePlacesSettings]):
     """Finds places for the cameras of a random rig that have free space around them."""
 
     name = "free_places"
-    function = "lightfield.rendering.camera_files:write_places"
+    function = "lightfield.rendering.inspection.camera_files:write_places"
 
     blend: Path = reads("the scene's .blend")
     inventory: Path | None = reads(INVENTORY, None)
@@ -69,7 +69,7 @@ class MakeLightfield(Stage[LightfieldSettings]):
     """Writes a dataset's lightfield.json: its lens, the poses of its views, and its rendering."""
 
     name = "make_lightfield"
-    function = "lightfield.rendering.lightfield_file:write"
+    function = "lightfield.rendering.views.lightfield_file:write"
     by_hand = SceneAndRig
 
     calibration: Path | None = reads(
@@ -85,7 +85,7 @@ class CheckCameras(PlainStage):
     """Finds cameras that are inside geometry, or that would show it wrongly."""
 
     name = "check_cameras"
-    function = "lightfield.rendering.camera_files:write_clearance"
+    function = "lightfield.rendering.inspection.camera_files:write_clearance"
     version = 2
 
     blend: Path = reads("the scene's .blend")

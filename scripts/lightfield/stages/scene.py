@@ -40,7 +40,7 @@ class BuildScene(Stage[BuildSettings]):
     """Builds a scene with one of the builders in scripts/scenes/, or with a user's own."""
 
     name = "build_scene"
-    function = "lightfield.rendering.built_scene:build"
+    function = "lightfield.rendering.scenes.built_scene:build"
     by_hand = BuildSettings
 
     output: Path = writes(".blend to write")
@@ -84,7 +84,7 @@ class ImportModel(Stage[ImportSettings]):
     """Makes a scene from a model file in glTF, USD, FBX, OBJ, PLY or STL."""
 
     name = "import_model"
-    function = "lightfield.rendering.model:import_model"
+    function = "lightfield.rendering.imports.model:import_model"
     by_hand = ImportSettings
 
     output: Path = writes(".blend to write")
@@ -95,7 +95,7 @@ class FetchBlend(PlainStage):
     """Downloads the .blend of a scene YAML."""
 
     name = "fetch_blend"
-    function = "lightfield.rendering.blend_source:fetch"
+    function = "lightfield.rendering.scenes.blend_source:fetch"
 
     scene: str = option("name of a file in configs/scenes/")
     output: Path = writes(".blend to write")
@@ -112,7 +112,7 @@ class CheckBlend(Stage[CheckBlendSettings]):
     """Checks that a .blend has the SHA-256 that is recorded for its scene."""
 
     name = "check_blend"
-    function = "lightfield.rendering.blend_source:check"
+    function = "lightfield.rendering.scenes.blend_source:check"
 
     settings: CheckBlendSettings = CheckBlendSettings()
     scene: str = option("name of a file in configs/scenes/")
@@ -139,7 +139,7 @@ class Inventory(Stage[InventorySettings]):
     """Lists what a scene contains, and what its rendering can leave out."""
 
     name = "inventory"
-    function = "lightfield.rendering.inventory_file:make"
+    function = "lightfield.rendering.inspection.inventory_file:make"
     version = 7
 
     settings: InventorySettings = InventorySettings()

@@ -19,7 +19,7 @@ class RenderShard(PlainStage):
     """Renders some views of a dataset in one process."""
 
     name = "render_shard"
-    function = "lightfield.rendering.shard:render"
+    function = "lightfield.rendering.views.shard:render"
 
     blend: Path = reads("the scene's .blend")
     lightfield: Path = reads(LIGHTFIELD)
@@ -47,7 +47,7 @@ class ImportViews(PlainStage):
     """Imports views that somebody else has rendered: links or copies them, and records them."""
 
     name = "import_views"
-    function = "lightfield.rendering.imported_views:import_views"
+    function = "lightfield.rendering.views.imported_views:import_views"
 
     dataset: Path = reads("folder of the existing dataset, with views in exr/")
     lightfield: Path = reads("lightfield.json of the dataset to write")

@@ -20,7 +20,7 @@ _SIGNALS = {
     "SIGTERM": "it was cancelled, or exceeded its time limit",
 }
 
-# The same while Blender reads a file, by what `lightfield.rendering.quiet` prints to the log.
+# The same while Blender reads a file, as `lightfield.rendering.scenes.quiet` prints it.
 READS = "Blender reads "
 HAS_READ = "Blender has read "
 MOST_MINUTES = 30

@@ -1,0 +1,244 @@
+"""Packs a dataset into reproducible archives, with a card that explains it.
+
+Each part is a tar by itself. All parts unpack into one folder, <scene>_<rig> as in SILVR. Names,
+order, times, owners and modes depend on the files alone.
+"""
+
+import json
+import tarfile
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from lightfield.configuration.exports import SEQUENCE_EXPORTS
+from lightfield.configuration.scene_yaml import Credits
+from lightfield.core import units
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, open_file, read_keys, sha256, write_json
+from lightfield.core.names import READER
+from lightfield.core.paths import files_below, place_in
+from lightfield.core.progress import Progress
+from lightfield.export import transforms
+from lightfield.formats.export_lists import MANIFEST
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_parts
+from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.passes import PASSES, group_pass
+from lightfield.imaging import images
+from lightfield.publishing import reader
+from lightfield.publishing.markdown import markdown
+from lightfield.report import snippet
+from lightfield.stages.publishing import Package
+
+SILVR = (
+    "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "
+    "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
+)
+
+# How to load each export. {} stands for the folder that holds it.
+LOADERS = {
+    "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
+    "nerfstudio": "ns-train nerfacto --data {} nerfstudio-data --orientation-method none "
+    "--center-method none --auto-scale-poses False",
+    "nerf_synthetic": "ns-train nerfacto --data {} blender-data",
+    "instant_ngp": "./instant-ngp {}/transforms.json",
+    "opendibr": "./RealtimeDIBR -i {} -j {}/cameras.json",
+    "miv": "Encoder -c {}/sequence.json  # TMIV, with a configuration of its own",
+    "hci": "import configparser\nparameters = configparser.ConfigParser()\n"
+    "parameters.read('{}/parameters.cfg')",
+    "scannetpp": "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT",
+    "ncore": "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
+    " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat",
+    "lichtfeld": "LichtFeld-Studio --data-path {} --output-path output",
+    "dnerf": "python train.py -s {} --configs arguments/dnerf/lego.py  # 4DGaussians",
+    "neural_3d_video": "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians",
+    "colmap_frames": "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians",
+    "multipleview": "python train.py -s {} --configs arguments/multipleview/default.py"
+    "  # 4DGaussians",
+    "scene_flow": "import OpenEXR\nflow = OpenEXR.File('{}/{frame}/{view}.exr').channels()",
+    "coco": "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')",
+    "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
+    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')",
+    "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
+}
+
+
+def write(job: Package) -> None:
+    """Pack the folder of a rig, and write a JSON with its card and its parts beside the archive."""
+    if job.output.suffix != ".tar":
+        raise UserError(f"--output {job.output}: must end in .tar; .json lies beside it")
+    if place_in(job.folder, job.output):
+        raise UserError(f"--output {job.output}: must not be in the folder that it packs")
+    content = card(job.folder, job.output.stem, job.settings.scene, job.settings.rig)
+    written = pack(job.folder, content, job.output, job.settings.most_bytes)
+    parts = listed(written)
+    card_path = job.output.with_suffix(".json")
+    write_json(card_path, {**content, "parts": parts})
+    size = sum(part["bytes"] for part in parts)
+    print(f"{job.output}: {units.count(len(parts), 'part')}, {units.size(size)}")
+
+
+def card(folder: Path, name: str, scene: Credits, rig: str | None = None) -> dict[str, Any]:
+    """Return the content of card.json for a rig's folder.
+
+    The folder of a sequence has a folder for each frame. The first one counts. Without the type of
+    the ``rig``, the card has the type in lightfield.json, which knows fewer.
+    """
+    frames = _frames(folder)
+    first = frames[0] if frames else folder
+    lightfield = LightField.read(first / NAME)
+    view = lightfield.views[0].name
+    bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
+    return {
+        "name": name,
+        "scene": {
+            "name": lightfield.scene["name"],
+            "description": scene.description,
+            "licence": scene.licence,
+            "credit": scene.credit,
+        },
+        "rig": rig or lightfield.content["lf_type"],
+        **({"frames": [frame.name for frame in frames]} if frames else {}),
+        "views": len(lightfield.views),
+        "lens": lightfield.lens.description,
+        "resolution": [lightfield.lens.width, lightfield.lens.height],
+        "transparent": lightfield.transparent,
+        "depth": lightfield.depth,
+        "passes": [
+            name
+            for name in (*PASSES, *map(group_pass, lightfield.light_groups))
+            if (first / name).is_dir()
+        ],
+        "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
+        "software": f"Cycles in bpy {bpy}" if bpy else None,
+        "cite": [SILVR, *([scene.credit] if scene.credit else [])],
+        "python": snippet.reading(name, lightfield),
+        "loaders": dict(_loaders(folder, first, view)),
+    }
+
+
+def _frames(folder: Path) -> list[Path]:
+    """Return the folders of a sequence's frames. Empty for one dataset.
+
+    Raises `UserError` if there is no dataset.
+    """
+    if (folder / NAME).is_file():
+        return []
+    frames = sorted(path.parent for path in folder.glob(f"*/{NAME}"))
+    if not frames:
+        raise UserError(f"{folder}: has no {NAME}")
+    return frames
+
+
+def _loaders(folder: Path, first: Path, view: str) -> Iterator[tuple[str, str]]:
+    """Yield the places in ``folder`` of each export, and how to load it.
+
+    ``first`` is the folder of a sequence's first frame. Without a sequence, it is ``folder``.
+    """
+
+    def loader(name: str, place: Path) -> str:
+        text = LOADERS[name].replace("{view}", view).replace("{frame}", first.name)
+        return text.replace("{}", place.relative_to(folder).as_posix())
+
+    for path in transforms(first):
+        yield path.relative_to(folder).as_posix(), loader("instant_ngp", path.parent)
+    lists = [path for path in files_below(first) if path.name == MANIFEST]
+    for path in [*lists, *(_lists_of_sequence(folder) if first != folder else ())]:
+        yield path.parent.relative_to(folder).as_posix(), loader(_format(path), path.parent)
+
+
+def _lists_of_sequence(folder: Path) -> Iterator[Path]:
+    """Yield the list of each export of a whole sequence."""
+    lists = [*folder.glob(f"exports/*/{MANIFEST}"), *folder.glob(f"*/exports/*/{MANIFEST}")]
+    yield from (path for path in sorted(lists) if _format(path) in SEQUENCE_EXPORTS)
+
+
+def _format(path: Path) -> str:
+    """Return the format of an export from its list. Raises `UserError` if nothing loads it."""
+    name = read_keys(path, "export.py", "format")["format"]
+    if name not in LOADERS:
+        raise UserError(f"{path}: format: is {name!r}; must be one of {', '.join(LOADERS)}")
+    return str(name)
+
+
+def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
+    """Write a folder as ``target``, and as further parts if that would exceed ``most`` bytes.
+
+    Further parts are named <target's stem>.2.tar and so on. Removes the parts of an earlier
+    package.
+    """
+    readme = markdown("card.md.j2", **{"frames": None, **content})
+    texts = {
+        CARD: json.dumps(content, indent=1) + "\n",
+        README: readme,
+        READER: source_of_reader(folder),
+    }
+    paths = [
+        path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
+    ]
+    for old in further_parts(target):
+        old.unlink()
+    written = []
+    card_size = sum(tar_size(len(text.encode())) for text in texts.values())
+    for number, part in enumerate(_parts(paths, most, card_size), 1):
+        name = target if number == 1 else target.with_name(f"{target.stem}.{number}.tar")
+        progress = Progress(len(part), name.name, "files")
+        with atomic_path(name) as temporary, tarfile.open(temporary, "w") as archive:
+            for file, text in texts.items() if number == 1 else ():
+                add_entry(archive, f"{content['name']}/{file}", text.encode())
+            for path in part:
+                inside = f"{content['name']}/{path.relative_to(folder).as_posix()}"
+                add_entry(archive, inside, path)
+                progress.done()
+        written.append(name)
+    return written
+
+
+def source_of_reader(folder: Path, shards: bool = False) -> str:
+    """Return the content of read.py for a rig's folder, or for shards of it."""
+    frames = _frames(folder)
+    first = frames[0] if frames else folder
+    lightfields = {"": LightField.read(first / NAME)}
+    for path in sorted(first.glob(f"*/{NAME}")):
+        lightfields[path.parent.name] = LightField.read(path)
+    return reader.source(lightfields, is_sequence=bool(frames), shards=shards)
+
+
+def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:
+    """Return name, size and SHA-256 of each part."""
+    return [{"file": p.name, "bytes": p.stat().st_size, "sha256": sha256(p)} for p in paths]
+
+
+def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[list[Path]]:
+    """Yield runs of files whose tar has at most ``most`` bytes. A larger file gets its own tar.
+
+    The first tar holds ``first`` bytes beside its files.
+    """
+    part: list[Path] = []
+    size = tarfile.RECORDSIZE + first
+    for path in paths:
+        needed = tar_size(path.stat().st_size)
+        if part and most is not None and size + needed > most:
+            yield part
+            part = []
+            size = tarfile.RECORDSIZE
+        part.append(path)
+        size += needed
+    yield part
+
+
+def tar_size(content: int) -> int:
+    """Return the most bytes that a file takes in a tar: its header, and its content in blocks."""
+    return content + 2 * tarfile.BLOCKSIZE
+
+
+def add_entry(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
+    """Add a file without any trace of this machine, user or time."""
+    entry = tarfile.TarInfo(name)
+    if isinstance(content, bytes):
+        entry.size = len(content)
+        archive.addfile(entry, BytesIO(content))
+        return
+    entry.size = content.stat().st_size
+    with open_file(content) as file:
+        archive.addfile(entry, file)

@@ -1,0 +1,1 @@
+"""Opens scenes, and walks through what they hold at a frame."""

@@ -1,0 +1,1 @@
+"""Sets Cycles up for the views of a scene: cameras, passes, and what is left out."""

@@ -1,0 +1,1 @@
+"""Renders views, a shard in one process."""
