@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.core.names import ROOT
+from lightfield.engine import receipts
 
 
 class FamilyBuild:

@@ -16,7 +16,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
-from lightfield.core import receipts
+from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 

@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core import files, processors
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.core.flags import program
-from lightfield.core.stage import option, writes
+from lightfield.engine.flags import program
+from lightfield.engine.stage import option, writes
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant

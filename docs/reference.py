@@ -34,13 +34,13 @@ from lightfield.configuration.json_schema import Generator
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.core.names import ROOT
-from lightfield.core.settings import MEANINGS
 from lightfield.core.units import limit
 from lightfield.formats import render_block, sensors
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import path, rig, split_setting
+from lightfield.settings.base import MEANINGS
 
 PROGRAMS = ROOT / "scripts"
 LIBRARY = PROGRAMS / "lightfield"

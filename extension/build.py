@@ -21,6 +21,8 @@ LIBRARY = ROOT / "scripts" / "lightfield"
 # The parts of the library that the extension uses, and all that they import.
 PARTS = (
     "core",
+    "settings",
+    "engine",
     "geometry",
     "imaging",
     "formats",

@@ -22,7 +22,7 @@ from .scripts.lightfield.geometry.lenses import Lens
 from .scripts.lightfield.geometry.lenses.rectilinear import Rectilinear
 from .scripts.lightfield.geometry.rigs import Rig, as_written, from_settings
 from .scripts.lightfield.geometry.rotations import euler_to_matrix
-from .scripts.lightfield.rendering import clearance
+from .scripts.lightfield.rendering.inspection import clearance
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -12,8 +12,8 @@ from .scripts.lightfield.configuration.blend_lock import record_blend
 from .scripts.lightfield.configuration.scene_yaml import check_scene
 from .scripts.lightfield.core.errors import UserError
 from .scripts.lightfield.core.files import atomic_path, sha256
-from .scripts.lightfield.core.yaml_files import parse_yaml, read_settings_text
 from .scripts.lightfield.geometry.rigs import as_written
+from .scripts.lightfield.settings.yaml_files import parse_yaml, read_settings_text
 
 Rigs = Mapping[str, Mapping[str, Any]]
 Edit = tuple[int, int, str]

@@ -7,7 +7,7 @@ A settings file is JSON: {"family": "chairs", "scene": {…}, "members": [{"name
 7}]}. `scene` and `values` come from the family's scene YAML.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.family import BuildMembers
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 A settings file is JSON: {"builder": "garden", "parameters": {"seed": 0, "detail": 0.5}}.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.scene import BuildScene
 
 if __name__ == "__main__":

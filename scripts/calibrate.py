@@ -5,7 +5,7 @@ until it reaches the target. Its effort is then interpolated to meet the target 
 cheapest method is chosen. Held-out views, the nearest others with another seed, confirm it.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import Calibrate
 
 if __name__ == "__main__":

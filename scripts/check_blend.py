@@ -5,7 +5,7 @@ it beside the YAML in a lock file, configs/scenes/<scene>.lock.json. Later files
 SHA-256. To take another file, delete the lock file.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.scene import CheckBlend
 
 if __name__ == "__main__":

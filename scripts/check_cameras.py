@@ -3,7 +3,7 @@
 The workflow runs this before it renders.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.rig import CheckCameras
 
 if __name__ == "__main__":

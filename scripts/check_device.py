@@ -1,6 +1,6 @@
 """Check that Cycles can render on a device of this machine."""
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import CheckDevice
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ members give equal bytes.
 A settings file is JSON: {"family": "chairs", "splits": {"test": 0.2}, "shards": true}.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.family import Corpus
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ their pixels. They are an upper estimate, because larger views compress better. 
 deleted and the views were kept.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import Costs
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 The settings file is JSON: {"family": "chairs"}.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.family import CountMembers
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ add are not compared. The exit status is 0 for equal datasets, 1 for different o
 trouble.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.checks import Diff
 
 if __name__ == "__main__":

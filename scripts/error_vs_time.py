@@ -4,7 +4,7 @@ Also try changes of the scene's settings, such as fewer bounces. The .md and the
 them reach the same error in less time.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import ErrorVsTime
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ eighth of the views tests. RENDERS may also have normal/<view>.exr. The rig's na
 view's, as in exports: <rig>_<view>.png. See docs/how-to/evaluate-renders.md.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import Evaluate
 
 if __name__ == "__main__":

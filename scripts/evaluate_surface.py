@@ -5,7 +5,7 @@ dataset's coordinates, Z up. glTF is turned, because it has Y up. See
 docs/how-to/evaluate-surfaces.md.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import EvaluateSurface
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ whose views test what is trained on these. An export of a sequence reads the fol
 `frames` lists the folders of the frames in it. An earlier export in the same folder is replaced.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.exports import ExportViews
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ Give instant-ngp the transforms.json itself. If it gets a folder, it opens every
 cannot read lightfield.json.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.exports import ExportInstantNgp
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The file has the suffix .part until it is complete and has the SHA-256 that the 
 lock file gives.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.scene import FetchBlend
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ where the other view sees the same point. All three are 0 where the other view h
 point.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.views import ComputeFlow
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ has the keys of the scene YAML. `frame`, `scene_name` and `view_layers` are as i
 `scene`.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.rig import FreePlaces
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ A settings file is JSON: {"full": {"LFSphere": {"views": 642, "resolution": [204
 has the size of each dataset whose hours are estimated. Without this file, no hours are estimated.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import GpuCheck
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 A settings file is JSON: {"model": "chair.glb", "unit": "box", "light": "softboxes"}.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.scene import ImportModel
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Import views that somebody else has rendered: link or copy them, and record them."""
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.views import ImportViews
 
 if __name__ == "__main__":

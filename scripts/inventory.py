@@ -4,7 +4,7 @@ Missing or unreadable files are reported as an error, before they turn views pin
 .blend, it prints which settings the dataset uses and which it ignores.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.scene import Inventory
 
 if __name__ == "__main__":

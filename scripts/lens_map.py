@@ -5,7 +5,7 @@ writes a map for each face, with _f, _b, _l, _r, _u or _d before FILE's suffix. 
 source does not see has a line of text instead of a map.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.lenses import ComputeLensMap
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The workflow gives a settings file, in which the limits of the preset are alread
 give --scene and --rig instead, for a dataset at full size.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.rig import MakeLightfield
 
 if __name__ == "__main__":

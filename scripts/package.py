@@ -4,7 +4,7 @@ A settings file is JSON: {"gigabytes": 4, "scene": {"licence": "CC0-1.0"}}. `gig
 largest size of a part. `scene` has the keys description, licence and credit of the scene YAML.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.publishing import Package
 
 if __name__ == "__main__":

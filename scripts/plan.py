@@ -4,7 +4,7 @@ Reads what scripts/probe.py measured. Hours count for one processor core, or for
 renders. Gigabytes are the size of the rendered views.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import Plan
 
 if __name__ == "__main__":

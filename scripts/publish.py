@@ -6,7 +6,7 @@ The descriptions are a card for Hugging Face, and Croissant. The scene YAML's ke
 A settings file is JSON with the same keys as package.py's settings file.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.publishing import Publish
 
 if __name__ == "__main__":

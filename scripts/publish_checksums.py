@@ -3,7 +3,7 @@
 The checksums are those in the receipts of the jobs that made the files.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.publishing import PublishChecksums
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Render some views of a dataset in one process. Keep every view that is finished."""
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.views import RenderShard
 
 if __name__ == "__main__":

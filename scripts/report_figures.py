@@ -4,7 +4,7 @@ Writes overview.png, contact_sheet.png, and rig, depth and noise as .svg and .pn
 A settings file is JSON: {"rig": {"type": "plane", "cameras": [2, 2], …}}, as in the scene YAML.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.report import ReportFigures
 
 if __name__ == "__main__":

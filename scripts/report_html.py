@@ -7,7 +7,7 @@ dataset again; `panorama`, whether the overview is a panorama; `measurements`, a
 …}, the .csv, .json, .svg and .png that measurements wrote.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.report import ReportHtml
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The page is one file with thumbnails. It lists every dataset that has a page. Th
 about datasets whose files cannot be read.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.report import ReportIndex
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ Examples, with views in garden/exr and garden/lightfield.json:
     --cubemap 512 --png
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.lenses import Reproject
 
 if __name__ == "__main__":

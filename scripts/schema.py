@@ -3,7 +3,7 @@
 They are generated from the models in lightfield/configuration/. Run this after a change there.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.report import WriteSchemas
 
 if __name__ == "__main__":

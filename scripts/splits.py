@@ -1,6 +1,6 @@
 """List which views of a scene's rigs are for training, validation and testing."""
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.views import ListSplits
 
 if __name__ == "__main__":

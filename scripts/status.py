@@ -5,7 +5,7 @@ assumes that rendering continues as in the last ten minutes: with as many proces
 seconds for each view.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.checks import Status
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ A settings file is JSON: {"formats": ["glb", "ply"], "frame": 1}. `frame`, `scen
 objects.json, and export.json, which lists them. Earlier meshes in the folder are replaced.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.exports import WriteSurface
 
 if __name__ == "__main__":

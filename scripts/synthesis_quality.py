@@ -6,7 +6,7 @@ view and region. If the truth has all parts of its light as passes, each kind of
 OUTPUT.svg and OUTPUT.png show the quality over the number and the bytes of the views used.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.measurement import SynthesisQuality
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ Examples:
   synthesize.py results/garden/LFSphere_e100cm_d170cm --poses rig.yaml --video --output work/walk
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.synthesis import Synthesize
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ A dataset is the folder of a rig, or of a frame. It may also be a folder of publ
 Files that exist already with the same bytes stay. The dataset's page is copied, too.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.publishing import TakeDataset
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "inpu
 flags --reprojection, --exports and --receipts.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.checks import Validate
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ A settings file is JSON: {"frames": ["f00001", "f00002"], "exports": []}. Its pa
 the working folder.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.checks import ValidateSequence
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from. The folder of a sequence stands for all its frames and their exports. The 
 stands for its corpus: its page, its shards, and all datasets of its members.
 """
 
-from lightfield.core.flags import program
+from lightfield.engine.flags import program
 from lightfield.stages.checks import Verify
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from lightfield.core import bundles, receipts
 from lightfield.core.files import Stamp, read_json
-from lightfield.core.receipts import Output, Receipt
+from lightfield.engine import bundles, receipts
+from lightfield.engine.receipts import Output, Receipt
 from lightfield.stages.registry import BY_NAME, VERSIONS
 from lightfield.validation.verification import faults
 from lightfield.workflow import run_lock

@@ -12,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 
 import lightfield  # noqa: F401
-from lightfield.core.stage import Stage
+from lightfield.engine.stage import Stage
 
 FILE, UNDONE, PROGRAM = sys.argv[1:4]
 sys.argv = sys.argv[3:]

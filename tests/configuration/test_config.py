@@ -15,11 +15,11 @@ from pydantic import ValidationError
 
 from lightfield.configuration import config_file, json_schema, scene_yaml
 from lightfield.configuration.config_file import Preset
-from lightfield.core import yaml_files
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
 from lightfield.geometry.rigs import as_written
 from lightfield.planning.loading import datasets_of, load_datasets, scene_datasets
+from lightfield.settings import yaml_files
 from lightfield.workflow import job_settings
 
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")

@@ -28,8 +28,8 @@ from lightfield import export
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Energy, load_config
 from lightfield.configuration.exports import settings_of
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
+from lightfield.engine import receipts
 from lightfield.export.source import SourceDataset
 from lightfield.formats import published
 from lightfield.formats.export_lists import MANIFESTS

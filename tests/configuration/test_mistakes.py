@@ -16,9 +16,9 @@ from lightfield.configuration.exports import ExportSettings, settings_of
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
-from lightfield.core.settings import read_settings
 from lightfield.geometry.rigs import from_settings
 from lightfield.planning.loading import load_datasets
+from lightfield.settings.base import read_settings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.measurement import CostSettings
 from lightfield.stages.scene import ImportSettings

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.core import bundles, leftovers, receipts
+from lightfield.core import leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.paths import files_below, inside, lies_below, place_in
+from lightfield.engine import bundles, receipts
 from lightfield.formats.layout import read_sums
 from lightfield.formats.lightfield import LightField
 from lightfield.workflow.member_record import read_member

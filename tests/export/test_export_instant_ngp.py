@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from lightfield.configuration.exports import ExportSettings, InstantNgp
 from lightfield.core.errors import UserError
-from lightfield.core.flags import parsed
+from lightfield.engine.flags import parsed
 from lightfield.export import instant_ngp
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses

@@ -17,14 +17,14 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
-from lightfield.core.settings import checked
+from lightfield.engine import receipts
 from lightfield.formats.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.planning.loading import scene_datasets
+from lightfield.settings.base import checked
 from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import ImportViews
 from lightfield.workflow.check import JobCheck

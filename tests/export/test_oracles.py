@@ -18,7 +18,7 @@ from sphere import LENSES, look_at_ball, write_views
 from lightfield import export
 from lightfield.configuration.exports import settings_of
 from lightfield.core.files import read_json, write_json
-from lightfield.core.flags import parsed
+from lightfield.engine.flags import parsed
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content

@@ -16,13 +16,13 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.core.settings import checked
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import rigs
 from lightfield.planning.loading import scene_datasets
+from lightfield.settings.base import checked
 from lightfield.validation import splits_check
 from lightfield.validation.files import read_sets
 

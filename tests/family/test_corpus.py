@@ -14,9 +14,9 @@ from faults import CORPUS_KINDS, FAULTS, spoil
 
 from lightfield import open_corpus, open_dataset
 from lightfield.configuration.corpus import Shares
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.stages.family import Corpus, CorpusSettings

@@ -19,9 +19,9 @@ from conftest import largest_file
 
 from lightfield.configuration.family import Family, Member, drawn, member_content, stand_in
 from lightfield.configuration.scene_yaml import check_member
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
+from lightfield.engine import receipts
 from lightfield.family import batch as family_batch
 from lightfield.family.batch import deadly_members, member_at_hand
 from lightfield.family.member import MemberBuild

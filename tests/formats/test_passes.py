@@ -16,10 +16,10 @@ from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
-from lightfield.core.receipts import made_in
+from lightfield.engine import receipts
+from lightfield.engine.receipts import made_in
 from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES

@@ -983,7 +983,7 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
 
 USE_IT = """
 import math
-from lightfield.core.flags import parsed
+from lightfield.engine.flags import parsed
 from lightfield.geometry import lenses
 from lightfield.reprojection.geometry import ReprojectionGeometry
 from lightfield.stages.lenses import ComputeLensMap

@@ -10,7 +10,7 @@ import numpy as np
 import psutil
 import pytest
 
-from lightfield.core import receipts
+from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.measurement import costs

@@ -11,8 +11,8 @@ from checkouts import checkout, planned, snakemake
 
 from lightfield.configuration.config_file import Energy
 from lightfield.configuration.dataset import Cluster, shard_bounds
-from lightfield.core import receipts
 from lightfield.core.files import write_json
+from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan

@@ -126,7 +126,7 @@ def test_reading_the_rules_imports_nothing_heavy():
 
 # The modules by which the workflow knows what is finished, outdated or damaged.
 MECHANISMS = [
-    "lightfield.core.receipts",
+    "lightfield.engine.receipts",
     "lightfield.workflow.check",
     "lightfield.workflow.history",
     "lightfield.workflow.member_record",

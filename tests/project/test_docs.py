@@ -15,11 +15,11 @@ import lightfield
 from lightfield.configuration import reprojections, scene_yaml
 from lightfield.configuration.keys import VERSIONS as VIEW_VERSIONS
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core.settings import checked
 from lightfield.geometry import frames
 from lightfield.geometry.rigs.poses import LARGEST_FILE
 from lightfield.imaging.images import HALF_MAX
 from lightfield.reading.dataset import Dataset, View
+from lightfield.settings.base import checked
 from lightfield.stages.registry import VERSIONS as STAGE_VERSIONS
 
 # isort: split

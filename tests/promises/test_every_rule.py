@@ -132,9 +132,9 @@ import json, os, sys
 from pathlib import Path
 sys.path.insert(0, "scripts")
 from lightfield.core.files import write_json
-from lightfield.core.flags import parsed
-from lightfield.core.receipts import input_sum, is_receipt, note_inputs, note_shared_inputs
-from lightfield.core.stage import Stage
+from lightfield.engine.flags import parsed
+from lightfield.engine.receipts import input_sum, is_receipt, note_inputs, note_shared_inputs
+from lightfield.engine.stage import Stage
 from lightfield.stages.registry import BY_NAME
 
 # Only the log of a job tells which job this is. A job fails if Snakemake removes its log meanwhile.

@@ -20,9 +20,9 @@ from sphere import LENSES, write_views
 
 from lightfield.configuration.publication import DOCUMENTS
 from lightfield.configuration.scene_yaml import Credits
-from lightfield.core.bundles import VARIABLE
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
+from lightfield.engine.bundles import VARIABLE
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.publishing import package

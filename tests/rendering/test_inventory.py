@@ -10,8 +10,8 @@ import pytest
 from checkouts import checkout, planned
 from conftest import BLENDER
 
-from lightfield.core.bundles import VARIABLE
 from lightfield.core.files import sha256
+from lightfield.engine.bundles import VARIABLE
 from lightfield.rendering.setup import pruning
 
 NOTHING = {

@@ -12,8 +12,8 @@ import pytest
 from conftest import BLENDER
 
 from lightfield import open_dataset
-from lightfield.core import receipts
 from lightfield.core.files import sha256
+from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from conftest import BLENDER, SCRIPTS
 
-from lightfield.core import receipts
 from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.files import sha256
-from lightfield.core.flags import parsed
+from lightfield.engine import receipts
+from lightfield.engine.flags import parsed
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular

@@ -25,7 +25,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import Stamp, read_json, sha256, write_json, write_text
-from lightfield.core.receipts import made_in
+from lightfield.engine.receipts import made_in
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.formats.passes import NAMES, PASSES, matte_header
 from lightfield.geometry import lenses, rotations

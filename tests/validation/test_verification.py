@@ -13,8 +13,8 @@ from simulated import put
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import Stamp, sha256
-from lightfield.core.flags import parsed
-from lightfield.core.receipts import job_of
+from lightfield.engine.flags import parsed
+from lightfield.engine.receipts import job_of
 from lightfield.stages.checks import Verify
 from lightfield.validation import verification
 from lightfield.validation.verification import faults

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from faults import FAULTS
 
-from lightfield.core import receipts
 from lightfield.core.files import Stamp, identity_and_sha256, size_and_time
+from lightfield.engine import receipts
 from lightfield.workflow import check
 from lightfield.workflow.check import JobCheck
 

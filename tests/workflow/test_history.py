@@ -8,8 +8,8 @@ import sys
 import pytest
 from conftest import SCRIPTS, largest_file
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
+from lightfield.engine import receipts
 from lightfield.workflow.history import is_suspect, read
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_bytes, write_text
+from lightfield.engine import receipts
 from lightfield.formats.layout import SUMS
 from lightfield.imaging import images
 from lightfield.workflow import shard_log

@@ -15,7 +15,7 @@ from checkouts import ROOT, snakemake
 from lightfield.configuration import keys
 from lightfield.core import files, progress
 from lightfield.core.files import Stamp
-from lightfield.core.flags import parsed
+from lightfield.engine.flags import parsed
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.stages.checks import Status

@@ -13,15 +13,15 @@ from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
 from lightfield.core.names import FILE
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import Settings
-from lightfield.core.stage import cause
+from lightfield.engine.stage import cause
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import OMNIDIRECTIONAL
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
+from lightfield.settings.base import Settings
+from lightfield.settings.types import AtLeastOne
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are not
 # among them.

@@ -10,14 +10,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, model_
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
-from lightfield.core.setting_types import (
-    AtLeastOne,
-    Auto,
-    DenoisePrefilter,
-    Folder,
-    unique_names,
-)
-from lightfield.core.settings import Name, Settings, checked_yaml, pattern
+from lightfield.settings.base import Name, Settings, checked_yaml, pattern
+from lightfield.settings.types import AtLeastOne, Auto, DenoisePrefilter, Folder, unique_names
 
 _FILE = "config.yaml"
 # Folders of the project, of a user's inputs, and of programs such as Snakemake.
@@ -220,7 +214,7 @@ def with_lines(message: str, files: Iterable[Path], given_keys: Set[str]) -> str
     ``files`` are those whose keys make the configuration, the one that counts first. The
     ``given_keys`` come from the command line, and have no line.
     """
-    from lightfield.core.yaml_files import find_key, read_settings_text
+    from lightfield.settings.yaml_files import find_key, read_settings_text
 
     texts = {(name := _shown(path)): read_settings_text(path, name) for path in files}
 
@@ -245,7 +239,7 @@ def read_config(path: Path) -> dict[str, Any]:
     """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
     # Import it only here: stages import this module for its settings, and their --help needs no
     # YAML.
-    from lightfield.core.yaml_files import read_yaml
+    from lightfield.settings.yaml_files import read_yaml
 
     content = read_yaml(path, _shown(path))
     if not isinstance(content, dict):

@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from lightfield.core.names import CORPUS, Part
-from lightfield.core.settings import Settings
+from lightfield.settings.base import Settings
 
 PAGE = "index.html"
 # The files of a corpus that every family has.

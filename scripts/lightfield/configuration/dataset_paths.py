@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.core.names import MESH, SPLITS, VIEWS
-from lightfield.core.receipts import FOLDER, SUFFIX
+from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.formats.export_lists import MANIFEST
 
 # The pictures of a report.

@@ -11,9 +11,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 from pydantic import Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
-from lightfield.core.setting_types import REINHARD, Stops, White
-from lightfield.core.settings import ReaderSettings, Settings, Vector, as_list
-from lightfield.core.stage import cause
+from lightfield.engine.stage import cause
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -23,6 +21,8 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
+from lightfield.settings.base import ReaderSettings, Settings, Vector, as_list
+from lightfield.settings.types import REINHARD, Stops, White
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""

@@ -22,7 +22,7 @@ from lightfield.configuration.corpus import CorpusOptions, evenly_spread
 from lightfield.configuration.own_builder import is_own
 from lightfield.core.errors import UserError
 from lightfield.core.names import MODELS
-from lightfield.core.settings import Settings, as_list, pattern
+from lightfield.settings.base import Settings, as_list, pattern
 
 # Planning more members would take minutes.
 _MOST_MEMBERS = 100_000

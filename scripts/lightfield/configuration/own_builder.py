@@ -22,7 +22,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable, open_file, read_error
 from lightfield.core.paths import inside
-from lightfield.core.settings import problems, suggestion
+from lightfield.settings.base import problems, suggestion
 
 SUFFIX = ".py"
 # The function that fills the scene, and the class of its parameters.

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from lightfield.core.names import READER
-from lightfield.core.settings import Address, Settings, pattern
+from lightfield.settings.base import Address, Settings, pattern
 
 
 def _as_text(value: Any) -> Any:

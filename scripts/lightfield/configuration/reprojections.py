@@ -11,9 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import TypeAliasType
 
-from lightfield.core.setting_types import REINHARD, Primaries, Stops, White
-from lightfield.core.settings import Name, Settings, Vector, as_list
-from lightfield.core.stage import cause
+from lightfield.engine.stage import cause
 from lightfield.formats.passes import PASSES, in_order
 from lightfield.formats.sensors import SensorSettings
 from lightfield.geometry.lenses import CameraSettings, Lens
@@ -21,6 +19,8 @@ from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
 from lightfield.imaging.look import Look
+from lightfield.settings.base import Name, Settings, Vector, as_list
+from lightfield.settings.types import REINHARD, Primaries, Stops, White
 
 MOST_SAMPLES = 64
 """Samples along each side of a pixel."""

@@ -8,9 +8,9 @@ from pydantic import AfterValidator, Field, ValidationInfo, WrapValidator, model
 
 from lightfield.configuration import own_builder
 from lightfield.core.names import FILE, LIGHTS, MODELS, SOFTBOXES, UP, builders
-from lightfield.core.setting_types import QUOTED
-from lightfield.core.settings import AS_WRITTEN, Address, Settings, pattern
 from lightfield.geometry.rigs.rig import Frame
+from lightfield.settings.base import AS_WRITTEN, Address, Settings, pattern
+from lightfield.settings.types import QUOTED
 
 
 class Parameters(Settings):

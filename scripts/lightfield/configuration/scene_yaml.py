@@ -31,15 +31,6 @@ from lightfield.configuration.reprojections import (
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, MESH, PARTS, ROOT, VIEWS
-from lightfield.core.setting_types import Auto, unique_names
-from lightfield.core.settings import Name, Settings, checked, checked_yaml, suggestion
-from lightfield.core.yaml_files import (
-    find_key,
-    located,
-    parse_yaml,
-    read_settings_text,
-    read_yaml,
-)
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
@@ -49,6 +40,15 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
 from lightfield.imaging import blender_looks
+from lightfield.settings.base import Name, Settings, checked, checked_yaml, suggestion
+from lightfield.settings.types import Auto, unique_names
+from lightfield.settings.yaml_files import (
+    find_key,
+    located,
+    parse_yaml,
+    read_settings_text,
+    read_yaml,
+)
 
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.

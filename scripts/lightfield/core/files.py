@@ -45,7 +45,7 @@ def open_file(path: Path | str) -> BufferedReader:
     """Open a file to read it. Raises OSError if it is missing, or if it is no file.
 
     Every file goes through here before a program or a library reads it, so that a job reads no
-    damaged file: see `lightfield.core.read_files`.
+    damaged file: see `lightfield.engine.read_files`.
     """
     _watch(path)
     return _opened(path)

@@ -25,12 +25,13 @@ from typing import Any
 import psutil
 
 from lightfield.configuration.family import RECORD, Member
-from lightfield.core import cli, leftovers, receipts
+from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import append_json_line
 from lightfield.core.names import SPLITS
 from lightfield.core.progress import Progress
-from lightfield.core.receipts import PART_SUFFIX, OpenReceipt
+from lightfield.engine import receipts
+from lightfield.engine.receipts import PART_SUFFIX, OpenReceipt
 from lightfield.family.member import MemberBuild, cause_of
 from lightfield.formats.layout import SUMS
 from lightfield.stages.family import BuildMembers

@@ -14,10 +14,10 @@ import numpy as np
 from PIL import Image
 
 from lightfield.configuration.corpus import THUMBNAILS
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
+from lightfield.engine import receipts
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.depth import converted

@@ -15,11 +15,12 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core import leftovers, receipts
+from lightfield.core import leftovers
 from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import LESS_MEMORY, OutsideError, UserError, is_outside
 from lightfield.core.files import DAMAGE, set_aside, sha256, write_json
-from lightfield.core.receipts import OpenReceipt
+from lightfield.engine import receipts
+from lightfield.engine.receipts import OpenReceipt
 from lightfield.family.stages import StageRun, jobs_of
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.geometry.rigs import Poses

@@ -17,7 +17,7 @@ from lightfield.configuration.dataset_paths import prefix_of
 from lightfield.configuration.exports import InstantNgp
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.names import VIEWS
-from lightfield.core.stage import Stage
+from lightfield.engine.stage import Stage
 from lightfield.stages.checks import Validate
 from lightfield.stages.exports import ExportInstantNgp, ExportViews
 from lightfield.stages.lenses import Reproject

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, TypeAdapter
 from typing_extensions import TypedDict
 
 from lightfield.core.files import read_keys
-from lightfield.core.settings import checked
+from lightfield.settings.base import checked
 
 _Count = Annotated[int, Field(ge=0)]
 

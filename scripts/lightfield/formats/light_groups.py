@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import suggestion
+from lightfield.settings.base import suggestion
 
 EACH = "each"
 """The word in a scene YAML for a group of its own for each emitter."""

@@ -17,10 +17,10 @@ from pydantic import (
     model_validator,
 )
 
-from lightfield.core.setting_types import AtLeastOne, DenoisePrefilter, unique_names
-from lightfield.core.settings import AS_WRITTEN, Settings, Vector, checked
 from lightfield.formats import light_groups, passes
 from lightfield.formats.passes import PASSES, Pass
+from lightfield.settings.base import AS_WRITTEN, Settings, Vector, checked
+from lightfield.settings.types import AtLeastOne, DenoisePrefilter, unique_names
 
 _PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]],

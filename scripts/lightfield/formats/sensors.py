@@ -10,8 +10,8 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 
 from lightfield.core.names import VIEWS
-from lightfield.core.settings import Settings, as_list, checked
 from lightfield.imaging.blender_looks import LookName
+from lightfield.settings.base import Settings, as_list, checked
 
 # The files beside a view of a bracket, by their kinds.
 BRACKET_FILES = {"clipped": "{view}_clipped.png", "weights": "{view}_weights.exr"}

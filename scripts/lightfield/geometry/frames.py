@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import FARTHEST
 from lightfield.geometry.rotations import Floats, is_mirrored, is_skewed
+from lightfield.settings.base import FARTHEST
 
 # Cameras are at one place if they are nearer to each other than this, in metres.
 ONE_PLACE = 1e-6

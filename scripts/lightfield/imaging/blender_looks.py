@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE
-from lightfield.core.settings import suggestion
+from lightfield.settings.base import suggestion
 
 FILE_LOOK = "file_look"
 """The key of lightfield.json with the look of the .blend, if something is developed with it."""

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.engine import receipts
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import FRAME_FOLDERS, IMAGES
 from lightfield.formats.lightfield import MACHINE, NAME, LightField, View

@@ -8,7 +8,7 @@ import math
 import os
 
 from lightfield.configuration.dataset import Dataset, shard_bounds
-from lightfield.core.receipts import FOLDER, SHARD
+from lightfield.engine.receipts import FOLDER, SHARD
 from lightfield.planning import cost
 
 

@@ -11,7 +11,7 @@ from lightfield.configuration.exports import Exports
 from lightfield.core import units
 from lightfield.core.files import absolute_path
 from lightfield.core.names import MESH, SPLITS
-from lightfield.core.read_files import check_since_plan
+from lightfield.engine.read_files import check_since_plan
 from lightfield.export import transforms
 from lightfield.formats import blend
 from lightfield.formats.export_lists import FOLDER, MANIFEST

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
 from lightfield.core.names import CORPUS
 from lightfield.core.paths import files_below, inside
+from lightfield.engine import receipts
 from lightfield.formats.layout import REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables

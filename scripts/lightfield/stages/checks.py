@@ -7,9 +7,9 @@ from typing import Any
 from pydantic import Field
 
 from lightfield.core.names import INVENTORY
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import ReaderSettings
-from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.settings.base import ReaderSettings
+from lightfield.settings.types import AtLeastOne
 
 
 class ValidationSettings(ReaderSettings):

@@ -15,9 +15,9 @@ from lightfield.configuration.exports import (
 )
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, INVENTORY, VIEWS
-from lightfield.core.settings import Settings, checked
-from lightfield.core.stage import ByHand, Stage, option, reads, writes
+from lightfield.engine.stage import ByHand, Stage, option, reads, writes
 from lightfield.geometry.rigs.rig import Frame
+from lightfield.settings.base import Settings, checked
 
 
 class SourceByHand(ByHand):

@@ -11,10 +11,10 @@ from lightfield.configuration.corpus import CorpusOptions
 from lightfield.configuration.family import Draw, Member
 from lightfield.core.names import scene_folder
 from lightfield.core.paths import files_below
-from lightfield.core.receipts import FOLDER
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import ReaderSettings, Settings
-from lightfield.core.stage import Stage, cause, option, reads, writes
+from lightfield.engine.receipts import FOLDER
+from lightfield.engine.stage import Stage, cause, option, reads, writes
+from lightfield.settings.base import ReaderSettings, Settings
+from lightfield.settings.types import AtLeastOne
 from lightfield.stages.views import Device
 
 

@@ -18,13 +18,13 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.core.flags import checked_flags
-from lightfield.core.setting_types import REINHARD, Stops, White
-from lightfield.core.stage import ByHand, option, reads
+from lightfield.engine.flags import checked_flags
+from lightfield.engine.stage import ByHand, option, reads
 from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.base import MOST_PIXELS, named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.blender_looks import LOOK_FLAG, LookName
+from lightfield.settings.types import REINHARD, Stops, White
 
 if TYPE_CHECKING:
     from lightfield.formats.lightfield import LightField

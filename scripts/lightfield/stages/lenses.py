@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.stage import Stage, option, reads, writes
+from lightfield.engine.stage import Stage, option, reads, writes
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.settings.types import AtLeastOne
 from lightfield.stages.lens_flags import LensMapFlags, ReprojectFlags, Source
 
 _FILES = "Input and output"

@@ -8,12 +8,12 @@ from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.configuration.config_file import Energy
 from lightfield.core.names import INVENTORY, VIEWS
-from lightfield.core.setting_types import REINHARD, AtLeastOne, Stops, White
-from lightfield.core.settings import ReaderSettings, Settings
-from lightfield.core.stage import PlainStage, Stage, StageSettings, option, reads, writes
+from lightfield.engine.stage import PlainStage, Stage, StageSettings, option, reads, writes
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
 from lightfield.planning.sampling import PROBES, WINDOW_SIZE
+from lightfield.settings.base import ReaderSettings, Settings
+from lightfield.settings.types import REINHARD, AtLeastOne, Stops, White
 
 
 class FullSize(Settings):

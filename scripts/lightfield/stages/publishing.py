@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from lightfield.configuration.scene_yaml import Credits, load_scene
-from lightfield.core.settings import ReaderSettings
-from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.settings.base import ReaderSettings
 
 FOLDER = "folder of a rig, with one or more datasets"
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from lightfield.core.stage import Stage
+from lightfield.engine.stage import Stage
 from lightfield.stages import (
     checks,
     exports,

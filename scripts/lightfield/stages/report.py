@@ -6,9 +6,9 @@ from typing import Annotated
 from pydantic import Field, PlainSerializer
 
 from lightfield.core.names import ROOT
-from lightfield.core.settings import ReaderSettings, Settings
-from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
+from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.geometry.rigs import AnyRig, as_written
+from lightfield.settings.base import ReaderSettings, Settings
 
 
 class FiguresSettings(ReaderSettings):

@@ -8,10 +8,10 @@ from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.core.names import FILE, INVENTORY
-from lightfield.core.settings import Settings
-from lightfield.core.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.geometry.rigs import Random, as_written
 from lightfield.geometry.rigs.rig import Frame
+from lightfield.settings.base import Settings
 
 # The keys of a rig that say what a camera sees and what its view is for.
 _CAMERA_KEYS = ("camera", "split")

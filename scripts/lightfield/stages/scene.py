@@ -20,10 +20,10 @@ from lightfield.configuration.scene_source import (
     SharedFolder,
     check_model,
 )
-from lightfield.core.settings import Settings
-from lightfield.core.stage import PlainStage, Stage, cause, option, reads, writes
+from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.rigs.rig import Frame
+from lightfield.settings.base import Settings
 
 
 class BuildSettings(Settings):

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from lightfield.core.setting_types import AtLeastOne, Stops
-from lightfield.core.stage import PlainStage, option, reads, writes
+from lightfield.engine.stage import PlainStage, option, reads, writes
 from lightfield.imaging.blender_looks import LOOK_FLAG, LookName
+from lightfield.settings.types import AtLeastOne, Stops
 
 # A picture is made of this many views.
 BEST = 6

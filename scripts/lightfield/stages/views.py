@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
-from lightfield.core.setting_types import AtLeastOne
-from lightfield.core.settings import ReaderSettings
-from lightfield.core.stage import PlainStage, Stage, option, reads, writes
+from lightfield.engine.stage import PlainStage, Stage, option, reads, writes
+from lightfield.settings.base import ReaderSettings
+from lightfield.settings.types import AtLeastOne
 
 Device = Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"]
 

@@ -9,9 +9,7 @@ from pydantic import TypeAdapter
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
-from lightfield.core.settings import checked_yaml
 from lightfield.core.units import count
-from lightfield.core.yaml_files import located, parse_yaml, read_settings_text
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import NAME, LightField
@@ -20,6 +18,8 @@ from lightfield.imaging import images, pictures
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.imaging.video import video
+from lightfield.settings.base import checked_yaml
+from lightfield.settings.yaml_files import located, parse_yaml, read_settings_text
 from lightfield.stages.synthesis import Synthesize
 from lightfield.synthesis.view import Sources, reader
 

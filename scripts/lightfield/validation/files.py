@@ -23,7 +23,7 @@ from lightfield.core.paths import (
     link_above,
     stray_places,
 )
-from lightfield.core.receipts import Output
+from lightfield.engine.receipts import Output
 from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.layout import (
     DEPTH_PICTURE,

@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys
+from lightfield.engine import receipts
 from lightfield.formats.layout import REPORT, write_sums
 from lightfield.stages.publishing import PublishChecksums
 

@@ -23,8 +23,8 @@ import OpenImageIO as oiio
 from lightfield.core.errors import LESS_MEMORY, OutsideError
 from lightfield.core.files import absolute_path, read_watchers, sha256
 from lightfield.core.progress import Progress
-from lightfield.core.read_files import ReadFiles
-from lightfield.core.receipts import Output
+from lightfield.engine.read_files import ReadFiles
+from lightfield.engine.receipts import Output
 from lightfield.formats import layout
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.layout import File, ImageSet

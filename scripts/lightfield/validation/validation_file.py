@@ -8,7 +8,7 @@ from lightfield.core import leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.paths import place_in
-from lightfield.core.receipts import made_in
+from lightfield.engine.receipts import made_in
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from lightfield.configuration.corpus import SHARDS, THUMBNAILS
 from lightfield.configuration.family import RECORD
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
 from lightfield.core.names import CORPUS
@@ -25,6 +24,7 @@ from lightfield.core.paths import (
     link_above,
     stray_places,
 )
+from lightfield.engine import receipts
 from lightfield.formats.layout import IMAGES, PACKAGED, REPORT, SUMS, VALIDATION, read_sums
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Verify

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.bundles import VARIABLE
+from lightfield.engine.bundles import VARIABLE
 from lightfield.workflow.job_plan import JobPlan
 from lightfield.workflow.run import HasWildcards, Run
 

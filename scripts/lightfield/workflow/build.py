@@ -23,7 +23,7 @@ from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import load_scene, mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import CORPUS, VIEWS, scene_folder
-from lightfield.core.receipts import FOLDER, SUFFIX
+from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.planning.cost import Cost, members_cost
 from lightfield.planning.loading import (
     chosen_families,

@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
     DAMAGE,
@@ -28,7 +27,8 @@ from lightfield.core.files import (
     write_json,
 )
 from lightfield.core.paths import lies_below
-from lightfield.core.receipts import Receipt
+from lightfield.engine import receipts
+from lightfield.engine.receipts import Receipt
 
 NAME = "sums.json"
 

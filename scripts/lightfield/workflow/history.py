@@ -27,7 +27,7 @@ from typing import Any
 import psutil
 
 from lightfield.core import memory
-from lightfield.core.receipts import PART_SUFFIX, SUFFIX, history, is_shard
+from lightfield.engine.receipts import PART_SUFFIX, SUFFIX, history, is_shard
 from lightfield.workflow.shard_log import log
 
 # A view is suspect if it took less than this part of the median time of its shard's views.

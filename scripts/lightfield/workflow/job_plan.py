@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lightfield.configuration.dataset import Dataset
-from lightfield.core import receipts
 from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, special_kind, unreadable, write_text
-from lightfield.core.receipts import SUFFIX, make_way
+from lightfield.engine import receipts
+from lightfield.engine.receipts import SUFFIX, make_way
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards

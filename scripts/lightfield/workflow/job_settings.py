@@ -26,10 +26,10 @@ from lightfield.configuration.scene_yaml import load_scene, scene_content, scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
-from lightfield.core.settings import ReaderSettings, Settings
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
 from lightfield.planning.loading import rendered_frames, scene_datasets
+from lightfield.settings.base import ReaderSettings, Settings
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
 from lightfield.stages.family import BatchSettings, CorpusSettings, CountSettings

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import Paths
-from lightfield.core.stage import Stage
+from lightfield.engine.stage import Stage
 from lightfield.planning import cost
 from lightfield.planning.cost import BLENDER, JOB, Cost
 from lightfield.planning.phases import Phase

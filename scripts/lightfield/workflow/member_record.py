@@ -9,7 +9,7 @@ from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.paths import leads_inside
-from lightfield.core.settings import checked
+from lightfield.settings.base import checked
 
 
 class _Record(BaseModel):

@@ -15,7 +15,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import DAMAGE, read_bytes, read_text, size_and_time
 from lightfield.core.names import LIGHTS
 from lightfield.core.paths import case_hint, files_below, lies_below
-from lightfield.core.receipts import name_of
+from lightfield.engine.receipts import name_of
 from lightfield.workflow.failures import CLOCKS_DIFFER
 
 

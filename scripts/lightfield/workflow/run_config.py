@@ -13,7 +13,7 @@ from typing import Any
 from lightfield.configuration.config_file import read_config, with_lines
 from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
-from lightfield.core.yaml_files import as_written
+from lightfield.settings.yaml_files import as_written
 
 NAME = "config.yaml"
 # Snakemake's own folder in the folder of the run.

@@ -1,7 +1,7 @@
 """Keeps two runs from making the same datasets: each holds a lock until its process ends.
 
 The kernel frees the lock of a killed process. Its jobs may live on: each holds a lock on its own
-receipt (`lightfield.core.receipts`), for which the jobs of the next run wait.
+receipt (`lightfield.engine.receipts`), for which the jobs of the next run wait.
 """
 
 import json

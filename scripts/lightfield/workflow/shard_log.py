@@ -10,9 +10,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
+from lightfield.engine import receipts
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.imaging import images
 

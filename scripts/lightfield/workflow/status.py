@@ -14,11 +14,12 @@ from pathlib import Path
 
 from lightfield.configuration import keys
 from lightfield.configuration.family import RECORD
-from lightfield.core import receipts, units
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
-from lightfield.core.receipts import FOLDER, Output
 from lightfield.core.units import duration
+from lightfield.engine import receipts
+from lightfield.engine.receipts import FOLDER, Output
 from lightfield.formats.layout import IMAGES, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status

@@ -1,7 +1,7 @@
 """The plan of jobs that share no folder, but a storage.
 
 Snakemake moves the files that rules declare. The other files of a job travel in its bundle
-(`lightfield.core.bundles`). All that differs with a storage is in this module: `plan_of` chooses.
+(`lightfield.engine.bundles`). All that differs with a storage is in this module: `plan_of` chooses.
 """
 
 import re
@@ -13,9 +13,9 @@ from typing import Any
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
-from lightfield.core import bundles
 from lightfield.core.errors import UserError
-from lightfield.core.receipts import SUFFIX, is_receipt
+from lightfield.engine import bundles
+from lightfield.engine.receipts import SUFFIX, is_receipt
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.job_plan import (
     Content,

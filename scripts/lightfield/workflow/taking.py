@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lightfield.configuration.dataset_paths import REPORT_FILES
-from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading, sha256
 from lightfield.core.paths import inside
 from lightfield.core.progress import Progress
+from lightfield.engine import bundles, receipts
 from lightfield.formats.layout import REPORT, SUMS, read_sums
 from lightfield.stages.publishing import TakeDataset
 from lightfield.workflow.storage import Storage

@@ -9,9 +9,9 @@ from pydantic import ConfigDict, Field, TypeAdapter
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import checked
 from lightfield.geometry.lenses.base import LENSES, MOST_PIXELS, Array, Lens, LensSettings, pair
 from lightfield.geometry.lenses.rectilinear import FileSettings
+from lightfield.settings.base import checked
 
 __all__ = [
     "LENSES",

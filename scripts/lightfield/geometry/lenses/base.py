@@ -30,7 +30,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import Settings, as_list
+from lightfield.settings.base import Settings, as_list
 
 Array = npt.NDArray[Any]
 Pair = tuple[float, float]

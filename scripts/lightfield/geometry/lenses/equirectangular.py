@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import as_list
 from lightfield.geometry.lenses.base import ANGLE_SLACK, Array, Lens, LensSettings, Pair
+from lightfield.settings.base import as_list
 
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from lightfield.core.settings import as_list
 from lightfield.geometry.lenses.base import (
     Array,
     Fisheye,
@@ -22,6 +21,7 @@ from lightfield.geometry.lenses.base import (
     slack,
 )
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
+from lightfield.settings.base import as_list
 
 
 class KannalaBrandtSettings(FisheyeSettings):

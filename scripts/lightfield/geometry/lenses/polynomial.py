@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import as_list
 from lightfield.geometry.lenses.base import (
     Array,
     Fisheye,
@@ -20,6 +19,7 @@ from lightfield.geometry.lenses.base import (
     fov_up_to,
 )
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
+from lightfield.settings.base import as_list
 
 
 class PolynomialSettings(FisheyeSettings):

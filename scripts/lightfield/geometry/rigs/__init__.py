@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from lightfield.core.settings import checked
 from lightfield.geometry.rigs.blend_camera import BlendCamera
 from lightfield.geometry.rigs.cuboid import Cuboid
 from lightfield.geometry.rigs.cylinder import Cylinder
@@ -25,6 +24,7 @@ from lightfield.geometry.rigs.rig import Pose, Rig
 from lightfield.geometry.rigs.ring import Ring
 from lightfield.geometry.rigs.sphere import Sphere
 from lightfield.geometry.rigs.spiral import Spiral
+from lightfield.settings.base import checked
 
 __all__ = [
     "AnyRig",

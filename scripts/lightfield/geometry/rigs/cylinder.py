@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, grid, quads
 from lightfield.geometry.rigs.rig import UnitPoses, circle, stack
 from lightfield.geometry.rotations import Floats
+from lightfield.settings.base import as_list
 
 
 class Cylinder(Grid):

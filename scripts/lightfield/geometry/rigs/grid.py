@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.rig import Rig
 from lightfield.geometry.rotations import Floats
+from lightfield.settings.base import as_list
 
 Count = Annotated[int, Field(ge=1, le=2000)]
 Cell = tuple[int, ...]

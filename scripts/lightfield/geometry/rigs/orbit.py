@@ -6,9 +6,9 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, ball_outline, stack
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
+from lightfield.settings.base import as_list
 
 Elevation = Annotated[float, Field(ge=-90, le=90)]
 

@@ -7,9 +7,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
+from lightfield.settings.base import Settings, Vector, as_list
 
 # The curve's length is measured over this many pieces between two keys. Its error is below 1e-6.
 _PIECES = 2000

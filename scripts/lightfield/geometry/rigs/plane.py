@@ -6,10 +6,10 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, grid, quads, square_outline
 from lightfield.geometry.rigs.rig import UnitPoses, stack
 from lightfield.geometry.rotations import Floats
+from lightfield.settings.base import as_list
 
 
 class Plane(Grid):

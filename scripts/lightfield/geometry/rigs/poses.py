@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
-from lightfield.core import receipts, units
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_bytes, read_error, read_json, read_text
-from lightfield.core.settings import FARTHEST, pattern
+from lightfield.engine import receipts
 from lightfield.geometry import colmap
 from lightfield.geometry.frames import (
     MIRRORED,
@@ -52,6 +52,7 @@ from lightfield.geometry.rotations import (
     matrix_to_euler,
     quaternion_to_matrix,
 )
+from lightfield.settings.base import FARTHEST, pattern
 
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 _QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]

@@ -15,7 +15,6 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import Part
-from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import CameraSettings, build_settings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
@@ -27,6 +26,7 @@ from lightfield.geometry.rotations import (
     matrix_to_euler,
 )
 from lightfield.geometry.spread import spread
+from lightfield.settings.base import FARTHEST, Settings, Vector, as_list
 
 # Each type of rig contains all lenses.
 build_settings()

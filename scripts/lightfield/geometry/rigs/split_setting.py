@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from lightfield.core.names import Part
-from lightfield.core.settings import Settings
+from lightfield.settings.base import Settings
 
 
 class Chosen(Settings):

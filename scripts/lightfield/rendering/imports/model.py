@@ -15,12 +15,11 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from lightfield.configuration.keys import model_fingerprint
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, keep_apart, listed, sha256, write_json
 from lightfield.core.names import UP
 from lightfield.core.paths import case_hint
-from lightfield.core.settings import FARTHEST
+from lightfield.engine import receipts
 from lightfield.imaging import environment
 from lightfield.imaging.images import is_readable
 from lightfield.rendering.imports import model_completion, model_light, model_paint, model_volumes
@@ -36,6 +35,7 @@ from lightfield.rendering.scenes import blend_file
 from lightfield.rendering.scenes.quiet import reading_quietly
 from lightfield.rendering.scenes.render_graph import in_render
 from lightfield.rendering.setup.pruning import objects_of_used_collections
+from lightfield.settings.base import FARTHEST
 from lightfield.stages.scene import ImportModel, ImportSettings
 
 # The options of each importer that differ from its defaults. Cameras and lamps are removed anyway.

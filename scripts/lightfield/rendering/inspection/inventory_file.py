@@ -10,12 +10,12 @@ from typing import Any
 
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.dataset import Dataset
-from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.names import FILE
 from lightfield.core.paths import case_hint
-from lightfield.core.read_files import changed_since_plan
+from lightfield.engine import bundles, receipts
+from lightfield.engine.read_files import changed_since_plan
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera

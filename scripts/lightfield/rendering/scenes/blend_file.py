@@ -10,9 +10,9 @@ from typing import Any
 
 import bpy
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
+from lightfield.engine import receipts
 from lightfield.rendering.scenes import animation
 from lightfield.rendering.scenes.quiet import quiet, reading_quietly
 

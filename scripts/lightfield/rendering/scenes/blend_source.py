@@ -4,10 +4,11 @@ from importlib.metadata import version
 
 from lightfield.configuration import blend_lock
 from lightfield.configuration.scene_yaml import load_scene, mistake, scene_path
-from lightfield.core import download, receipts
+from lightfield.core import download
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.core.read_files import changed_since_plan
+from lightfield.engine import receipts
+from lightfield.engine.read_files import changed_since_plan
 from lightfield.stages.scene import CheckBlend, FetchBlend
 
 

@@ -7,7 +7,7 @@ from lightfield.configuration.keys import builder_fingerprint
 from lightfield.configuration.own_builder import is_own
 from lightfield.configuration.scene_source import Parameters
 from lightfield.core.files import atomic_path
-from lightfield.core.read_files import changed_since_plan
+from lightfield.engine.read_files import changed_since_plan
 from lightfield.rendering.scenes import blend_file, own_scene
 from lightfield.stages.scene import BuildScene, BuildSettings
 

@@ -12,8 +12,8 @@ from typing import Any
 import bpy
 
 from lightfield.configuration import own_builder
-from lightfield.core import receipts
 from lightfield.core.errors import OutsideError, UserError, is_outside
+from lightfield.engine import receipts
 from lightfield.rendering.scenes.quiet import quiet
 
 # The package of the builder, so that it can import files beside it with a dot, too.

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from lightfield.configuration import keys
-from lightfield.core import receipts
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.progress import Progress
-from lightfield.core.read_files import changed
+from lightfield.engine import receipts
+from lightfield.engine.read_files import changed
 from lightfield.formats.lightfield import LightField
 from lightfield.stages.views import ImportViews
 from lightfield.workflow import shard_log

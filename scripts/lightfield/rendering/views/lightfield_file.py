@@ -9,7 +9,7 @@ from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE
-from lightfield.core.read_files import changed_since_plan, check_since_plan
+from lightfield.engine.read_files import changed_since_plan, check_since_plan
 from lightfield.formats import blend, light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, LightField

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.core import bundles, receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_text
+from lightfield.engine import bundles, receipts
 
 RECEIPT = Path("work/receipts/s/r/render/0-1.jsonl")
 VIEW, NAMED, TEXTURE = Path("results/s/r/exr/a.exr"), Path("results/s/r/a.json"), Path("wood.png")

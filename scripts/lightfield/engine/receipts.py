@@ -47,7 +47,7 @@ from lightfield.core.files import (
 )
 from lightfield.core.locks import lock
 from lightfield.core.paths import is_normal
-from lightfield.core.read_files import ReadFiles, changed_since_plan
+from lightfield.engine.read_files import ReadFiles, changed_since_plan
 
 FOLDER = "receipts"
 """The folder of all receipts, in the workflow's folder of intermediate files."""

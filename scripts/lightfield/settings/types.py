@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from lightfield.core.settings import pattern
+from lightfield.settings.base import pattern
 
 
 def _plain_path(folder: str) -> str:

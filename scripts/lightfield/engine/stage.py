@@ -10,7 +10,7 @@ of a run, such as the number of threads. Its settings decide what it writes, and
 
         output: Path = writes(".blend to write")
 
-The class determines the program with its flags (`lightfield.core.flags`) and its page of the
+The class determines the program with its flags (`lightfield.engine.flags`) and its page of the
 reference. It also determines the settings file that a rule writes, and the stage of a family's
 member.
 """
@@ -23,8 +23,8 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
 
-from lightfield.core import bundles, receipts
-from lightfield.core.settings import ReaderSettings, Settings
+from lightfield.engine import bundles, receipts
+from lightfield.settings.base import ReaderSettings, Settings
 
 
 class NoSettings(Settings):
@@ -167,7 +167,7 @@ class PlainStage(Stage[NoSettings]):
 def reads(text: str, default: Any = ..., **flag: Any) -> Any:
     """Return a field for a file or folder that a stage reads. ``text`` says what it is.
 
-    ``flag`` says how it looks on a command line: see `lightfield.core.flags`.
+    ``flag`` says how it looks on a command line: see `lightfield.engine.flags`.
     """
     return _field("read", text, default, flag)
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import Stamp
-from lightfield.core.receipts import Output
+from lightfield.engine import receipts
+from lightfield.engine.receipts import Output
 
 RECEIPT = Path("work/receipts/garden/job.jsonl")
 

@@ -12,9 +12,9 @@ import pytest
 from pydantic import Field
 
 from lightfield.core.errors import UserError
-from lightfield.core.flags import parsed, parser_of
-from lightfield.core.settings import Settings
-from lightfield.core.stage import Stage, cause, option, reads, writes
+from lightfield.engine.flags import parsed, parser_of
+from lightfield.engine.stage import Stage, cause, option, reads, writes
+from lightfield.settings.base import Settings
 from lightfield.stages.registry import STAGES
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"

@@ -19,8 +19,8 @@ from pydantic.fields import FieldInfo
 from lightfield.core import cli
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.core.settings import checked, read_settings
-from lightfield.core.stage import ByHand, NoSettings, Stage
+from lightfield.engine.stage import ByHand, NoSettings, Stage
+from lightfield.settings.base import checked, read_settings
 
 Model = TypeVar("Model", bound=BaseModel)
 

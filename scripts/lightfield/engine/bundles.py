@@ -13,10 +13,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lightfield.core import receipts
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, sha256
 from lightfield.core.paths import check_inside
+from lightfield.engine import receipts
 
 # The environment variable with which the workflow tells its programs where the storage is.
 VARIABLE = "PLENOFORGE_STORE"

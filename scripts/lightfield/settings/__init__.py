@@ -1,0 +1,1 @@
+"""What all settings in YAML share: models, types, safe reading, and mistakes in one line."""
