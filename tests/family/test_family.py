@@ -353,7 +353,7 @@ def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_pa
     box = "".join([*corners, *(f"f {side}\n" for side in sides)])
     (tmp_path / "face.obj").write_text(box)
     failure = build_of(face(size=0.1)).build("cpu", 1)["failure"]
-    assert failure["stage"] == "validate"
+    assert failure["stage"] == "publish_checksums"
     assert "exr/view_0000f.exr: is black" in failure["cause"]
     assert (tmp_path / "results/faces/face/ring/exr/view_0000f.exr").is_file()
     validation = tmp_path / "results/faces/face/ring/validation.json"

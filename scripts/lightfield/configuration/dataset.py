@@ -41,6 +41,8 @@ class Dataset(Capture):
     preset: str
     rig_name: str
     rig_folder: str
+    # The scene YAML, in which `source`, `render` and `rig` are without the preset's limits.
+    written: scene_yaml.Scene
     reprojections: dict[str, Reprojection]
     flow: scene_yaml.Flow | None
     mesh: scene_yaml.MeshFiles | None

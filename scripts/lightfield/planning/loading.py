@@ -144,6 +144,7 @@ def datasets_of(
                 preset=preset,
                 rig_name=name,
                 rig_folder=folder,
+                written=written,
                 source=source.model_copy(update={"frame": frame}),
                 render=_limited_render(written.render, rig, limits),
                 rig=limited_rig,

@@ -20,7 +20,7 @@ from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_yaml import load_scene, mistake
+from lightfield.configuration.scene_yaml import mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import CORPUS, VIEWS, scene_folder
 from lightfield.engine.receipts import FOLDER, SUFFIX
@@ -229,7 +229,7 @@ class Build:
         return [
             document
             for dataset in self.chosen
-            if load_scene(dataset.scene_name).publish
+            if dataset.written.publish
             for document in dataset.sequence_paths.documents
         ]
 
