@@ -363,6 +363,25 @@ def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_pa
 
 
 @pytest.mark.slow
+def test_a_rig_that_tests_is_placed_as_the_rig_that_trains(face, tmp_path):
+    settings = face()
+    content = settings.scene | {
+        # The rig that tests comes first, and is smaller.
+        "rigs": {"a": RING | {"split": "test", "size": 2}, "b": RING | {"split": "train"}},
+        "exports": {"instant_ngp": {"sources": ["views"]}},
+    }
+    build = build_of(settings.model_copy(update={"scene": content}))
+    assert build.build("cpu", 1)["state"] == "valid"
+    tested, trained = (read_json(build.folder / rig / "transforms.json") for rig in "ab")
+    assert (tested["scale"], tested["offset"]) == (trained["scale"], trained["offset"])
+    distances = [
+        np.linalg.norm(np.array(export["frames"][0]["transform_matrix"])[:3, 3])
+        for export in (tested, trained)
+    ]
+    assert distances[1] == pytest.approx(1.5 * distances[0])
+
+
+@pytest.mark.slow
 def test_views_of_members_are_kept_without_their_folder_of_work(face, tmp_path):
     """Their published checksums tell which are intact."""
     build = build_of(face())

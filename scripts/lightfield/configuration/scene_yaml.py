@@ -30,7 +30,7 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
-from lightfield.core.names import FILE, MESH, PARTS, ROOT, VIEWS
+from lightfield.core.names import FILE, MESH, PARTS, RENDERED, ROOT, VIEWS
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
@@ -62,7 +62,7 @@ _REPROJECTION_NEIGHBOURS = {
     "exports",
     MESH,
     "panorama",
-    "render",
+    RENDERED,
     "report",
     "settings",
     FLOW.name,

@@ -14,6 +14,7 @@ from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.core.names import RENDERED, VIEWS
 from lightfield.engine.stage import Stage
+from lightfield.formats import passes
 from lightfield.planning import cost
 from lightfield.planning.cost import BLENDER, JOB, Cost
 from lightfield.planning.phases import Phase
@@ -173,14 +174,6 @@ CHECK_CAMERAS = Job(
     fields=fields.check_cameras,
     times="{scene}/{rig}/cameras/check_cameras",
 )
-SPLITS = Job(
-    "{scene}/splits",
-    views.ListSplits,
-    "cameras",
-    _costs(JOB),
-    fields=fields.splits,
-    is_local=True,
-)
 PROBE_CAMERAS = Job(
     "{scene}/probe_cameras",
     rig.MakeLightfield,
@@ -207,7 +200,7 @@ RENDER = Job(
     renders=True,
 )
 FLOW = Job(
-    "{scene}/{rig}/flow/{first}-{end}",
+    f"{{scene}}/{{rig}}/{passes.FLOW.name}/{{first}}-{{end}}",
     views.ComputeFlow,
     "flow",
     _of_views(cost.computing_flow),
@@ -240,6 +233,15 @@ REPROJECT = Job(
     of_reprojection("reproject", settings.reproject),
     fields.reproject,
     has_bundle=True,
+)
+# After the views, so that a member without views has no list of them.
+SPLITS = Job(
+    "{scene}/splits",
+    views.ListSplits,
+    "cameras",
+    _costs(JOB),
+    fields=fields.splits,
+    is_local=True,
 )
 EXPORT_INSTANT_NGP = Job(
     "{scene}/{rig}/{source}export_instant_ngp",
