@@ -76,6 +76,10 @@ class Job(NamedTuple):
     # Whether it renders on the device.
     renders: bool = False
 
+    def name_of(self, dataset: Dataset) -> str:
+        """Return the name of a dataset's job."""
+        return self.name.format(scene=dataset.scene_folder, rig=dataset.rig_folder)
+
     def stage_of(self, build: Build, wildcards: Wildcards, fields: Fields) -> Stage[Any]:
         """Return the stage of a job, with its settings."""
         if self.settings is None:
