@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 def inventory_of_path(path, frames, depth_of_field=False):
     """List what a .blend contains for a rig of its camera at ``frames``, (first, last) or None.
 
-    Without frames, list it for a rig that only takes its depth of field.
+    Without frames, list it for a rig that only takes its depth of field. Return the rig's dataset.
     """
     from lightfield.rendering.inspection import inventory_file
 
@@ -38,6 +38,7 @@ def inventory_of_path(path, frames, depth_of_field=False):
     datasets = datasets_of("tried", written, "full", Preset(), {})
     settings = job_settings.inventory(datasets[0])
     inventory_file.write(path, settings, datasets, path.with_suffix(".json"), False)
+    return datasets[0]
 
 
 @pytest.mark.parametrize("mirror", [blend_scenes.mirrored_camera, blend_scenes.mirroring_parent])
@@ -76,6 +77,25 @@ def changing_camera():
     for frame, scale in ((6, 1), (7, -1)):
         second.scale.y = scale
         second.keyframe_insert("scale", frame=frame)
+
+
+def moving_camera():
+    """Move the camera along X: two metres from frame 1 to frame 3."""
+    import bpy
+
+    blend_scenes.studio()
+    camera = bpy.context.scene.camera
+    for frame, x in ((1, 0), (3, 2)):
+        camera.location.x = x
+        camera.keyframe_insert("location", frame=frame)
+
+
+def test_the_views_of_a_path_are_where_the_camera_is_at_their_frames(tmp_path):
+    path = tmp_path / "path.blend"
+    save(path, moving_camera)
+    rig = inventory_of_path(path, (1, 3)).resolved(path.with_suffix(".json")).rig
+    assert [pose.name for pose in rig.poses()] == ["view_0001f", "view_0002f", "view_0003f"]
+    assert [pose.position[0] for pose in rig.poses()] == pytest.approx([0, 1, 2], abs=1e-6)
 
 
 def test_a_mirrored_camera_is_named_with_its_frame(tmp_path):

@@ -74,11 +74,14 @@ def write(
     shown_frames = shown_frames or [saved_frame]
     contents: dict[str, Any] = {}
     if is_own:
+        # Only a frame with a fraction is a float in an inventory.
+        camera_frames = [
+            frame if frame is None or frame % 1 else int(frame)
+            for frame in settings.camera_frames or ()
+        ]
         unknown_to_blender = unknown_colours.of_scene(unknown)
         try:
-            contents = {
-                "blend": blend_facts.facts(settings.camera_frames or []) | {"layers": layers}
-            }
+            contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         if unknown_to_blender:
