@@ -161,7 +161,7 @@ def are_inside(enclosing: Sequence[str | None], distances: Floats) -> NDArray[np
 
     ``enclosing`` comes from `enclosing_objects`, and ``distances`` (n,) from `surroundings`.
     """
-    are_enclosed = np.array([name is not None for name in enclosing])
+    are_enclosed = np.array([name is not None for name in enclosing], np.bool_)
     return np.asarray(are_enclosed | (distances < TOUCHING))
 
 
