@@ -150,16 +150,15 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
 
     Raises `UserError` if the file is refused.
     """
-    from lightfield.workflow.loading import datasets_of
-
     from lightfield.configuration.config_file import Preset
     from lightfield.configuration.scene_yaml import Scene
     from lightfield.core.files import sha256
     from lightfield.imaging import images
+    from lightfield.planning.loading import datasets_of
     from lightfield.rendering.inspection import inventory_file
     from lightfield.rendering.views import lightfield_file
-    from lightfield.stages import job_settings
     from lightfield.stages.views import RenderShard
+    from lightfield.workflow import job_settings
 
     camera = {"lens": "file", "resolution": [SIDE, SIDE]}
     scene = Scene.model_validate(
