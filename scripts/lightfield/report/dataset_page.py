@@ -21,7 +21,6 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.formats.sensors import settings_in
 from lightfield.geometry import rigs
-from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import FILE_LOOK
@@ -191,7 +190,7 @@ def facts(
         "Views": f"{len(parts)}" + (f" ({', '.join(counts)})" if counts else ""),
         "Rig": rig_text(rig, lightfield.world_from_cameras[:, :3, 3]),
         "Lens": lens.description,
-        "Field of view": _field_of_view(lens),
+        "Field of view": " × ".join(f"{math.degrees(a):.4g}°" for a in lens.field_of_view),
         "Resolution": f"{lens.width} × {lens.height}",
         "Frame": str(lightfield.frame),
         "Samples": samples,
@@ -215,21 +214,6 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     if isinstance(size, tuple):
         return f"{kind}, {' × '.join(f'{side:.4g}' for side in size)} m"
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"
-
-
-def _field_of_view(lens: Lens) -> str:
-    """Return the angles that the image spans, across and down, through the principal point."""
-    x, y = lens.center
-    lines = (
-        lens.rays(np.linspace(0, lens.width, 513), y),
-        lens.rays(x, np.linspace(0, lens.height, 513)),
-    )
-    angles = []
-    for rays in lines:
-        visible_rays = rays[np.isfinite(rays[:, 0])]
-        chords = np.linalg.norm(np.diff(visible_rays, axis=0), axis=1)
-        angles.append(math.degrees(2 * np.arcsin(chords / 2).sum()))
-    return " × ".join(f"{angle:.4g}°" for angle in angles)
 
 
 def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:

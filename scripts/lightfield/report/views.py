@@ -114,10 +114,14 @@ def collect(
         return read(folder / f"{names[number]}.exr", small, meaning)
 
     embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
+    middle = lightfield.world_from_cameras[middle_view(rig)]
+    # The view with the pose most similar to the middle view's.
+    offsets = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
+    first = int(np.argmin(offsets))
     for small in _lenses(lens, len(embedded)):
         views = [load(number, small) for number in embedded]
         depths = _depths(views, small)
-        shown = _pictures(views, depths, embedded, lightfield, small)
+        shown = _pictures(views, depths, embedded, first, lightfield, small)
         if sensor:
             for entry in shown["embedded"]:
                 entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
@@ -125,16 +129,13 @@ def collect(
             break
     row = epipolar.find_row(rig, lightfield.world_from_cameras)
     row_views = epipolar.thinned(row.views, _MOST_ROWS) if row else []
-    middle = lightfield.world_from_cameras[middle_view(rig)]
-    distances = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
     data = {
         "views": _cameras(lightfield),
         "outline": [[_rounded(point) for point in line] for line in rig.outline()],
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
         "white": pictures.WHITE,
-        # The view with the pose most similar to the middle view's.
-        "first": int(np.argmin(distances)),
+        "first": first,
         "row": _epipolar_images(load, lightfield, row, row_views, shown["light"]) if row else None,
         **shown,
     }
@@ -211,10 +212,14 @@ def _pictures(
     views: list[PageView],
     depths: Array | None,
     embedded: list[int],
+    first: int,
     lightfield: LightField,
     small: Lens,
 ) -> dict[str, Any]:
-    """Return the packed pictures of the ``embedded`` views, through the lens ``small``."""
+    """Return the packed pictures of the ``embedded`` views, through the lens ``small``.
+
+    ``first`` is the place in ``embedded`` of the view in the middle of the rig.
+    """
     light = np.stack([view.colour for view in views])
     scale = light_scale(light)
     exposure = round(pictures.exposure_for(light), 2)
@@ -237,7 +242,12 @@ def _pictures(
         "points": _points(distances, rays, world_from_cameras[embedded], colours),
         "depth": _depth_scale(depths, reach, lightfield.depth),
         "walk": walk.collect(
-            small, world_from_cameras[:, :3, 3], distances, fills_holes=not lightfield.transparent
+            small,
+            world_from_cameras[:, :3, 3],
+            world_from_cameras[embedded],
+            distances,
+            first,
+            fills_holes=not lightfield.transparent,
         ),
     }
 

@@ -66,6 +66,7 @@ class ReportHtml(Stage[PageSettings]):
 
     name = "report_html"
     function = "lightfield.report.dataset_page:write"
+    version = 2
 
     dataset: Path = reads("folder of the dataset")
     dataset_name: str = option("name of the dataset, scene/rig", flag="--name", metavar="NAME")
