@@ -1057,7 +1057,7 @@ def test_yaml_refuses_the_exports_that_fail_without_depth(name, tmp_path):
         # The sphere's views have no passes.
         if "depth" in str(error):
             with pytest.raises(
-                ValidationError, match="holds no depth; leave out render.depth: none"
+                ValidationError, match=r"holds no depth; leave out render\.depth: none"
             ):
                 TypeAdapter(Scene).validate_python(content)
             return

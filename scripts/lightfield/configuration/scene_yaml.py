@@ -641,9 +641,10 @@ def _check_blender_limits(key: str, settings: CameraSettings) -> None:
         raise ValueError(f"{key}.resolution: {problem}")
     lens = settings.make()
     camera = lens.to_lightfield()["camera"]
-    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and getattr(settings, "fov", None):
+    fov = getattr(settings, "fov", None)
+    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and fov:
         widest = math.degrees(2 * math.atan(lens.sensor[0] / 2))
-        raise ValueError(f"{key}.fov: is {settings.fov:g}; must be at most {widest:.4g} in Blender")
+        raise ValueError(f"{key}.fov: is {fov:g}; must be at most {widest:.4g} in Blender")
     for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:
