@@ -14,6 +14,7 @@ from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
@@ -115,6 +116,11 @@ class Dataset(Capture):
         """Whether something is developed with the look of the user's .blend. Otherwise None."""
         made = [*self.reprojections.values(), *self.exports.selected.values()]
         return any(getattr(each, "look", None) == FILE for each in made) or None
+
+    @property
+    def shown_look(self) -> ShownLook | None:
+        """The look of the dataset's pictures, if they have one."""
+        return shown_look(self.reprojections.values(), self.exports.selected.values())
 
     # Files that a dataset may lack.
 

@@ -24,6 +24,7 @@ from lightfield.configuration.exports import Export, ExportSettings, InstantNgp,
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
+from lightfield.configuration.shown_look import shown_look
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
@@ -231,7 +232,9 @@ def validate(dataset: Dataset) -> ValidationSettings:
 def figures(dataset: Dataset) -> FiguresSettings:
     exports = [*dataset.exports.selected.values()]
     chooses_tests = any(_chooses_tests(dataset, export) for export in exports)
-    return FiguresSettings.of(rig=dataset.placed_rig, chooses_tests=chooses_tests or None)
+    return FiguresSettings.of(
+        rig=dataset.placed_rig, chooses_tests=chooses_tests or None, look=dataset.shown_look
+    )
 
 
 def _chooses_tests(dataset: Dataset, export: Export) -> bool:
@@ -293,6 +296,7 @@ def page(build: Build, dataset: Dataset) -> PageSettings:
         command=_rebuilding(dataset),
         panorama=bool(dataset.panorama),
         measurements=measured,
+        look=dataset.shown_look,
     )
 
 
@@ -429,6 +433,7 @@ def pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
         gigabytes=build.config.package_gigabytes,
         rig=datasets[0].rig.type,
         scene=datasets[0].written,
+        look=datasets[0].shown_look,
     )
     return "pack", settings
 
@@ -484,5 +489,7 @@ def corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     folder = wildcards["family"]
     options = build.families[build.family_names[folder]].corpus
     members = [member.name for batch in build.batches[folder].values() for member in batch]
-    settings = CorpusSettings(**dict(options), family=folder, members=sorted(members))
+    scene = load_scene(build.family_names[folder])
+    look = shown_look(scene.developments.values(), scene.exports.selected.values())
+    settings = CorpusSettings.of(**dict(options), family=folder, members=sorted(members), look=look)
     return "corpus", settings
