@@ -14,12 +14,10 @@ from pydantic import InstanceOf
 
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import prefix_of
-from lightfield.configuration.exports import InstantNgp
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.core.names import VIEWS
 from lightfield.engine.stage import Stage
 from lightfield.stages.checks import Validate
-from lightfield.stages.exports import ExportInstantNgp, ExportViews
+from lightfield.stages.exports import ExportViews
 from lightfield.stages.lenses import Reproject
 from lightfield.stages.publishing import PublishChecksums
 from lightfield.stages.rig import CheckCameras, FreePlaces, MakeLightfield
@@ -31,7 +29,6 @@ from lightfield.workflow import job_settings
 NAMES: dict[type[Stage[Any]], str] = {
     MakeLightfield: "lightfield",
     RenderShard: "render",
-    ExportInstantNgp: "export",
     PublishChecksums: "validate",
 }
 
@@ -168,20 +165,12 @@ def _export_jobs(dataset: Dataset) -> Iterator[Stage[Any]]:
     for name, options in dataset.exports.selected.items():
         for source in options.sources:
             prefix = prefix_of(source)
-            if isinstance(options, InstantNgp):
-                yield ExportInstantNgp(
-                    settings=job_settings.instant_ngp(dataset, source),
-                    input_cfg=Path(paths.source_lightfield(prefix)),
-                    output=Path(paths.transforms(prefix)),
-                    image_dir=Path(paths.views if source == VIEWS else paths.reprojected(source)),
-                )
-            else:
-                yield ExportViews(
-                    settings=job_settings.export(dataset, name, options, source),
-                    format=name,
-                    dataset=Path(paths.folder),
-                    output=Path(paths.export_list(name, prefix)).parent,
-                )
+            yield ExportViews(
+                settings=job_settings.export(dataset, options, source),
+                format=name,
+                dataset=Path(paths.folder),
+                output=Path(paths.export_list(name, prefix)).parent,
+            )
 
 
 def _check_jobs(dataset: Dataset, removed: Path) -> Iterator[Stage[Any]]:

@@ -33,7 +33,6 @@ STAGES: list[type[Stage[Any]]] = [
     views.ComputeFlow,
     views.ListSplits,
     exports.ExportViews,
-    exports.ExportInstantNgp,
     exports.WriteSurface,
     synthesis.Synthesize,
     checks.Validate,
