@@ -3,6 +3,9 @@ from lightfield.exporters import BESIDE_VIEWS, SEQUENCE_EXPORTS
 from lightfield.workflow.jobs import EXPORT_RULES, EXPORT_SEQUENCE
 from lightfield.workflow.run import one_of
 
+# The formats that have rules of their own.
+OTHER_EXPORTS = one_of((*SEQUENCE_EXPORTS, *BESIDE_VIEWS))
+
 # The list of an export lies in a folder named after the format, or beside the views. All paths of a
 # rule must have the same wildcards, so each format beside the views has a rule of its own.
 for NAME, EXPORTED in EXPORT_RULES.items():
@@ -27,7 +30,7 @@ for NAME, EXPORTED in EXPORT_RULES.items():
         benchmark:
             RUN.times_of(EXPORTED)
         wildcard_constraints:
-            format=rf"(?!(?:{one_of(SEQUENCE_EXPORTS + tuple(BESIDE_VIEWS))})[/.])[a-z0-9_]+",
+            format=rf"(?!(?:{OTHER_EXPORTS})[/.])[a-z0-9_]+",
         resources:
             mem_mb=4000,
             runtime=120,

@@ -161,7 +161,7 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
 # How Python and NumPy open a file, but for writing.
 OPENS = re.compile(r"\.(?:read_bytes|read_text)\(|(?<!tarfile)\.open\((?!\"[wax])|\bnp\.load\(")
 READERS = (
-    *("reading", "reprojection", "validation", "export", "synthesis"),
+    *("reading", "export", "exporters", "products", "reprojection", "validation", "synthesis"),
     *("measurement", "report", "publishing"),
 )
 # Templates of the package, and a file whose bytes are compared right before.
