@@ -35,14 +35,14 @@ for NAME, EXPORTED in EXPORT_RULES.items():
             mem_mb=4000,
             runtime=120,
         params:
+            format=EXPORTED.pattern("format"),
             dataset=subpath(input.dataset, parent=True),
             folder=subpath(output[0], parent=True),
         message:
-            "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for "
-            f"{EXPORTED.shown('format')}"
+            "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {params.format}"
         shell:
-            f"python {RUN.scripts}/export.py {EXPORTED.shown('format')}"
-            " --settings {input.settings} --dataset {params.dataset}"
+            f"python {RUN.scripts}/export.py"
+            " {params.format} --settings {input.settings} --dataset {params.dataset}"
             " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"
 
 

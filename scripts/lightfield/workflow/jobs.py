@@ -75,9 +75,9 @@ class Job(NamedTuple):
         """Return all names of a job, by the wildcards of its files."""
         return {**dict(self.given), **wildcards}
 
-    def shown(self, wildcard: str) -> str:
-        """Return a wildcard as the command of the rule writes it."""
-        return dict(self.given).get(wildcard, f"{{wildcards.{wildcard}}}")
+    def pattern(self, wildcard: str) -> str:
+        """Return a wildcard as the rule's paths have it, or the one value for which the rule is."""
+        return dict(self.given).get(wildcard, f"{{{wildcard}}}")
 
 
 def _costs(known: Cost) -> CostOf:
