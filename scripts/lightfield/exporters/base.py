@@ -20,7 +20,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs import BlendCamera, Rig
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
 from lightfield.settings.base import ReaderSettings, Settings
@@ -30,7 +30,9 @@ EXPORTERS: dict[str, "type[Export]"] = {}
 """All exporters by their names."""
 
 PointCount = Annotated[int, Field(ge=1)]
-NO_DEPTH = "holds no depth; give it format: exr"
+# Refusals of views without depth. What to do depends on the source, and scene_yaml.py adds it.
+NO_DEPTH = "holds no depth"
+NOT_EXR = "is not in EXR"
 TO_RECTILINEAR = "reproject to rectilinear"
 
 
@@ -56,6 +58,8 @@ class Export(Settings, ABC):
     is_of_sequence: ClassVar[bool] = False
     # Whether the export has the times of a rolling shutter's rows.
     has_row_times: ClassVar[bool] = False
+    # Whether the export lifts points from the depth of the rendered views.
+    needs_surfaces: ClassVar[bool] = False
     # The lists of an export whose files lie beside the views. A * stands for the part of a split.
     # Other exports have a folder of their own.
     lists_beside_views: ClassVar[Manifest | None] = None
@@ -102,6 +106,11 @@ class Export(Settings, ABC):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
+        if self.is_of_sequence and isinstance(rig, BlendCamera):
+            return (
+                "is of type blend_camera, whose frames are views of one still scene, and this "
+                "export is for sequences; give it a rig of another type with frames"
+            )
         if self.is_of_sequence and (rig.sequence is None or len(rig.sequence.numbers) < 2):
             return (
                 "has fewer than two frames, and this export is for sequences; give the rig frames"

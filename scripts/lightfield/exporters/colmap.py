@@ -107,6 +107,7 @@ class Colmap(ColmapModel):
     rank = 2
     loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
     is_for_training = True
+    needs_surfaces = True
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""

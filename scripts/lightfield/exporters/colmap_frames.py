@@ -23,6 +23,7 @@ class ColmapFrames(ColmapModel):
     loader = "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians"
     is_for_training = True
     is_of_sequence = True
+    needs_surfaces = True
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if not isinstance(lens, Rectilinear):

@@ -38,6 +38,7 @@ class Dnerf(Developed):
     is_for_training = True
     chooses_tests = True
     is_of_sequence = True
+    needs_surfaces = True
 
     points: PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."

@@ -29,7 +29,14 @@ from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, PointCount, angle
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    NOT_EXR,
+    TO_RECTILINEAR,
+    Developed,
+    PointCount,
+    angle,
+)
 from lightfield.formats.depth import check_size
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
@@ -56,6 +63,7 @@ class LichtFeld(Developed):
     loader = "LichtFeld-Studio --data-path {} --output-path output"
     is_for_training = True
     chooses_tests = True
+    needs_surfaces = True
 
     format: Literal["png", "exr"] = Field(
         "png", description="Format of the images. exr keeps linear light, for HDR training."
@@ -90,7 +98,7 @@ class LichtFeld(Developed):
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "exr" and not has_depth:
-            return "is not in EXR; give it format: exr"
+            return NOT_EXR
         return NO_DEPTH if self.depth and not has_depth else None
 
     def export(self, source: SourceDataset, folder: Path) -> None:

@@ -33,6 +33,7 @@ class MultipleView(Developed):
     rank = 15
     loader = "python train.py -s {} --configs arguments/multipleview/default.py  # 4DGaussians"
     is_of_sequence = True
+    needs_surfaces = True
 
     points: PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."

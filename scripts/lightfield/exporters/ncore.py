@@ -123,6 +123,7 @@ class NCore(Developed):
     )
     is_for_training = True
     has_row_times = True
+    needs_surfaces = True
 
     points: PointCount = Field(
         50000, description="Largest number of points, which are computed from depth."

@@ -51,6 +51,7 @@ class Nerfstudio(Developed):
     )
     is_for_training = True
     chooses_tests = True
+    needs_surfaces = True
 
     points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")

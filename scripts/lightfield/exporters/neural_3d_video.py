@@ -36,6 +36,7 @@ class Neural3dVideo(Developed):
     loader = "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians"
     is_for_training = True
     is_of_sequence = True
+    needs_surfaces = True
 
     points: PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."

@@ -16,6 +16,7 @@ class PointCloud(Developed):
     summary = "Point cloud of all surfaces that the views see, for any program."
     rank = 18
     loader = "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')"
+    needs_surfaces = True
 
     voxel: float = Field(
         0.01,

@@ -35,6 +35,7 @@ class ScanNetPP(Developed):
     loader = "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT"
     is_for_training = True
     chooses_tests = True
+    needs_surfaces = True
 
     points: PointCount = Field(
         50000,
