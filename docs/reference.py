@@ -82,6 +82,16 @@ def _export_section(name: str) -> Section:
     return Section(name, model, Developed if issubclass(model, Developed) else Export)
 
 
+def _without_pictures() -> str:
+    """Return the names of the exports on this page that develop no pictures."""
+    *names, last = [
+        f"`{name}`"
+        for name, model in EXPORTERS.items()
+        if name not in SEQUENCE_EXPORTS and not issubclass(model, Developed)
+    ]
+    return f"{', '.join(names)} and {last}"
+
+
 RIG_MODELS = _models(rigs.AnyRig)
 
 
@@ -196,7 +206,7 @@ KEY_PAGES: dict[str, Page] = {
         "The keys of exports",
         "An entry of `exports` in a scene YAML writes files in one format. "
         "[Export formats](export-formats.md) says which programs read each format. All but "
-        "`instant_ngp` and `poses_csv` are exports of pictures, so they have those keys, too.",
+        f"{_without_pictures()} are exports of pictures, so they have those keys, too.",
         [
             Section("exports", Exports),
             Section("All exports", Export),
