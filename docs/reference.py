@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.configuration import (
     config_file,
     corpus,
-    exports,
     family,
     publication,
     render_settings,
@@ -29,12 +28,13 @@ from lightfield.configuration import (
     scene_source,
     scene_yaml,
 )
-from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.json_schema import Generator
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.core.names import ROOT
 from lightfield.core.units import limit
+from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
+from lightfield.exporters.base import Developed, Export
 from lightfield.formats import render_block, sensors
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
@@ -78,9 +78,18 @@ def _literal(model: type[BaseModel], key: str) -> str:
 
 def _export_section(name: str) -> Section:
     """Return the section of an exporter's own keys."""
-    model = exports.settings_of(name)
-    develops = issubclass(model, exports.Developed)
-    return Section(name, model, exports.Developed if develops else exports.Export)
+    model = EXPORTERS[name]
+    return Section(name, model, Developed if issubclass(model, Developed) else Export)
+
+
+def _without_pictures() -> str:
+    """Return the names of the exports on this page that develop no pictures."""
+    *names, last = [
+        f"`{name}`"
+        for name, model in EXPORTERS.items()
+        if name not in SEQUENCE_EXPORTS and not issubclass(model, Developed)
+    ]
+    return f"{', '.join(names)} and {last}"
 
 
 RIG_MODELS = _models(rigs.AnyRig)
@@ -197,16 +206,12 @@ KEY_PAGES: dict[str, Page] = {
         "The keys of exports",
         "An entry of `exports` in a scene YAML writes files in one format. "
         "[Export formats](export-formats.md) says which programs read each format. All but "
-        "`instant_ngp` and `poses_csv` are exports of pictures, so they have those keys, too.",
+        f"{_without_pictures()} are exports of pictures, so they have those keys, too.",
         [
-            Section("exports", exports.Exports),
-            Section("All exports", exports.Export),
-            Section("Exports of pictures", exports.Developed, exports.Export),
-            *[
-                _export_section(name)
-                for name in exports.Exports.model_fields
-                if name not in SEQUENCE_EXPORTS
-            ],
+            Section("exports", Exports),
+            Section("All exports", Export),
+            Section("Exports of pictures", Developed, Export),
+            *[_export_section(name) for name in EXPORTERS if name not in SEQUENCE_EXPORTS],
         ],
     ),
     "sequence-export-keys.md": Page(
@@ -214,7 +219,7 @@ KEY_PAGES: dict[str, Page] = {
         "These entries of `exports` in a scene YAML need a rig with `frames`. Each writes one "
         "export "
         "of all frames. [Train on a sequence](../how-to/train-on-a-sequence.md) shows how.",
-        [Section(name, exports.settings_of(name)) for name in SEQUENCE_EXPORTS],
+        [Section(name, EXPORTERS[name]) for name in SEQUENCE_EXPORTS],
     ),
 }
 

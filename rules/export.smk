@@ -1,66 +1,49 @@
 # Files with which trainers open a dataset.
-from lightfield.configuration.exports import SEQUENCE_EXPORTS
-from lightfield.workflow.jobs import EXPORT, EXPORT_INSTANT_NGP, EXPORT_SEQUENCE
+from lightfield.exporters import BESIDE_VIEWS, SEQUENCE_EXPORTS
+from lightfield.workflow.jobs import EXPORT_RULES, EXPORT_SEQUENCE
 from lightfield.workflow.run import one_of
 
+# The formats that have rules of their own.
+OTHER_EXPORTS = one_of((*SEQUENCE_EXPORTS, *BESIDE_VIEWS))
 
-rule export_to_instant_ngp:
-    input:
-        PLAN.reads(
-            EXPORT_INSTANT_NGP,
-            views=RUN.of_build(RUN.build.receipts),
-            lightfield=RUN.paths.source_lightfield(),
-            trained=RUN.of_build(RUN.build.training_transforms),
-        ),
-    output:
-        transforms=update(RUN.paths.transforms()),
-        receipt=PLAN.receipt_of(EXPORT_INSTANT_NGP),
-        bundle=PLAN.bundle_of(EXPORT_INSTANT_NGP),
-    log:
-        RUN.log_of(EXPORT_INSTANT_NGP),
-    benchmark:
-        RUN.times_of(EXPORT_INSTANT_NGP)
-    localrule: True
-    params:
-        views=RUN.of_build(RUN.build.folder_of_views),
-    message:
-        "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
-    shell:
-        f"python {RUN.scripts}/export_instant_ngp.py"
-        " --settings {input.settings} --input-cfg {input.lightfield} --image-dir {params.views}"
-        " --output {output.transforms} --receipt {output.receipt} > {log} 2>&1"
+# The list of an export lies in a folder named after the format, or beside the views. All paths of a
+# rule must have the same wildcards, so each format beside the views has a rule of its own.
+for NAME, EXPORTED in EXPORT_RULES.items():
 
-
-rule export:
-    input:
-        PLAN.reads(
-            EXPORT,
-            views=RUN.of_build(RUN.build.exported_views),
-            lightfield=RUN.paths.source_lightfield(),
-            dataset=RUN.paths.lightfield,
-        ),
-    output:
-        update(RUN.paths.export_list()),
-        receipt=PLAN.receipt_of(EXPORT),
-        bundle=PLAN.bundle_of(EXPORT),
-    log:
-        RUN.log_of(EXPORT),
-    benchmark:
-        RUN.times_of(EXPORT)
-    wildcard_constraints:
-        format=rf"(?!(?:{one_of([* SEQUENCE_EXPORTS, 'instant_ngp'])})[/.])[a-z0-9_]+",
-    resources:
-        mem_mb=4000,
-        runtime=120,
-    params:
-        dataset=subpath(input.dataset, parent=True),
-        folder=subpath(output[0], parent=True),
-    message:
-        "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
-    shell:
-        f"python {RUN.scripts}/export.py"
-        " {wildcards.format} --settings {input.settings} --dataset {params.dataset}"
-        " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"
+    rule:
+        name:
+            NAME
+        input:
+            PLAN.reads(
+                EXPORTED,
+                views=RUN.of_build(RUN.build.exported_views),
+                lightfield=RUN.paths.source_lightfield(),
+                dataset=RUN.paths.lightfield,
+                training=RUN.of_build(RUN.build.training_lists),
+            ),
+        output:
+            update(EXPORTED.file(RUN.paths)),
+            receipt=PLAN.receipt_of(EXPORTED),
+            bundle=PLAN.bundle_of(EXPORTED),
+        log:
+            RUN.log_of(EXPORTED),
+        benchmark:
+            RUN.times_of(EXPORTED)
+        wildcard_constraints:
+            format=rf"(?!(?:{OTHER_EXPORTS})[/.])[a-z0-9_]+",
+        resources:
+            mem_mb=4000,
+            runtime=120,
+        params:
+            format=EXPORTED.pattern("format"),
+            dataset=subpath(input.dataset, parent=True),
+            folder=subpath(output[0], parent=True),
+        message:
+            "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {params.format}"
+        shell:
+            f"python {RUN.scripts}/export.py"
+            " {params.format} --settings {input.settings} --dataset {params.dataset}"
+            " --output {params.folder} --receipt {output.receipt} > {log} 2>&1"
 
 
 # The frames of a sequence lie in the rig's folder, beside the exports of all of them.

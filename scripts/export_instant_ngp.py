@@ -13,7 +13,7 @@ cannot read lightfield.json.
 """
 
 from lightfield.engine.flags import program
-from lightfield.stages.exports import ExportInstantNgp
+from lightfield.exporters.instant_ngp import TransformsByHand
 
 if __name__ == "__main__":
-    program(ExportInstantNgp, __doc__)
+    program(TransformsByHand, __doc__)

@@ -222,7 +222,7 @@ def test_each_rig_has_the_exports_that_name_it():
         "results/mixed/wide/exports/poses_csv/export.json",
     ]
     # The files of an export do not depend on the rigs that have one, too.
-    settings = job_settings.export(first, "hci", first.exports.hci, "views").as_json()
+    settings = job_settings.export(first, first.exports.hci, "views").as_json()
     assert "rigs" not in settings["options"]
     assert "rigs" not in first.exports.hci.recorded
 

@@ -24,15 +24,13 @@ from oracles import readers
 from pydantic import TypeAdapter
 from sphere import write_views
 
-from lightfield import export
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Energy, load_config
-from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.engine import receipts
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS, MANIFESTS
 from lightfield.formats import published
-from lightfield.formats.export_lists import MANIFESTS
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock
@@ -45,6 +43,7 @@ from lightfield.planning import cost as planning
 from lightfield.planning.cost import rendering
 from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import calibrated
+from lightfield.products import exports
 from lightfield.reprojection import lens_map
 from lightfield.stages.registry import VERSIONS
 from lightfield.validation import splits_check
@@ -668,11 +667,9 @@ def test_a_damaged_export_is_read_or_refused(kind, count, tmp_path):
     source = tmp_path / "dataset"
     camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
     write_views(source, camera, {"type": "plane", "cameras": [2, 2], "size": 0.2})
-    settings = TypeAdapter(settings_of(kind)).validate_python(
-        {"sources": ["views"]} | EXPORTS[kind]
-    )
+    settings = TypeAdapter(EXPORTERS[kind]).validate_python({"sources": ["views"]} | EXPORTS[kind])
     folder = tmp_path / "export"
-    export.run(kind, SourceDataset(source, "", ".exr", {}), settings, folder)
+    exports.run(SourceDataset(source, "", ".exr", {}), settings, folder)
     listed = folder / "export.json"
 
     def read(path, _):

@@ -12,10 +12,11 @@ from checkouts import checkout, snakemake
 from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
 
 from lightfield.configuration import config_file, scene_yaml
-from lightfield.configuration.exports import ExportSettings, settings_of
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
+from lightfield.exporters import EXPORTERS
+from lightfield.exporters.base import ExportSettings
 from lightfield.geometry.rigs import from_settings
 from lightfield.planning.loading import load_datasets
 from lightfield.settings.base import read_settings
@@ -27,8 +28,8 @@ SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 SETTINGS = {
     "reproject.json": Reprojection,
     "mesh.json": MeshSettings,
-    "colmap.json": ExportSettings[settings_of("colmap")],
-    "instant_ngp.json": ExportSettings[settings_of("instant_ngp")],
+    "colmap.json": ExportSettings[EXPORTERS["colmap"]],
+    "instant_ngp.json": ExportSettings[EXPORTERS["instant_ngp"]],
     "costs.json": CostSettings,
     "import_model.json": ImportSettings,
 }

@@ -14,13 +14,13 @@ sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 
 from sphere import LENSES, enlarged, look, look_at_ball, write_views  # noqa: E402
 
-from lightfield import export  # noqa: E402
-from lightfield.configuration.exports import settings_of  # noqa: E402
 from lightfield.configuration.scene_yaml import Credits  # noqa: E402
 from lightfield.core.files import sha256  # noqa: E402
 from lightfield.export.sequence import SourceSequence  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
+from lightfield.exporters import EXPORTERS  # noqa: E402
 from lightfield.formats.lightfield import LightField  # noqa: E402
+from lightfield.products import exports  # noqa: E402
 from lightfield.publishing.publish import publish  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
@@ -75,8 +75,8 @@ def write_sequence(folder: Path) -> None:
         if kind == "neural_3d_video" and shutil.which("ffmpeg") is None:
             print("neural_3d_video: is not written, because ffmpeg is not installed")
             continue
-        settings = settings_of(kind).model_validate({"sources": ["views"], **options})
-        export.run(kind, source, settings, folder / "exports" / kind)
+        settings = EXPORTERS[kind].model_validate({"sources": ["views"], **options})
+        exports.run(source, settings, folder / "exports" / kind)
 
 
 # Cameras that move while their shutters are open.
@@ -91,8 +91,8 @@ def export_moving(folder: Path, motion: dict[str, object]) -> None:
     content = LightField.read(path).changed(render={"camera_motion": motion}).with_exposure()
     content.write(path)
     source = SourceDataset(folder / "dataset", "", ".exr")
-    settings = settings_of("ncore").model_validate({"sources": ["views"], "points": 40000})
-    export.run("ncore", source, settings, folder / "ncore")
+    settings = EXPORTERS["ncore"].model_validate({"sources": ["views"], "points": 40000})
+    exports.run(source, settings, folder / "ncore")
     rays = source.lens.pixel_rays()
     names = [view.name for view in content.views]
     np.savez(
@@ -134,17 +134,17 @@ def main() -> None:
             is_panorama = kind == "lichtfeld" and name == "panorama"
             if kind != "ncore" and not is_panorama:
                 options["depth"] = True
-            settings = settings_of(kind).model_validate(options)
+            settings = EXPORTERS[kind].model_validate(options)
             source = SourceDataset(folder / "dataset", name, ".exr")
-            export.run(kind, source, settings, folder / kind / name)
+            exports.run(source, settings, folder / kind / name)
     for name, motion in MOVING.items():
         export_moving(folder / "moving" / name, motion)
     write_sequence(folder / "sequence")
     publish_views(folder / "publish")
     write_views(folder / "learn" / "dataset", LENSES["perspective"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
-    settings = settings_of("nerfstudio").model_validate({"sources": ["views"], "depth": True})
-    export.run("nerfstudio", source, settings, folder / "learn" / "export")
+    settings = EXPORTERS["nerfstudio"].model_validate({"sources": ["views"], "depth": True})
+    exports.run(source, settings, folder / "learn" / "export")
 
 
 if __name__ == "__main__":

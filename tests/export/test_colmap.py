@@ -11,12 +11,12 @@ import pytest
 from sphere import LENSES, RADIUS, colour_of, look, look_at_ball, write_views
 from test_exports import RIG, VIEWS, exported, on_sphere
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.products import exports
 
 # COLMAP's cameras look along +Z, with Y down.
 FLIP = np.diag([1.0, -1, -1, 1])
@@ -191,8 +191,8 @@ def test_a_model_has_the_views_of_the_rigs_that_test_too(tmp_path, form):
         views |= {f"{prefix}{name}": view for name, view in rig_views.items()}
     beside = {"along": tmp_path / "along/dataset"}
     source = SourceDataset(tmp_path / "around/dataset", "", ".exr", beside)
-    settings = settings_of("colmap")(sources=["views"], points=200, format=form)
-    export.run("colmap", source, settings, tmp_path / "made")
+    settings = EXPORTERS["colmap"](sources=["views"], points=200, format=form)
+    exports.run(source, settings, tmp_path / "made")
     model = read(tmp_path / "made")
     assert_has_the_cameras_of(model, views, lens)
     assert_projects_its_points(model)

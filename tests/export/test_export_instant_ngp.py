@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from lightfield.configuration.exports import ExportSettings, InstantNgp
 from lightfield.core.errors import UserError
 from lightfield.engine.flags import parsed
-from lightfield.export import instant_ngp
+from lightfield.exporters import instant_ngp
+from lightfield.exporters.base import ExportSettings
+from lightfield.exporters.instant_ngp import InstantNgp, TransformsByHand
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images
-from lightfield.stages.exports import ExportInstantNgp
 
 RIG: dict[str, Any] = {
     "type": "cylinder",
@@ -57,7 +57,7 @@ class Dataset:
         """Return the transforms.json that the program writes for these arguments."""
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        parsed(ExportInstantNgp, None, [*map(str, [*paths, *arguments])]).run()
+        parsed(TransformsByHand, None, [*map(str, [*paths, *arguments])]).run()
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -649,7 +649,7 @@ def test_impossible_arguments_are_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        parsed(ExportInstantNgp, None, arguments)
+        parsed(TransformsByHand, None, arguments)
     assert re.search(message, capsys.readouterr().err)
 
 

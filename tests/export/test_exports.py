@@ -15,22 +15,24 @@ import numpy as np
 import OpenEXR
 import pycolmap
 import pytest
+from conftest import SCRIPTS
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
 from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
 
-from lightfield import export
-from lightfield.configuration.exports import EXPORTS, SEQUENCE_EXPORTS, Exports, settings_of
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.export import disparity, hci
+from lightfield.export import disparity
 from lightfield.export.points import evenly, one_a_voxel
 from lightfield.export.source import SeenSurface, SourceDataset
+from lightfield.exporters import BESIDE_VIEWS, EXPORTERS, SEQUENCE_EXPORTS, Exports, hci
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.products import exports
+from lightfield.stages.exports import ExportViews
 from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
@@ -50,12 +52,12 @@ def dataset(tmp_path_factory):
 
 
 def exported(dataset, name, source, tmp_path, **options):
-    model = settings_of(name)
+    model = EXPORTERS[name]
     settings = TypeAdapter(model).validate_python({"sources": [source], **options})
     suffix = ".png" if source == "png" else ".exr"
     folder = tmp_path / name / source
     views = "" if source == "views" else source
-    export.run(name, SourceDataset(dataset, views, suffix), settings, folder)
+    exports.run(SourceDataset(dataset, views, suffix), settings, folder)
     return folder
 
 
@@ -68,8 +70,11 @@ def on_sphere(points, tolerance):
     np.testing.assert_allclose(np.linalg.norm(points, axis=-1), RADIUS, rtol=0, atol=tolerance)
 
 
-def test_the_program_offers_every_export_of_a_scene_yaml():
-    assert {*EXPORTS, "instant_ngp"} == set(Exports.model_fields)
+def test_each_file_of_an_exporter_is_a_key_of_a_scene_yaml_and_a_format_of_the_program():
+    files = {path.stem for path in (SCRIPTS / "lightfield/exporters").glob("*.py")}
+    formats = files - {"__init__", "base"}
+    assert formats == set(Exports.model_fields)
+    assert formats == {*ExportViews.model_fields["format"].json_schema_extra["enum"]}
 
 
 def nerfstudio_rays(content):
@@ -349,7 +354,7 @@ def test_no_far_limit_is_read_as_infinity(depths):
 
 def test_opendibr_takes_lossless_h265_if_ffmpeg_is_installed(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
-    settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})
+    settings = EXPORTERS["opendibr"].model_validate({"sources": ["views"], "format": "h265"})
     assert settings.refusal(lens, True) is None
     folder = exported(dataset, "opendibr", "perspective", tmp_path, format="h265")
     camera = json.loads((folder / "cameras.json").read_text())["cameras"][1]
@@ -813,11 +818,11 @@ def test_the_surface_of_a_dataset_without_its_list_may_be_replaced(beside, tmp_p
     folder = tmp_path / "mesh"
     folder.mkdir()
     (folder / "objects.json").write_text("{}")
-    assert not export.is_mesh_of_dataset(folder)
+    assert not exports.is_mesh_of_dataset(folder)
     (tmp_path / beside).parent.mkdir(exist_ok=True)
     (tmp_path / beside).write_text("")
-    assert export.is_mesh_of_dataset(folder)
-    assert not export.is_mesh_of_dataset(tmp_path / "other")
+    assert exports.is_mesh_of_dataset(folder)
+    assert not exports.is_mesh_of_dataset(tmp_path / "other")
 
 
 def test_an_ncore_sequence_needs_two_views(tmp_path):
@@ -942,11 +947,11 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
     shutil.copytree(dataset / "perspective", tmp_path / "perspective")
     source = SourceDataset(tmp_path, "perspective", ".exr")
     last = source.path(source.lightfield.views[-1])
-    settings = settings_of("nerf_synthetic")(sources=["perspective"])
+    settings = EXPORTERS["nerf_synthetic"](sources=["perspective"])
     last.unlink()
     for problem in ("no such file", "is 9 × 8, but .* says 64 × 48"):
         with pytest.raises(UserError, match=f"{last.name}: {problem}"):
-            export.run("nerf_synthetic", source, settings, tmp_path / "made")
+            exports.run(source, settings, tmp_path / "made")
         assert not (tmp_path / "made").exists()
         images.write_exr(last, dict.fromkeys("RGB", np.zeros((8, 9), np.float32)))
 
@@ -1043,7 +1048,9 @@ def yaml_without_depth(name, camera, **keys):
     }
 
 
-@pytest.mark.parametrize("name", [name for name in EXPORTS if name not in SEQUENCE_EXPORTS])
+@pytest.mark.parametrize(
+    "name", [name for name in EXPORTERS if name not in {*SEQUENCE_EXPORTS, *BESIDE_VIEWS}]
+)
 def test_yaml_refuses_the_exports_that_fail_without_depth(name, tmp_path):
     """An export that works on views without depth is accepted. One that fails is refused."""
     camera = LENSES["fisheye"] if name == "scannetpp" else LENSES["perspective"]
@@ -1148,7 +1155,7 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
     link = tmp_path / "link"
     link.symlink_to(folder)
     source = SourceDataset(dataset, "perspective", ".png")
-    assert export.run("poses_csv", source, settings_of("poses_csv")(sources=["perspective"]), link)
+    exports.run(source, EXPORTERS["poses_csv"](sources=["perspective"]), link)
     assert link.is_symlink()
     assert (folder / "poses.csv").is_file()
 

@@ -15,15 +15,15 @@ from oracles import exported_cameras, exported_depth, exported_pictures
 from pydantic import TypeAdapter
 from sphere import LENSES, look_at_ball, write_views
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.core.files import read_json, write_json
 from lightfield.engine.flags import parsed
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
+from lightfield.exporters.instant_ngp import TransformsByHand
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.imaging import images
-from lightfield.stages.exports import ExportInstantNgp
+from lightfield.products import exports
 from lightfield.validation.files import read_sets
 
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -133,9 +133,9 @@ def home(folder, name):
 
 
 def write_export(folder, name, kind, options, beside=None):
-    settings = TypeAdapter(settings_of(kind)).validate_python({"sources": [name], **options})
+    settings = TypeAdapter(EXPORTERS[kind]).validate_python({"sources": [name], **options})
     source = SourceDataset(folder, "" if name == "views" else name, ".exr", beside or {})
-    export.run(kind, source, settings, home(folder, name) / "exports" / kind)
+    exports.run(source, settings, home(folder, name) / "exports" / kind)
 
 
 def write_instant_ngp(folder, name, arguments):
@@ -145,7 +145,7 @@ def write_instant_ngp(folder, name, arguments):
     files += ["--output", folder_of_set / "transforms.json"]
     files += ["--image-suffix", ".exr", "--image-dir", images]
     files += ["--depth-dir", folder_of_set / "instant_ngp" / "depth"]
-    parsed(ExportInstantNgp, None, [*map(str, files), *arguments]).run()
+    parsed(TransformsByHand, None, [*map(str, files), *arguments]).run()
 
 
 @functools.cache
@@ -168,16 +168,16 @@ def sets_and_lists(folder, name, kind):
 def problems(folder, name, kind):
     """Return what is wrong with the cameras, points and depth of one export."""
     sets, lists = sets_and_lists(folder, name, kind)
-    lines, exports = exported_cameras.check(folder, sets, lists)
-    lines += exported_depth.faults(folder, sets, exports)
+    lines, exported = exported_cameras.check(folder, sets, lists)
+    lines += exported_depth.faults(folder, sets, exported)
     return [line.replace(f"{folder}/", "") for line in lines]
 
 
 def picture_problems(folder, name, kind):
     """Return what is wrong with the pictures of one export."""
     sets, lists = sets_and_lists(folder, name, kind)
-    _, exports = exported_cameras.check(folder, sets, lists)
-    lines = exported_pictures.faults(folder, sets, exports)
+    _, exported = exported_cameras.check(folder, sets, lists)
+    lines = exported_pictures.faults(folder, sets, exported)
     return [line.replace(f"{folder}/", "") for line in lines]
 
 
@@ -322,8 +322,8 @@ def moving(tmp_path_factory):
     path = folder / "lightfield.json"
     motion = {"travel": [0.2, 0, 0], "turn": [0, 20, 0], "rolling": 0.2}
     LightField.read(path).changed(render={"camera_motion": motion}).with_exposure().write(path)
-    settings = settings_of("ncore").model_validate({"sources": ["views"], "points": 50})
-    export.run("ncore", SourceDataset(folder, "", ".exr"), settings, folder / "exports/ncore")
+    settings = EXPORTERS["ncore"].model_validate({"sources": ["views"], "points": 50})
+    exports.run(SourceDataset(folder, "", ".exr"), settings, folder / "exports/ncore")
     return folder
 
 
@@ -441,9 +441,9 @@ def test_developed_and_transparent_pictures_show_their_views(transparent, kind, 
             channels["A"] = alpha
         images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: lightfield.depth})
     options = {"exposure": -2.5, "reinhard": 3}
-    settings = TypeAdapter(settings_of(kind)).validate_python({"sources": ["flat"], **options})
+    settings = TypeAdapter(EXPORTERS[kind]).validate_python({"sources": ["flat"], **options})
     source = SourceDataset(folder, "flat", ".exr", **options)
-    export.run(kind, source, settings, folder / "flat" / "exports" / kind)
+    exports.run(source, settings, folder / "flat" / "exports" / kind)
     assert picture_problems(folder, "flat", kind) == []
 
 

@@ -18,13 +18,13 @@ from sphere import (
     write_views,
 )
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.export.sequence import SourceSequence
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.products import exports
 
 RIG = {"type": "plane", "cameras": [3, 3], "size": 0.6, "center": [0.1, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -60,8 +60,8 @@ def source_of(rig_folder, name="perspective"):
 
 
 def exported(rig_folder, name, folder, **options):
-    settings = settings_of(name)(sources=["perspective"], **options)
-    export.run(name, source_of(rig_folder), settings, folder)
+    settings = EXPORTERS[name](sources=["perspective"], **options)
+    exports.run(source_of(rig_folder), settings, folder)
     return folder
 
 
@@ -329,9 +329,9 @@ def write_moving_ball(folder, camera):
 def test_scene_flow_is_the_motion_of_the_ball_and_0_around_it(camera, tmp_path):
     rig = tmp_path / "rig"
     view, ((_, on_ball), (_, ball_later)) = write_moving_ball(rig, CAMERAS[camera])
-    settings = settings_of("scene_flow")(sources=["views"])
+    settings = EXPORTERS["scene_flow"](sources=["views"])
     source = SourceSequence.of_folders(rig, ["f00001", "f00002"], "", ".exr", {})
-    export.run("scene_flow", source, settings, tmp_path / "flow")
+    exports.run(source, settings, tmp_path / "flow")
     assert not (tmp_path / "flow/f00002").exists()
     image = images.read_image(tmp_path / f"flow/f00001/{view.name}.exr")
     flow = np.stack([image.channels[axis] for axis in "XYZ"], axis=-1)
@@ -355,6 +355,6 @@ def test_scene_flow_needs_every_frame(tmp_path):
     file = tmp_path / "f00002/lightfield.json"
     file.write_text(json.dumps(json.loads(file.read_text()) | {"frame": 4}))
     source = SourceSequence.of_folders(tmp_path, ["f00001", "f00002"], "", ".exr", {})
-    settings = settings_of("scene_flow")(sources=["views"])
+    settings = EXPORTERS["scene_flow"](sources=["views"])
     with pytest.raises(UserError, match="frame 1 is followed by 4"):
-        export.run("scene_flow", source, settings, tmp_path / "flow")
+        exports.run(source, settings, tmp_path / "flow")

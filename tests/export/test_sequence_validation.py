@@ -12,11 +12,11 @@ from oracles import sequence as sequence_oracle
 from oracles.readers.mp4 import read_mp4
 from test_sequence_exports import CAMERAS, FRAMES, source_of, write_moving_ball
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.core.files import sha256
 from lightfield.export.sequence import SourceSequence
+from lightfield.exporters import EXPORTERS
 from lightfield.imaging import images
+from lightfield.products import exports
 from lightfield.validation.sequence import (
     export_lists,
     frame_folders,
@@ -43,14 +43,14 @@ def rigs(sequence, tmp_path_factory):
     """The sequence's rigs with all exports of the views that have no flow."""
     folder = tmp_path_factory.mktemp("exported")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lightfield.export.neural_3d_video.video", video)
+        patch.setattr("lightfield.imaging.video.video", video)
         patch.setattr("shutil.which", lambda name: name)
         for name in ("plain", "split"):
             shutil.copytree(sequence / name, folder / name)
             source = source_of(folder / name)
             for kind in KINDS:
-                settings = settings_of(kind)(sources=["perspective"], **POINTS)
-                export.run(kind, source, settings, folder / name / "perspective/exports" / kind)
+                settings = EXPORTERS[kind](sources=["perspective"], **POINTS)
+                exports.run(source, settings, folder / name / "perspective/exports" / kind)
     return folder
 
 
@@ -65,8 +65,8 @@ def flow(tmp_path_factory):
     rig = tmp_path_factory.mktemp("flow") / "rig"
     view, _ = write_moving_ball(rig, CAMERAS["panorama"])
     source = SourceSequence.of_folders(rig, frame_folders(rig), "", ".exr", {})
-    settings = settings_of("scene_flow")(sources=["views"])
-    export.run("scene_flow", source, settings, rig / "exports/scene_flow")
+    settings = EXPORTERS["scene_flow"](sources=["views"])
+    exports.run(source, settings, rig / "exports/scene_flow")
     return rig, f"exports/scene_flow/f00001/{view.name}.exr"
 
 

@@ -11,17 +11,17 @@ from checkouts import checkout, planned
 from pydantic import TypeAdapter
 from test_exports import RADIUS, VIEWS, ply, write_views
 
-from lightfield import export
 from lightfield.configuration import scene_yaml
-from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.formats.splits_file import splits_content
 from lightfield.geometry import rigs
 from lightfield.planning.loading import scene_datasets
+from lightfield.products import exports
 from lightfield.settings.base import checked
 from lightfield.validation import splits_check
 from lightfield.validation.files import read_sets
@@ -204,9 +204,9 @@ def scene(tmp_path_factory):
 
 
 def exported(scene, name, folder, **options):
-    settings = TypeAdapter(settings_of(name)).validate_python({"sources": ["small"], **options})
+    settings = TypeAdapter(EXPORTERS[name]).validate_python({"sources": ["small"], **options})
     beside = {rig: scene / rig for rig in ("near", "along")}
-    export.run(name, SourceDataset(scene / "around", "small", ".exr", beside), settings, folder)
+    exports.run(SourceDataset(scene / "around", "small", ".exr", beside), settings, folder)
     return folder
 
 
@@ -249,8 +249,8 @@ def test_points_come_only_from_the_training_views(scene, tmp_path):
 
 
 def test_points_of_a_rig_that_only_tests_come_from_all_its_views(scene, tmp_path):
-    settings = settings_of("point_cloud")(sources=["small"], voxel=0.1)
-    export.run("point_cloud", SourceDataset(scene / "along", "small", ".exr"), settings, tmp_path)
+    settings = EXPORTERS["point_cloud"](sources=["small"], voxel=0.1)
+    exports.run(SourceDataset(scene / "along", "small", ".exr"), settings, tmp_path)
     assert len(ply(tmp_path / "points.ply")[0])
 
 

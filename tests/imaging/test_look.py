@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lightfield.configuration.exports import NerfSynthetic, OpenDibr
 from lightfield.configuration.keys import render_key
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
-from lightfield.export import run as export
 from lightfield.export.source import SourceDataset
+from lightfield.exporters.nerf_synthetic import NerfSynthetic
+from lightfield.exporters.opendibr import OpenDibr
 from lightfield.formats import blend
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
@@ -23,6 +23,7 @@ from lightfield.imaging import blender_looks, images
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.imaging.sensor import SensorParameters, light_of
+from lightfield.products.exports import run as export
 from lightfield.validation.validate import validate
 
 SIZE = 32
@@ -258,7 +259,7 @@ def test_an_export_develops_as_a_reprojection_does(tmp_path, develop):
     dataset(tmp_path, transparent=True)
     source = SourceDataset(tmp_path, "", ".exr", exposure=0.5, look_name="Filmic - High Contrast")
     settings = NerfSynthetic(sources=["views"], exposure=0.5, look="Filmic - High Contrast")
-    export("nerf_synthetic", source, settings, tmp_path / "nerf")
+    export(source, settings, tmp_path / "nerf")
     folder = develop(look="Filmic - High Contrast", exposure=0.5)
     exported = next((tmp_path / "nerf").rglob("view_0000f.png"))
     np.testing.assert_array_equal(read(exported, "RGBA"), read(folder / "view_0000f.png", "RGBA"))

@@ -16,7 +16,7 @@ from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
 from lightfield.core.names import PARTS, SPLITS
-from lightfield.formats.export_lists import MANIFESTS
+from lightfield.exporters import MANIFESTS
 from lightfield.formats.layout import ImageSet
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry import rotations

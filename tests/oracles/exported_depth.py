@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.configuration.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.core.errors import UserError
+from lightfield.exporters.instant_ngp import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.formats.layout import ImageSet, rendered
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images

@@ -101,7 +101,7 @@ def without_encoding(file):
 
 
 # Functions with the names of those that read and write text.
-OTHER_CALLS = ("model(source, settings.points).write_text", "tarfile.open", "write_text")
+OTHER_CALLS = ("model(source, self.points).write_text", "tarfile.open", "write_text")
 
 
 def test_code_names_the_encoding_of_each_text():
@@ -161,7 +161,7 @@ def test_promises_are_tested_without_the_mechanisms_that_keep_them():
 # How Python and NumPy open a file, but for writing.
 OPENS = re.compile(r"\.(?:read_bytes|read_text)\(|(?<!tarfile)\.open\((?!\"[wax])|\bnp\.load\(")
 READERS = (
-    *("reading", "reprojection", "validation", "export", "synthesis"),
+    *("reading", "export", "exporters", "products", "reprojection", "validation", "synthesis"),
     *("measurement", "report", "publishing"),
 )
 # Templates of the package, and a file whose bytes are compared right before.
@@ -189,15 +189,17 @@ def test_one_module_writes_times_and_sizes():
 
 
 # The records of jobs, by their names in the rules.
-RECORDS = {name: record for name, record in vars(jobs).items() if isinstance(record, jobs.Job)}
+RECORDS = {name: [record] for name, record in vars(jobs).items() if isinstance(record, jobs.Job)}
+# A rule in a loop has several.
+RECORDS["EXPORTED"] = [*jobs.EXPORT_RULES.values()]
 
 
 def rules_of_records():
     """Yield the text of each rule whose job has a record, and the record."""
     text = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
-    for rule in re.split(r"^(?=rule |use rule )", text, flags=re.M):
+    for rule in re.split(r"^(?=rule |use rule |for )", text, flags=re.M):
         if named := re.search(r"PLAN\.receipt_of\((\w+)\)", rule):
-            yield rule, RECORDS[named[1]]
+            yield from ((rule, record) for record in RECORDS[named[1]])
 
 
 def test_each_record_of_a_job_has_a_rule():
@@ -207,7 +209,7 @@ def test_each_record_of_a_job_has_a_rule():
 def test_a_rule_names_one_record_in_all_its_directives():
     for rule, record in rules_of_records():
         named = re.findall(r"(?:reads|receipt_of|bundle_of|log_of|times_of)\(\s*(\w+)", rule)
-        assert {RECORDS[name].name for name in named} == {record.name}, rule
+        assert len({*named}) == 1 and record in RECORDS[named[0]], rule
         declares_bundle = "PLAN.bundle_of" in rule
         assert declares_bundle == record.has_bundle, record.name
 
@@ -253,6 +255,9 @@ def test_the_files_of_rules_share_only_the_run():
             if token.type == tokenize.NAME and token.string.isupper() and before.string != "."
         }
         own = set(re.findall(r"^(\w+) = ", text, re.M))
+        own |= {
+            name for loop in re.findall(r"^for (.*) in ", text, re.M) for name in loop.split(", ")
+        }
         imports = re.findall(r"^from \S+ import (\([^)]*\)|.*)", text, re.M)
         own |= {name for names in imports for name in re.findall(r"\w+", names)}
         assert constants <= own | SHARED, file

@@ -1,4 +1,4 @@
-"""The diffs in CONTRIBUTING.md apply to the code as it is, and the tests in them pass."""
+"""The diffs in CONTRIBUTING.md apply one after the other, and the tests of the result pass."""
 
 import re
 import shutil
@@ -10,33 +10,67 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DIFFS = re.findall(r"^```diff\n(.*?)^```$", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
+# What belongs to a checkout, and not to the code.
+LEFT_OUT = shutil.ignore_patterns(
+    *(".git", ".venv*", ".snakemake", "__pycache__", ".*_cache", "work", "results", "build", "site")
+)
+TESTS = [
+    ["tests/geometry/test_lenses.py", "-k", "thoby or registry"],
+    ["tests/geometry/test_rigs.py"],
+    ["tests/export/test_exports.py", "-k", "tum or decimals or exporter"],
+    ["tests/configuration/test_mistakes.py", "-k", "arc or decimals or tum"],
+    ["tests/publishing/test_package.py", "-k", "load"],
+    ["tests/core/test_start.py", "-k", "export or schema"],
+    ["tests/project/test_docs.py"],
+    ["tests/project/test_architecture.py"],
+]
 
 
-def test_a_lens_a_setting_and_an_exporter_have_an_example():
-    assert len(DIFFS) == 3
+@pytest.fixture(scope="module")
+def changed(tmp_path_factory):
+    """Return a copy of the code to which all diffs were applied, with new generated files."""
+    folder = tmp_path_factory.mktemp("contributing") / "plenoforge"
+    shutil.copytree(ROOT, folder, ignore=LEFT_OUT)
+    for diff in DIFFS:
+        subprocess.run(["git", "apply", "-"], input=diff, text=True, cwd=folder, check=True)
+    for program in ("scripts/schema.py", "docs/reference.py"):
+        run(folder, program)
+    return folder
+
+
+def run(folder, *words):
+    result = subprocess.run(
+        [sys.executable, *words], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+def added_files():
+    """Return the paths of the Python files that a diff adds or changes."""
+    return sorted(set(re.findall(r"^\+\+\+ b/(.*\.py)$", "\n".join(DIFFS), re.M)))
+
+
+def test_a_lens_a_rig_a_setting_and_an_exporter_have_an_example():
+    assert len(DIFFS) == 4
+
+
+def test_an_exporter_touches_its_file_its_tests_and_a_table():
+    touched = re.findall(r"^\+\+\+ b/(.*)$", DIFFS[3], re.M)
+    code = [path for path in touched if path.startswith(("scripts/", "rules/", "workflow/"))]
+    assert code == ["scripts/lightfield/exporters/tum.py"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "tests"),
-    [
-        (0, ["tests/geometry/test_lenses.py", "-k", "thoby"]),
-        (1, ["tests/export/test_exports.py", "-k", "decimals"]),
-        (2, ["tests/export/test_exports.py", "-k", "tum"]),
-    ],
-    ids=["lens", "setting", "exporter"],
-)
-def test_an_example_applies_and_its_tests_pass(number, tests, tmp_path):
-    for name in ("scripts", "tests", "pyproject.toml"):
-        source = ROOT / name
-        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
-    subprocess.run(["git", "apply", "-"], input=DIFFS[number], text=True, cwd=tmp_path, check=True)
-    result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 0, result.stdout
-    assert " passed" in result.stdout
+def test_the_examples_pass_the_checks_of_make_test(changed):
+    run(changed, "-m", "ruff", "check", ".")
+    run(changed, "-m", "ruff", "format", "--check", ".")
+    library = [path for path in added_files() if path.startswith("scripts/lightfield/")]
+    assert library
+    run(changed, "-m", "mypy", "--num-workers", "0", *library)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tests", TESTS, ids=lambda words: Path(words[0]).stem)
+def test_the_tests_pass_with_all_examples(tests, changed):
+    assert " passed" in run(changed, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests)

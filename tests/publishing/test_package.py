@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 from sphere import write_views
 
-from lightfield.configuration.exports import Exports
 from lightfield.configuration.scene_yaml import load_scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.export import transforms
+from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats.lightfield import LightField
 from lightfield.publishing import package
 from lightfield.stages.publishing import Package, PackSettings
@@ -131,7 +130,8 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
         path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")
     }
     assert instant_ngp_files == {"perspective/transforms.json"}
-    assert transforms(folder) == [folder / path for path in instant_ngp_files]
+    lists = [("instant_ngp", folder / path) for path in instant_ngp_files]
+    assert [*lists_beside_views(folder)] == lists
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
     assert "licence of the scene | CC-BY-4.0" in readme
     credited = load_scene("lone_monk_original")
@@ -158,7 +158,7 @@ def test_a_folder_may_have_any_name_but_must_hold_a_dataset(folder, tmp_path):
 
 
 def test_every_export_has_a_loader():
-    assert package.LOADERS.keys() == {"mesh", *Exports.model_fields}
+    assert package.LOADERS.keys() == {"mesh", *EXPORTERS}
 
 
 def test_an_export_in_a_folder_with_another_name_is_recognised_by_its_list(folder, tmp_path):

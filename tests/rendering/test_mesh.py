@@ -9,12 +9,12 @@ from conftest import BLENDER
 from oracles import readers
 from scipy import ndimage
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.products import exports
 
 FRAME = 2
 RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 0}
@@ -260,8 +260,8 @@ def test_the_oracle_finds_a_moved_object(scene, tmp_path):
 
 
 def test_coco_has_the_box_of_each_object_and_instance_in_each_view(scene, tmp_path):
-    settings = settings_of("coco")(sources=["views"])
-    export.run("coco", SourceDataset(scene, "", ".exr"), settings, tmp_path)
+    settings = EXPORTERS["coco"](sources=["views"])
+    exports.run(SourceDataset(scene, "", ".exr"), settings, tmp_path)
     content = json.loads((tmp_path / "instances.json").read_text())
     names = {category["id"]: category["name"] for category in content["categories"]}
     boxes = {

@@ -12,17 +12,17 @@ from conftest import SMALL_WALK
 from PIL import Image
 from sphere import RADIUS, colour_of, look
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import FLOW, PASSES
 from lightfield.geometry import lenses, overview, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
 from lightfield.imaging.tonemap import decode_srgb
+from lightfield.products import exports
 from lightfield.report import (
     contact_sheet,
     dataset_page,
@@ -102,9 +102,9 @@ def test_the_list_of_files_names_the_exports(tmp_path):
         ("hci", "", {"disparity": "exr"}),
         ("poses_csv", "again", {}),
     ):
-        settings = settings_of(name)(sources=[source or "views"], **options)
+        settings = EXPORTERS[name](sources=[source or "views"], **options)
         folder = tmp_path / source / "exports" / name
-        export.run(name, SourceDataset(tmp_path, source, ".exr"), settings, folder)
+        exports.run(SourceDataset(tmp_path, source, ".exr"), settings, folder)
     write_json(tmp_path / "mesh" / "export.json", {})
     listed = dict(dataset_page.files(tmp_path, lightfield, valid=True))
     assert "HCI" in listed["exports/hci/"]

@@ -8,10 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from lightfield.configuration.exports import NerfSynthetic
 from lightfield.configuration.scene_yaml import Scene
-from lightfield.export import nerf_synthetic
 from lightfield.export.source import SourceDataset
+from lightfield.exporters.nerf_synthetic import NerfSynthetic
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -97,7 +96,7 @@ def test_transparent_views_are_rgba_to_trainers(tmp_path):
     dataset(tmp_path, PERSPECTIVE)
     source = SourceDataset(tmp_path, "", ".exr")
     folder = tmp_path / "nerf"
-    nerf_synthetic.export(source, NerfSynthetic(sources=["views"]), folder)
+    NerfSynthetic(sources=["views"]).export(source, folder)
     pixels = read(next(folder.rglob("view_0000f.png")))
     colour, alpha = disk(source.lens)
     np.testing.assert_allclose(pixels[..., 3], alpha, atol=1 / 255)

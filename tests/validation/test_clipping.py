@@ -7,11 +7,11 @@ import pytest
 from pydantic import TypeAdapter
 from sphere import LENSES, look, write_views
 
-from lightfield import export
-from lightfield.configuration.exports import settings_of
 from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
+from lightfield.products import exports
 from lightfield.validation.validate import validate
 
 RIG = {"type": "plane", "cameras": [3, 3], "size": [0.4, 0, 0.4]}
@@ -33,10 +33,10 @@ def brighter(factor):
 
 def exported(dataset, name, **options):
     """Export the rendered views. Return the part of the pixels that are white in a channel."""
-    settings = TypeAdapter(settings_of(name)).validate_python({"sources": ["views"], **options})
+    settings = TypeAdapter(EXPORTERS[name]).validate_python({"sources": ["views"], **options})
     development = {key: value for key, value in options.items() if key in ("exposure", "reinhard")}
     folder = dataset / "exports" / name
-    export.run(name, SourceDataset(dataset, "", ".exr", **development), settings, folder)
+    exports.run(SourceDataset(dataset, "", ".exr", **development), settings, folder)
     pictures = [images.read_image(path).srgb for path in sorted(folder.rglob("*.png"))]
     return np.mean([(picture == 255).any(axis=-1) for picture in pictures])
 

@@ -12,12 +12,12 @@ from lightfield.configuration import own_builder, scene_yaml
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
-from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
+from lightfield.exporters import BESIDE_VIEWS, Exports
+from lightfield.exporters.base import Export
 from lightfield.formats import passes
-from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
 
@@ -199,11 +199,14 @@ class Dataset(Capture):
         """The checksums of the exports of the whole sequence, if it has any."""
         return self.sequence_paths.sums if self.sequence_exports else None
 
-    def training_transforms(self, prefix: str) -> str | None:
-        """Return the transforms.json that trains the models that this dataset tests."""
-        if self.trained_by is None:
+    def training_list(self, export: Export, source: str) -> str | None:
+        """Return the list of the ``export`` of the views that train what this dataset tests.
+
+        None if the export does not read it.
+        """
+        if self.trained_by is None or not export.reads_training_list:
             return None
-        return replace(self.paths, rig=self.trained_by).transforms(prefix)
+        return replace(self.paths, rig=self.trained_by).export_list(export.name, prefix_of(source))
 
     # Files that a dataset has several of.
 
@@ -254,9 +257,7 @@ class Dataset(Capture):
     def exported(self) -> list[str]:
         """The file of each export and source that its job writes last."""
         return [
-            self.paths.transforms(prefix_of(source))
-            if name == "instant_ngp"
-            else self.paths.export_list(name, prefix_of(source))
+            self.paths.export_list(name, prefix_of(source))
             for name, export in self.exports.selected.items()
             if not export.is_of_sequence
             for source in export.sources
@@ -277,10 +278,13 @@ class Dataset(Capture):
         """All files in which exports list their files. With a split, each part has one, too."""
         lists = [*self.exported, *_present(self.mesh_list)]
         if self.rig.split:
-            for path in self.exported:
-                if not path.endswith(MANIFEST):
-                    stem = path.removesuffix(".json")
-                    lists += [f"{stem}_{part}.json" for part in PARTS]
+            lists += [
+                self.paths.export_list(name, prefix_of(source), part)
+                for name, export in self.exports.selected.items()
+                if name in BESIDE_VIEWS
+                for source in export.sources
+                for part in PARTS
+            ]
         return lists
 
     @property

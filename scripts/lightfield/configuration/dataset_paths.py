@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
 from lightfield.core.names import MESH, SPLITS, VIEWS
 from lightfield.engine.receipts import FOLDER, SUFFIX
+from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
 
 # The pictures of a report.
@@ -159,13 +160,12 @@ class Paths:
         """Return the lightfield.json of a source."""
         return f"{self.folder}/{prefix}lightfield.json"
 
-    def transforms(self, prefix: str = "{source}") -> str:
-        """Return the export of a source to instant-ngp."""
-        return f"{self.folder}/{prefix}transforms.json"
+    def export_list(self, name: str = "{format}", prefix: str = "{source}", part: str = "") -> str:
+        """Return the file in which the job of an export of a source lists its files.
 
-    def export_list(self, name: str = "{format}", prefix: str = "{source}") -> str:
-        """Return the file in which the job of an export of a source lists its files."""
-        return f"{self.folder}/{prefix}exports/{name}/{MANIFEST}"
+        ``part`` is a part of a split, which has a list of its own beside the views.
+        """
+        return f"{self.folder}/{prefix}{list_path(name, part)}"
 
     # Files of the checks and the report.
 

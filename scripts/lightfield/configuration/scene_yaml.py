@@ -15,7 +15,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
-from lightfield.configuration.exports import NO_DEPTH, NOT_EXR, Export, Exports
 from lightfield.configuration.family import Family, stand_in
 from lightfield.configuration.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.configuration.render_settings import Render
@@ -31,6 +30,8 @@ from lightfield.configuration.reprojections import (
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, MESH, PARTS, RENDERED, ROOT, VIEWS
+from lightfield.exporters import Exports
+from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor

@@ -21,7 +21,7 @@ def focal_pixels(lens: Rectilinear | KannalaBrandt) -> tuple[float, float]:
 def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
     """Return fx, fy in pixels and k1 to k4 of OpenCV's fisheye: r = f (θ + k1 θ³ + …).
 
-    Raises TypeError for any other lens: `lightfield.configuration.exports` refuses it before.
+    Raises TypeError for any other lens: the exporter's `refusal` comes before.
     """
     if isinstance(lens, KannalaBrandt):
         return (*focal_pixels(lens), *lens.coefficients)

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.configuration.exports import FARTHEST
 from lightfield.export.source import Floats
+
+FARTHEST = 999.9
+"""Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
 
 
 def depth_range(depth: Floats) -> tuple[float, float]:

@@ -38,6 +38,7 @@ class SourceDataset:
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
     - ``look_name``: the look with which EXR views are developed instead, if they are.
+    - ``training_list``: the list of the export of the views that train, if these views test.
     """
 
     dataset: Path
@@ -48,6 +49,7 @@ class SourceDataset:
     reinhard: float = 1.0
     renamed: Mapping[str, str] = field(default_factory=dict)
     look_name: str | None = None
+    training_list: Path | None = None
 
     @cached_property
     def lightfield(self) -> LightField:

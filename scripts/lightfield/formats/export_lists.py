@@ -13,9 +13,6 @@ MANIFEST = "export.json"
 # The folder of a dataset that holds its exports.
 FOLDER = "exports"
 
-MASK = "dynamic_mask_{view}.png"
-"""The mask beside a PNG view. instant-ngp does not train on pixels where it is above 0."""
-
 
 def files_of(path: Path) -> dict[str, str]:
     """Return the files that an export.json lists, with their SHA-256."""
@@ -30,21 +27,6 @@ def _pictures(path: Path) -> list[str]:
     return [name for name in files_of(path) if name.endswith(".png")]
 
 
-def _pictures_of_transforms(path: Path) -> list[str]:
-    """Return the images that a transforms.json names: views and depth maps."""
-    try:
-        frames = read_json(path)["frames"]
-        depths = [str(frame["depth_path"]) for frame in frames if "depth_path" in frame]
-        return [str(frame["file_path"]) for frame in frames] + depths
-    except (UserError, LookupError, TypeError):
-        raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
-
-
 # The exports with a folder of their own. Exports of a sequence are in the rig's folder.
 IN_FOLDERS = Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=files_of)
-MANIFESTS = [
-    # instant-ngp's files lie beside the views.
-    Manifest("transforms*.json", _pictures_of_transforms, (MASK,)),
-    IN_FOLDERS,
-    Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=files_of),
-]
+OF_MESH = Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=files_of)

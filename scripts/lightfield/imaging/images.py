@@ -2,7 +2,8 @@
 
 The OpenEXR package handles EXR files of one part in scan lines. It has newer codecs, reads twice as
 fast as OpenImageIO, and writes in two thirds of the time. OpenImageIO handles all other images. It
-takes 33 MB of memory, so it is imported only for a file that needs it.
+takes 33 MB of memory. Both are imported only for a file that needs them: scene YAMLs are checked
+with exporters, which import this module.
 """
 
 import re
@@ -14,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, check_readable, open_file
@@ -285,6 +285,8 @@ def is_finished(path: Path, key: str) -> bool:
 
 def check_codec(compression: str) -> None:
     """Raise `UserError` if this version of OpenEXR cannot write one of `CODECS`."""
+    import OpenEXR
+
     if not hasattr(OpenEXR, CODECS[compression]):
         writable = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
         raise UserError(
@@ -307,6 +309,8 @@ def write_exr(
     Lossless (one of `CODECS`), atomic, and without time stamp or host name, so that equal input
     gives equal bytes. Raises `UserError` if the file cannot be written.
     """
+    import OpenEXR
+
     header = {"compression": getattr(OpenEXR, CODECS[compression]), "type": OpenEXR.scanlineimage}
     if chromaticities:
         header[_CHROMATICITIES] = chromaticities
@@ -365,6 +369,8 @@ def _check_exr(path: Path) -> None:
 
     OpenEXR reports no error when it writes the last pixels and the table of chunks.
     """
+    import OpenEXR
+
     try:
         file = OpenEXR.InputFile(str(path))
         is_complete = file.isComplete()
@@ -416,6 +422,8 @@ def _plain_exr_header(path: Path | str) -> Header | None:
 
     Also None for a header with text that is not UTF-8: OpenEXR's InputFile may crash on it.
     """
+    import OpenEXR
+
     try:
         with open_file(path) as file:
             magic, version = struct.unpack("<II", file.read(8))
@@ -467,6 +475,8 @@ def _read_plain_exr(
     rows: tuple[int, int] | None,
 ) -> tuple[Image, list[str]]:
     """Return an EXR's image with the ``channels`` or all, and the names of all its channels."""
+    import OpenEXR
+
     names = [name for name in header.channels if channels is None or name in channels]
     window = header.window
     first, end = window.stored_rows(rows)

@@ -17,12 +17,12 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.engine import receipts
+from lightfield.exporters import BESIDE_VIEWS, list_path
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import FRAME_FOLDERS, IMAGES
 from lightfield.formats.lightfield import MACHINE, NAME, LightField, View
 from lightfield.imaging import images
 
-_TRANSFORMS = "transforms.json"
 _WORK = "work"
 _FRAME = re.compile(r"f\d{5,7}")
 # Keys of lightfield.json that have a form of their own below.
@@ -74,7 +74,7 @@ def read(folder: Path) -> Facts:
         raise UserError(f"{folder}: has no {NAME}; must be the folder of a dataset{hint}")
     settings = _merged(
         [_settings(reprojection_of(place), lightfield) for place, lightfield in lightfields.items()]
-        + [_of_export(path) for path in _lists(folder)]
+        + [_of_export(name, path) for name, path in _lists(folder)]
     )
     inputs = _merged([*map(_inputs, lightfields.values()), *_versions(folder, lightfields)])
     return Facts(folder, lightfields, settings, inputs, _of_receipts(folder, lightfields))
@@ -132,18 +132,19 @@ def _versions(folder: Path, lightfields: Mapping[str, LightField]) -> Iterator[d
                 yield {key: attributes[name] for key, name in names.items() if name in attributes}
 
 
-def _lists(folder: Path) -> Iterator[Path]:
-    """Yield the lists of all exports."""
-    for pattern in (MANIFEST, _TRANSFORMS):
-        yield from sorted(folder.rglob(pattern))
+def _lists(folder: Path) -> Iterator[tuple[str | None, Path]]:
+    """Yield the lists of all exports, each with its format. None for a list that names it."""
+    yield from ((None, path) for path in sorted(folder.rglob(MANIFEST)))
+    for name in BESIDE_VIEWS:
+        yield from ((name, path) for path in sorted(folder.rglob(list_path(name))))
 
 
-def _of_export(path: Path) -> dict[str, Any]:
+def _of_export(name: str | None, path: Path) -> dict[str, Any]:
     """Return the options of an export, from its list."""
     content = read_json(path)
     if not isinstance(content, dict) or "options" not in content:
         return {}
-    name = content.get("format", "instant_ngp")
+    name = name or content["format"]
     prefix = name if name == "mesh" else f"exports.{name}"
     return {prefix: "made"} | _flat(prefix, content["options"])
 

@@ -6,12 +6,12 @@ from typing import Any, Literal
 from lightfield.configuration import blend_lock, scene_yaml
 from lightfield.configuration.config_file import Configuration, Preset
 from lightfield.configuration.dataset import Cluster, Dataset
-from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, VIEWS, scene_folder
+from lightfield.exporters import Exports
 from lightfield.formats import published
 from lightfield.formats.render_block import MeasuredTargetError, RenderBlock, TargetError
 from lightfield.geometry.lenses import CameraSettings

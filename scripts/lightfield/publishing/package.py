@@ -11,7 +11,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
@@ -19,7 +18,7 @@ from lightfield.core.files import atomic_path, open_file, read_json, read_keys, 
 from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
-from lightfield.export import transforms
+from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, lists_beside_views
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_parts
 from lightfield.formats.lightfield import NAME, LightField
@@ -36,31 +35,9 @@ SILVR = (
     "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
 )
 
-# How to load each export. {} stands for the folder that holds it.
-LOADERS = {
-    "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
-    "nerfstudio": "ns-train nerfacto --data {} nerfstudio-data --orientation-method none "
-    "--center-method none --auto-scale-poses False",
-    "nerf_synthetic": "ns-train nerfacto --data {} blender-data",
-    "instant_ngp": "./instant-ngp {}/transforms.json",
-    "opendibr": "./RealtimeDIBR -i {} -j {}/cameras.json",
-    "miv": "Encoder -c {}/sequence.json  # TMIV, with a configuration of its own",
-    "hci": "import configparser\nparameters = configparser.ConfigParser()\n"
-    "parameters.read('{}/parameters.cfg')",
-    "scannetpp": "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT",
-    "ncore": "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
-    " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat",
-    "lichtfeld": "LichtFeld-Studio --data-path {} --output-path output",
-    "dnerf": "python train.py -s {} --configs arguments/dnerf/lego.py  # 4DGaussians",
-    "neural_3d_video": "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians",
-    "colmap_frames": "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians",
-    "multipleview": "python train.py -s {} --configs arguments/multipleview/default.py"
-    "  # 4DGaussians",
-    "scene_flow": "import OpenEXR\nflow = OpenEXR.File('{}/{frame}/{view}.exr').channels()",
-    "coco": "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')",
-    "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
-    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')",
-    "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
+# How to load each export, and the mesh. {} stands for the folder that holds it.
+LOADERS = {name: exporter.loader for name, exporter in EXPORTERS.items()} | {
+    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')"
 }
 
 
@@ -158,8 +135,8 @@ def _loaders(folder: Path, first: Path, view: str) -> Iterator[tuple[str, str]]:
         text = LOADERS[name].replace("{view}", view).replace("{frame}", first.name)
         return text.replace("{}", place.relative_to(folder).as_posix())
 
-    for path in transforms(first):
-        yield path.relative_to(folder).as_posix(), loader("instant_ngp", path.parent)
+    for name, path in lists_beside_views(first):
+        yield path.relative_to(folder).as_posix(), loader(name, path.parent)
     lists = [path for path in files_below(first) if path.name == MANIFEST]
     for path in [*lists, *(_lists_of_sequence(folder) if first != folder else ())]:
         yield path.parent.relative_to(folder).as_posix(), loader(_format(path), path.parent)

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.configuration.exports import Exports
 from lightfield.core import units
 from lightfield.core.files import absolute_path
 from lightfield.core.names import MESH, SPLITS
 from lightfield.engine.read_files import check_since_plan
-from lightfield.export import transforms
+from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats import blend
 from lightfield.formats.export_lists import FOLDER, MANIFEST
 from lightfield.formats.inventory import read_inventory
@@ -92,7 +91,10 @@ def write(job: ReportHtml) -> None:
         measured=measurements,
         costs=tables.costs(report / "costs.json"),
         files=files(folder, lightfield, valid=not validation or validation["valid"]),
-        transforms=[path.relative_to(folder).as_posix() for path in transforms(folder)],
+        beside_views=[
+            (name.replace("_", "-"), path.relative_to(folder).as_posix())
+            for name, path in lists_beside_views(folder)
+        ],
         yaml=job.settings.yaml,
         command=job.settings.command,
     )
@@ -255,7 +257,7 @@ def _exported_files(folder: Path) -> Iterator[tuple[str, str]]:
     for pattern in (f"{FOLDER}/*/{MANIFEST}", f"*/{FOLDER}/*/{MANIFEST}"):
         for path in sorted(folder.glob(pattern)):
             place = path.parent
-            meaning = str(Exports.model_fields[place.name].description).removesuffix(".")
+            meaning = EXPORTERS[place.name].summary.removesuffix(".")
             yield f"{place.relative_to(folder)}/", f"export: {meaning}"
     if (folder / MESH / MANIFEST).is_file():
         yield f"{MESH}/", "the surface that the cameras can see, as meshes"

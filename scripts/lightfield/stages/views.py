@@ -59,7 +59,7 @@ class ComputeFlow(Stage[ReaderSettings]):
     """Computes the optical flow from views of a dataset to their neighbours."""
 
     name = "flow"
-    function = "lightfield.export.flow:write_flow"
+    function = "lightfield.products.flow:write_flow"
 
     settings: ReaderSettings = ReaderSettings()
     lightfield: Path = reads(LIGHTFIELD)
@@ -71,7 +71,7 @@ class ListSplits(PlainStage):
     """Lists which views of a scene's rigs are for training, validation and testing."""
 
     name = "splits"
-    function = "lightfield.export.splits:write_splits"
+    function = "lightfield.products.splits:write_splits"
 
     lightfields: list[Path] = reads("the rigs' lightfield.json files", positional=True)
     output: Path = writes("splits.json to write")

@@ -24,7 +24,7 @@ from lightfield.core.paths import (
     stray_places,
 )
 from lightfield.engine.receipts import Output
-from lightfield.formats.export_lists import MANIFESTS
+from lightfield.exporters import MANIFESTS
 from lightfield.formats.layout import (
     DEPTH_PICTURE,
     IMAGES,

@@ -17,13 +17,13 @@ from typing import TypeVar
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.configuration.dataset import Cluster, Dataset
-from lightfield.configuration.exports import Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import CORPUS, RENDERED, VIEWS, scene_folder
 from lightfield.engine.receipts import FOLDER, SUFFIX
+from lightfield.exporters.base import Export
 from lightfield.planning.cost import Cost, members_cost
 from lightfield.planning.loading import (
     chosen_families,
@@ -142,14 +142,10 @@ class Build:
             files += _views_of_source(test, wildcards)
         return list(dict.fromkeys(files))
 
-    def folder_of_views(self, wildcards: Wildcards) -> str:
-        """Return the folder of the views that an export reads."""
-        source = wildcards["source"].rstrip("/")
-        return f"{self.dataset(wildcards).paths.folder}/{source or 'exr'}"
-
-    def training_transforms(self, wildcards: Wildcards) -> list[str]:
-        """Return the transforms.json of the training views that a dataset tests, if any."""
-        path = self.dataset(wildcards).training_transforms(wildcards["source"])
+    def training_lists(self, wildcards: Wildcards) -> list[str]:
+        """Return the list of the export of the views that train, if a job's export reads it."""
+        dataset = self.dataset(wildcards)
+        path = dataset.training_list(self.export(wildcards), source_of(wildcards))
         return [path] if path else []
 
     @cached_property

@@ -140,18 +140,6 @@ def reproject(build: Build, wildcards: Wildcards) -> Fields:
     }
 
 
-def export_instant_ngp(build: Build, wildcards: Wildcards) -> Fields | None:
-    dataset = build.dataset(wildcards)
-    path = dataset.paths.transforms(wildcards["source"])
-    if path not in dataset.exported:
-        return None
-    return {
-        "input_cfg": dataset.paths.source_lightfield(wildcards["source"]),
-        "output": path,
-        "image_dir": build.folder_of_views(wildcards),
-    }
-
-
 def export(build: Build, wildcards: Wildcards) -> Fields | None:
     dataset = build.dataset(wildcards)
     path = dataset.paths.export_list(wildcards["format"], wildcards["source"])

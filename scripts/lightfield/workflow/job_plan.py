@@ -127,9 +127,9 @@ class JobPlan:
             return Wanted(files, path, content)
 
         def input_function(wildcards: HasWildcards) -> Files:
-            planned = PlannedJob(job, dict(wildcards.items()))
+            planned = PlannedJob(job, job.names(dict(wildcards.items())))
             receipt = self.receipt_path(planned.name)
-            job_reads = wanted(wildcards)
+            job_reads = wanted(planned.names)
             path = job_reads.settings_path
             settings = {"settings": self._settings_file(path, job_reads.settings)} if path else {}
             self.asked[receipt] = planned

@@ -19,8 +19,6 @@ from lightfield.configuration import keys
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.dataset_paths import prefix_of
-from lightfield.configuration.exports import Export, ExportSettings, InstantNgp, export_settings_of
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.configuration.scene_yaml import load_scene, scene_content, scene_path
@@ -28,6 +26,8 @@ from lightfield.configuration.shown_look import shown_look
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
+from lightfield.exporters import export_settings_of
+from lightfield.exporters.base import Export, ExportSettings
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
 from lightfield.planning.loading import datasets_of, rendered_frames
@@ -341,29 +341,21 @@ def synthesis(build: Build, dataset: Dataset) -> SynthesisSettings:
 # Of an export.
 
 
-def export(dataset: Dataset, name: str, options: Export, source: str) -> ExportSettings[Export]:
-    """Return the settings that export a source of a dataset in the format ``name``."""
+def export(dataset: Dataset, options: Export, source: str) -> ExportSettings[Export]:
+    """Return the settings that export a source of a dataset."""
     # In a sequence the frame's folder follows the rig's name.
     folders = {
         rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder
         for rig in dataset.testing_rigs(options)
     }
-    return _export_settings(dataset, name, options, source, tested_by=folders)
-
-
-def instant_ngp(dataset: Dataset, source: str) -> ExportSettings[Export]:
-    """Return the settings that export a source of a dataset for instant-ngp."""
-    # A user may name a transforms.json that the scene YAML does not export.
-    options = dataset.exports.instant_ngp or InstantNgp(sources=[source])
-    transforms = dataset.training_transforms(prefix_of(source))
-    roles = {"trained_by": transforms} if transforms else {}
-    return _export_settings(dataset, "instant_ngp", options, source, **roles)
+    training_list = dataset.training_list(options, source)
+    return _export_settings(dataset, options, source, tested_by=folders, trained_by=training_list)
 
 
 def _export_settings(
-    dataset: Dataset, name: str, options: Export, source: str, **roles: Any
+    dataset: Dataset, options: Export, source: str, **roles: Any
 ) -> ExportSettings[Export]:
-    return export_settings_of(name).of(
+    return export_settings_of(options.name).of(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
         spread_version=keys.VERSIONS["spread"] if _chooses_tests(dataset, options) else None,
@@ -377,7 +369,7 @@ def _export_settings(
 
 def export_of(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     name, source = wildcards["format"], source_of(wildcards)
-    settings = export(build.dataset(wildcards), name, build.export(wildcards), source)
+    settings = export(build.dataset(wildcards), build.export(wildcards), source)
     return f"exports/{source}/{name}", settings
 
 
@@ -389,18 +381,12 @@ def export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     tests = build.testing(first, options)
     settings = _export_settings(
         first,
-        name,
         options,
         source,
         tested_by={test.rig_name: test.sequence_paths.folder for test in tests},
         frames=[Path(frame.paths.folder).name for frame in frames],
     )
     return f"exports/{source}/{name}", settings
-
-
-def instant_ngp_of(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    source = source_of(wildcards)
-    return f"exports/{source}/instant_ngp", instant_ngp(build.dataset(wildcards), source)
 
 
 def validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:

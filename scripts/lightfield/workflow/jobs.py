@@ -14,6 +14,7 @@ from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.core.names import RENDERED, VIEWS
 from lightfield.engine.stage import Stage
+from lightfield.exporters import BESIDE_VIEWS
 from lightfield.formats import passes
 from lightfield.planning import cost
 from lightfield.planning.cost import BLENDER, JOB, Cost
@@ -75,6 +76,16 @@ class Job(NamedTuple):
     is_local: bool = False
     # Whether it renders on the device.
     renders: bool = False
+    # Wildcards that the paths of its files do not have, because its rule is for one value of them.
+    given: tuple[tuple[str, str], ...] = ()
+
+    def names(self, wildcards: Wildcards) -> dict[str, str]:
+        """Return all names of a job, by the wildcards of its files."""
+        return {**dict(self.given), **wildcards}
+
+    def pattern(self, wildcard: str) -> str:
+        """Return a wildcard as the rule's paths have it, or the one value for which the rule is."""
+        return dict(self.given).get(wildcard, f"{{{wildcard}}}")
 
     def name_of(self, dataset: Dataset) -> str:
         """Return the name of a dataset's job."""
@@ -247,18 +258,6 @@ SPLITS = Job(
     fields=fields.splits,
     is_local=True,
 )
-EXPORT_INSTANT_NGP = Job(
-    "{scene}/{rig}/{source}export_instant_ngp",
-    exports.ExportInstantNgp,
-    "exports",
-    _of_dataset(cost.checking),
-    of_others(settings.instant_ngp_of),
-    fields.export_instant_ngp,
-    times="{scene}/{rig}/export/{source}instant_ngp",
-    file=lambda paths: paths.transforms(),
-    has_bundle=True,
-    is_local=True,
-)
 EXPORT = Job(
     "{scene}/{rig}/{source}export_{format}",
     exports.ExportViews,
@@ -270,6 +269,22 @@ EXPORT = Job(
     file=lambda paths: paths.export_list(),
     has_bundle=True,
 )
+
+
+def _export_to(name: str) -> Job:
+    """Return the record of exports to one format, for lists whose paths do not name it."""
+    return EXPORT._replace(
+        name=EXPORT.name.replace("{format}", name),
+        times=EXPORT.times.replace("{format}", name),
+        file=lambda paths: paths.export_list(name),
+        # `EXPORT` stands for all exports of a build.
+        fields=None,
+        given=(("format", name),),
+    )
+
+
+EXPORT_RULES = {"export": EXPORT} | {f"export_to_{name}": _export_to(name) for name in BESIDE_VIEWS}
+"""The records of exports by their rules."""
 EXPORT_SEQUENCE = Job(
     "{scene}/{rig}/{source}sequence_{format}",
     exports.ExportViews,
@@ -424,6 +439,7 @@ SYNTHESIS = Job(
 )
 
 JOBS = [record for record in globals().values() if isinstance(record, Job)]
+JOBS += [record for record in EXPORT_RULES.values() if record is not EXPORT]
 """All jobs, in the order of the work."""
 ORDER = {job: place for place, job in enumerate(JOBS)}
 

@@ -7,7 +7,7 @@ perspective views, and that of distance for all others.
 import math
 from typing import Any
 
-from lightfield.configuration.exports import FARTHEST
+from lightfield.export.disparity import FARTHEST
 from oracles.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from oracles.readers.contents import DepthRange, number, numbers
 

@@ -10,16 +10,18 @@ has the views that see it. One view is enough, because depth says where the poin
 COLMAP's format.rst, scene/reconstruction_io and sensor/models.h.
 """
 
+import math
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from lightfield.configuration.exports import Colmap
 from lightfield.core.files import atomic_path
 from lightfield.export import cameras
 from lightfield.export.pictures import write_pictures
@@ -33,10 +35,13 @@ from lightfield.export.points import (
 )
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, PointCount, angle
 from lightfield.formats.lightfield import View
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 PINHOLE = (1, "PINHOLE")
@@ -49,24 +54,64 @@ EQUIRECTANGULAR = (17, "EQUIRECTANGULAR")
 TESTS = "test.txt"
 
 
-def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
-    """Write the model of a source's views into ``folder``."""
-    problem = cameras.misreading(source.lens)
-    if problem:
-        print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
-    views = source.lightfield.views
-    if any(view.split for view in views):
-        tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
-        _write(folder / "sparse" / "0" / TESTS, tests)
-    colmap_model = model(source, settings.points)
-    write = colmap_model.write_binary if settings.format == "binary" else colmap_model.write_text
-    write(folder / "sparse" / "0")
-    for view, _ in write_pictures(
-        source, folder, "colmap", picture="images/{}.png", mask="masks/{}.png.png"
-    ):
-        if settings.depth:
-            depth_maps = folder / "stereo" / "depth_maps"
-            _write_depth(depth_maps / f"{view.name}.png.geometric.bin", source, view)
+class ColmapModel(Developed):
+    """The options of exports that are COLMAP models."""
+
+    format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
+    points: PointCount = Field(
+        50000,
+        description="Largest number of points, which are computed from depth. An image in which "
+        "none of them lies gets one more.",
+    )
+    depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | KannalaBrandt):
+            # COLMAP projects only points in front of the camera.
+            if lens.fov >= math.pi:
+                return f"{angle(lens)}, but COLMAP's fisheye ends below 180; give it a smaller fov"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
+            if self.depth:
+                return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
+        elif not isinstance(lens, Rectilinear):
+            return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
+        return NO_DEPTH if self.depth and not has_depth else None
+
+    def write_model(self, source: SourceDataset, folder: Path) -> None:
+        """Write the model of a source's views into ``folder``."""
+        problem = cameras.misreading(source.lens)
+        if problem:
+            print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
+        views = source.lightfield.views
+        if any(view.split for view in views):
+            tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
+            _write(folder / "sparse" / "0" / TESTS, tests)
+        colmap_model = model(source, self.points)
+        write = colmap_model.write_binary if self.format == "binary" else colmap_model.write_text
+        write(folder / "sparse" / "0")
+        for view, _ in write_pictures(
+            source, folder, "colmap", picture="images/{}.png", mask="masks/{}.png.png"
+        ):
+            if self.depth:
+                depth_maps = folder / "stereo" / "depth_maps"
+                _write_depth(depth_maps / f"{view.name}.png.geometric.bin", source, view)
+
+
+class Colmap(ColmapModel):
+    """A COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting."""
+
+    name = "colmap"
+    summary = "COLMAP model for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting."
+    rank = 2
+    loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
+    is_for_training = True
+    needs_surfaces = True
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write the model of a source's views into ``folder``."""
+        self.write_model(source, folder)
 
 
 def model(source: SourceDataset, count: int) -> "Model":

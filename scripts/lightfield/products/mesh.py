@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_text
-from lightfield.export import is_mesh_of_dataset, replace_folder
 from lightfield.geometry.mesh import (
     Floats,
     Mesh,
@@ -33,6 +32,7 @@ from lightfield.geometry.mesh import (
     box_around,
     to_world,
 )
+from lightfield.products.exports import is_mesh_of_dataset, replace_folder
 from lightfield.rendering.inspection.visible_meshes import surface_of
 from lightfield.stages.exports import WriteSurface
 

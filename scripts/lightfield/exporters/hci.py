@@ -11,51 +11,92 @@ as `_FOCUS`.
 Source: Honauer et al. 2016, and the benchmark's parameters.
 """
 
+import math
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from lightfield.configuration.exports import Hci
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, write_bytes, write_text
 from lightfield.core.progress import Progress
 from lightfield.export import cameras
 from lightfield.export.source import Floats, SourceDataset
+from lightfield.exporters.base import NO_DEPTH, Developed, centred_pinhole
 from lightfield.formats.lightfield import LightField, View
+from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs.plane import Plane
 from lightfield.imaging import images
 
 _FOCUS = 1e9  # metres
 
 
-def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
-    """Write a source's views into ``folder``."""
-    views, columns, baseline = grid(source.lightfield)
-    lens = source.lens
-    assert isinstance(lens, Rectilinear)
-    middle = len(views) // columns // 2 * columns + columns // 2
-    disparities: list[float] = []
-    progress = Progress(len(views), "hci", "views")
-    for number, view in enumerate(views):
-        source.write_image(view, folder / f"input_Cam{number:03}.png")
-        depth = source.depth(view, "z")
-        with np.errstate(divide="ignore"):
-            disparity = np.nan_to_num(baseline * cameras.focal_pixels(lens)[0] / depth)
-        maps = {"depth": np.where(np.isfinite(depth), depth, 0), "disp": disparity}
-        for name, values in maps.items():
-            _write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
-            if number == middle:
-                _write_pfm(folder / f"gt_{name}_lowres.pfm", values)
-        if settings.disparity == "exr":
-            plane = disparity.astype(np.float32)
-            images.write_exr(folder / f"gt_disp_lowres_Cam{number:03}.exr", {"Y": plane})
-        disparities += [float(np.min(disparity)), float(np.max(disparity))]
-        progress.done()
-    write_text(
-        folder / "parameters.cfg",
-        parameters(source, views[middle], (columns, len(views) // columns), baseline, disparities),
+class Hci(Developed):
+    """The layout of the HCI 4D light field benchmark, with disparities."""
+
+    name = "hci"
+    summary = "Layout of the HCI 4D light field benchmark, for programs that read it."
+    rank = 7
+    loader = (
+        "import configparser\nparameters = configparser.ConfigParser()\n"
+        "parameters.read('{}/parameters.cfg')"
     )
+
+    disparity: Literal["exr"] | None = Field(
+        None,
+        description="exr: also write the disparity maps as EXR, with a channel Y of 32-bit floats, "
+        "in pixels between neighbouring views.",
+    )
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return centred_pinhole(lens) or (None if has_depth else NO_DEPTH)
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if not isinstance(rig, Plane) or rig.cube_map or rig.look_at is not None:
+            return "is not a rig of type plane with parallel cameras, which HCI's layout needs"
+        steps = rig.steps
+        if not steps:
+            return "has only one view"
+        if math.isclose(steps[0], steps[-1], rel_tol=1e-6):
+            return None
+        return (
+            f"has cameras {steps[0]:g} m apart across and {steps[1]:g} m apart down, which are "
+            "equal in HCI's layout; give it a baseline in place of size"
+        )
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write a source's views into ``folder``."""
+        views, columns, baseline = grid(source.lightfield)
+        lens = source.lens
+        assert isinstance(lens, Rectilinear)
+        middle = len(views) // columns // 2 * columns + columns // 2
+        disparities: list[float] = []
+        progress = Progress(len(views), "hci", "views")
+        for number, view in enumerate(views):
+            source.write_image(view, folder / f"input_Cam{number:03}.png")
+            depth = source.depth(view, "z")
+            with np.errstate(divide="ignore"):
+                disparity = np.nan_to_num(baseline * cameras.focal_pixels(lens)[0] / depth)
+            maps = {"depth": np.where(np.isfinite(depth), depth, 0), "disp": disparity}
+            for name, values in maps.items():
+                _write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
+                if number == middle:
+                    _write_pfm(folder / f"gt_{name}_lowres.pfm", values)
+            if self.disparity == "exr":
+                plane = disparity.astype(np.float32)
+                images.write_exr(folder / f"gt_disp_lowres_Cam{number:03}.exr", {"Y": plane})
+            disparities += [float(np.min(disparity)), float(np.max(disparity))]
+            progress.done()
+        write_text(
+            folder / "parameters.cfg",
+            parameters(
+                source, views[middle], (columns, len(views) // columns), baseline, disparities
+            ),
+        )
 
 
 def grid(lightfield: LightField) -> tuple[list[View], int, float]:

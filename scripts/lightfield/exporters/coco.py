@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.configuration.exports import Coco
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.export.source import SourceDataset
+from lightfield.exporters.base import Export
 from lightfield.formats.lightfield import View
 from lightfield.formats.passes import NAMES, PASSES
 from lightfield.imaging import images
@@ -25,55 +25,67 @@ from lightfield.imaging import images
 Numbers = NDArray[np.uint32]
 
 
-def export(source: SourceDataset, settings: Coco, folder: Path) -> None:
-    """Write ``instances.json`` into ``folder``."""
-    lens = source.lens
-    available = {each.name for each in source.lightfield.passes}
-    if "object" not in available:
-        raise UserError(
-            f"{source.lightfield.path}: passes: lack object, from which the boxes are computed; "
-            "add it to render.passes, and to passes of the reprojection"
-        )
-    kind = "instance" if "instance" in available else "object"
-    names = {number: name for name, number in _names(source, kind).items()}
-    images_of_views = []
-    annotations: list[dict[str, Any]] = []
-    progress = Progress(len(source.lightfield.views), "coco", "views")
-    for number, view in enumerate(source.lightfield.views, 1):
-        images_of_views.append(
-            {
-                "id": number,
-                "file_name": source.path(view).name,
-                "width": lens.width,
-                "height": lens.height,
-            }
-        )
-        objects = _pixels(source, view, "object")
-        instances = _pixels(source, view, kind)
-        for shown, category, box, area in _boxes(objects, instances):
-            annotations.append(
+class Coco(Export):
+    """COCO's list of the objects in each view, with their boxes."""
+
+    name = "coco"
+    summary = "Boxes of the objects in each view, for object detectors."
+    rank = 11
+    loader = "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')"
+
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        return ("object",)
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write ``instances.json`` into ``folder``."""
+        lens = source.lens
+        available = {each.name for each in source.lightfield.passes}
+        if "object" not in available:
+            raise UserError(
+                f"{source.lightfield.path}: passes: lack object, from which the boxes are "
+                "computed; add it to render.passes, and to passes of the reprojection"
+            )
+        kind = "instance" if "instance" in available else "object"
+        names = {number: name for name, number in _names(source, kind).items()}
+        images_of_views = []
+        annotations: list[dict[str, Any]] = []
+        progress = Progress(len(source.lightfield.views), "coco", "views")
+        for number, view in enumerate(source.lightfield.views, 1):
+            images_of_views.append(
                 {
-                    "id": len(annotations) + 1,
-                    "image_id": number,
-                    "category_id": category,
-                    "bbox": box,
-                    "area": area,
-                    "iscrowd": 0,
-                    "instance": shown,
-                    "name": names.get(shown, ""),
+                    "id": number,
+                    "file_name": source.path(view).name,
+                    "width": lens.width,
+                    "height": lens.height,
                 }
             )
-        progress.done()
-    categories = [
-        {"id": number, "name": name, "supercategory": "object"}
-        for name, number in _names(source, "object").items()
-    ]
-    content = {
-        "images": images_of_views,
-        "categories": categories,
-        "annotations": annotations,
-    }
-    write_json(folder / "instances.json", content)
+            objects = _pixels(source, view, "object")
+            instances = _pixels(source, view, kind)
+            for shown, category, box, area in _boxes(objects, instances):
+                annotations.append(
+                    {
+                        "id": len(annotations) + 1,
+                        "image_id": number,
+                        "category_id": category,
+                        "bbox": box,
+                        "area": area,
+                        "iscrowd": 0,
+                        "instance": shown,
+                        "name": names.get(shown, ""),
+                    }
+                )
+            progress.done()
+        categories = [
+            {"id": number, "name": name, "supercategory": "object"}
+            for name, number in _names(source, "object").items()
+        ]
+        content = {
+            "images": images_of_views,
+            "categories": categories,
+            "annotations": annotations,
+        }
+        write_json(folder / "instances.json", content)
 
 
 def _names(source: SourceDataset, kind: str) -> dict[str, int]:

@@ -28,8 +28,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
-from lightfield.configuration.exports import NCore
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
@@ -37,6 +37,7 @@ from lightfield.export import cameras
 from lightfield.export.points import Points, lift
 from lightfield.export.source import SourceDataset
 from lightfield.export.zarr_store import ZarrStore
+from lightfield.exporters.base import Developed, PointCount
 from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
@@ -110,50 +111,75 @@ def _row_times(source: SourceDataset) -> tuple[float, float] | None:
     return float(times[0]), float(times[-1])
 
 
-def export(source: SourceDataset, settings: NCore, folder: Path) -> None:
-    """Write a source's views into ``folder``."""
-    views = sorted(source.lightfield.views, key=lambda view: view.name)
-    if len(views) < 2:
-        raise UserError(f"{source.lightfield.path}: frames: has one view; NCore needs two or more")
-    rows = _row_times(source)
-    frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
-    sequence = {
-        "sequence_id": SEQUENCE,
-        # The end is not included.
-        "sequence_timestamp_interval_us": {"start": 0, "stop": max(frames[-1].poses) + 1},
-        "generic_meta_data": {},
-        "version": "v4",
-    }
-    name = f"{SEQUENCE}.ncore4.zarr"
-    store = ZarrStore(folder / name, sequence | {"component_group_name": ""})
-    components = {
-        "cameras": CAMERA,
-        "cuboids": _DEFAULT,
-        "intrinsics": _DEFAULT,
-        "lidars": _LIDAR,
-        "masks": _DEFAULT,
-        "poses": _DEFAULT,
-    }
-    for component, instance in components.items():
-        store.group(component)
-        names = {
-            "component_name": component,
-            "component_instance_name": instance,
-            "component_version": "v1",
+class NCore(Developed):
+    """A sequence of NCore v4, for gsplat and 3DGRUT."""
+
+    name = "ncore"
+    summary = "NCore v4 for gsplat and 3DGRUT, also for fisheyes wider than 180°."
+    rank = 9
+    loader = (
+        "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
+        " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat"
+    )
+    is_for_training = True
+    has_row_times = True
+    needs_surfaces = True
+
+    points: PointCount = Field(
+        50000, description="Largest number of points, which are computed from depth."
+    )
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | Rectilinear):
+            return None
+        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write a source's views into ``folder``."""
+        views = sorted(source.lightfield.views, key=lambda view: view.name)
+        if len(views) < 2:
+            raise UserError(
+                f"{source.lightfield.path}: frames: has one view; NCore needs two or more"
+            )
+        rows = _row_times(source)
+        frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
+        sequence = {
+            "sequence_id": SEQUENCE,
+            # The end is not included.
+            "sequence_timestamp_interval_us": {"start": 0, "stop": max(frames[-1].poses) + 1},
+            "generic_meta_data": {},
+            "version": "v4",
         }
-        store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
-    store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
-    _write_poses(store, frames)
-    _write_lens(store, camera(source.lens, is_rolling=rows is not None))
-    _write_points(store, lift(source, count=settings.points))
-    _write_frames(store, source, frames)
-    digest = store.close()
-    versions = {
-        component: {instance: {"version": "v1", "generic_meta_data": {}}}
-        for component, instance in components.items()
-    }
-    stores = [{"path": name, "md5": digest, "components": versions}]
-    write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
+        name = f"{SEQUENCE}.ncore4.zarr"
+        store = ZarrStore(folder / name, sequence | {"component_group_name": ""})
+        components = {
+            "cameras": CAMERA,
+            "cuboids": _DEFAULT,
+            "intrinsics": _DEFAULT,
+            "lidars": _LIDAR,
+            "masks": _DEFAULT,
+            "poses": _DEFAULT,
+        }
+        for component, instance in components.items():
+            store.group(component)
+            names = {
+                "component_name": component,
+                "component_instance_name": instance,
+                "component_version": "v1",
+            }
+            store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
+        store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
+        _write_poses(store, frames)
+        _write_lens(store, camera(source.lens, is_rolling=rows is not None))
+        _write_points(store, lift(source, count=self.points))
+        _write_frames(store, source, frames)
+        digest = store.close()
+        versions = {
+            component: {instance: {"version": "v1", "generic_meta_data": {}}}
+            for component, instance in components.items()
+        }
+        stores = [{"path": name, "md5": digest, "components": versions}]
+        write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
 
 
 def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Writes transforms.json for instant-ngp: the work of scripts/export_instant_ngp.py."""
+"""Writes transforms.json for instant-ngp, beside the views, and the files that it names."""
 
 # How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``). It negates
 # the Y and Z axes of each camera. It maps a position p to p · ``scale`` + ``offset``. Then it
@@ -9,35 +9,36 @@
 import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter, model_validator
 
-from lightfield.configuration.exports import (
-    BOUNDS_PIXELS,
-    BOUNDS_VIEWS,
-    FARTHEST,
-)
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
-from lightfield.core.names import PARTS
+from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
-from lightfield.export.source import DepthMaps, Floats
+from lightfield.engine.stage import ByHand, Stage, option, reads, writes
+from lightfield.export.disparity import FARTHEST
+from lightfield.export.source import DepthMaps, Floats, SourceDataset
+from lightfield.exporters.base import NO_DEPTH, Export, ExportSettings
 from lightfield.formats.depth import check_size, depth_of
-from lightfield.formats.export_lists import MASK
+from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
-from lightfield.stages.exports import ExportInstantNgp
+from lightfield.settings.base import Vector, as_list, checked
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The rotation from world to NeRF coordinates in SILVR's generate_NERF_transforms.py."""
@@ -45,21 +46,141 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 RIG_PART = 0.2
 """The part of the unit cube's side that the rig fills if the scene's size is unknown."""
 
+MASK = "dynamic_mask_{view}.png"
+"""The mask beside a PNG view. instant-ngp does not train on pixels where it is above 0."""
+
+BOUNDS_VIEWS = 64
+"""The extent of a scene is measured in this many views."""
+BOUNDS_PIXELS = 64
+"""The views that measure a scene's extent have this many pixels along the longer side."""
+
 _DEPTH_UNIT = 0.001  # metres of a step of depth, unless a surface is too far for such steps
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
 
 
-def write(job: ExportInstantNgp) -> None:
+def pictures_of(path: Path) -> list[str]:
+    """Return the images that a transforms.json names: views and depth maps."""
+    try:
+        frames = read_json(path)["frames"]
+        depths = [str(frame["depth_path"]) for frame in frames if "depth_path" in frame]
+        return [str(frame["file_path"]) for frame in frames] + depths
+    except (UserError, LookupError, TypeError):
+        raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
+
+
+class InstantNgp(Export):
+    """The transforms.json of instant-ngp."""
+
+    name = "instant_ngp"
+    summary = "transforms.json for instant-ngp."
+    rank = 1
+    loader = "./instant-ngp {}/transforms.json"
+    # Test views get the scale and offset of the training views.
+    reads_training_list = True
+    lists_beside_views = Manifest("transforms*.json", pictures_of, (MASK,))
+
+    scale: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
+        None,
+        description="Scale from metres to unit cubes. Without this key, it is fitted to the scene.",
+        json_schema_extra={"unit": "cubes/m"},
+    )
+    offset: Vector | None = Field(
+        None,
+        description="Position of the mean camera in the unit cube. Without this key, it is 0.5 "
+        "along each axis.",
+        json_schema_extra={"unit": "cubes"},
+    )
+    bounds: Literal["rig", "depth"] = Field(
+        "rig",
+        description="What the unit cube is fitted to without a scale. rig: the cameras. depth: the "
+        "cameras, and most of the surfaces that the views see.",
+    )
+    aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = Field(
+        None,
+        description="Length of a side of the volume in which instant-ngp trains.",
+        json_schema_extra={"unit": "cubes"},
+    )
+    render_aabb: Annotated[tuple[Vector, Vector], as_list(2)] | None = Field(
+        None,
+        description="Two opposite corners of the part of the unit cube that instant-ngp shows.",
+        json_schema_extra={"unit": "cubes"},
+    )
+    depth: bool = Field(
+        False, description="Also write depth maps of 16 bits. The source must have depth."
+    )
+
+    @model_validator(mode="after")
+    def _one_placement(self) -> Self:
+        if self.scale is not None and self.bounds == "depth":
+            raise ValueError("bounds: does not go with scale, which it would determine")
+        if self.scale is None and self.offset is not None:
+            raise ValueError("offset: needs scale; without scale, both are fitted")
+        if self.render_aabb:
+            lowest, highest = self.render_aabb
+            if any(low >= high for low, high in zip(lowest, highest, strict=True)):
+                raise ValueError("render_aabb: must have the corner of smaller numbers first")
+        return self
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if self.scale is None and self.bounds == "rig" and rig.positions == 1:
+            return "has cameras at one place, which gives no scale; give scale, or bounds: depth"
+        return None
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        options = super().recorded
+        del options["offset"]
+        # Without a scale the offset is fitted, too.
+        return options if self.scale is None else {**options, "offset": list(self.middle)}
+
+    @property
+    def middle(self) -> tuple[float, float, float]:
+        """The mean camera's place in the unit cube, if a scale is given."""
+        return self.offset or (0.5, 0.5, 0.5)
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write transforms.json into ``folder``, and the files that it names."""
+        images_folder = source.path(source.lightfield.views[0]).parent
+        places = _Places.of(folder / "transforms.json", images_folder)
+        _write(self, source.lightfield, source.suffix, places, source.training_list)
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the files of an export lie: the transforms.json, and the folders of other files."""
+
+    output: Path
+    images: Path
+    # Copies of EXR views.
+    exr: Path
+    depth: Path
+
+    @classmethod
+    def of(
+        cls, output: Path, images: Path, exr: Path | None = None, depth: Path | None = None
+    ) -> "_Places":
+        folder = output.parent / "instant_ngp"
+        return cls(output, images, exr or folder, depth or folder / "depth")
+
+
+def _write(
+    options: InstantNgp,
+    lightfield: LightField,
+    suffix: str,
+    places: _Places,
+    training_list: Path | None,
+) -> None:
     """Write a dataset's transforms.json, and the files that it names."""
-    options = job.settings.options
-    lightfield = LightField.read(job.input_cfg)
-    lightfield.require_centre()
-    view_names = {job.output: [view.name for view in lightfield.views]}
+    output = places.output
+    view_names = {output: [view.name for view in lightfield.views]}
     for part in PARTS:
         names = [view.name for view in lightfield.views if view.split == part]
         if names:
-            view_names[job.output.with_stem(f"{job.output.stem}_{part}")] = names
-    writer = _TransformsWriter(job, lightfield)
+            view_names[output.with_stem(f"{output.stem}_{part}")] = names
+    writer = _TransformsWriter(options, lightfield, suffix, places, training_list)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
     common["options"] = options.recorded
@@ -80,15 +201,17 @@ class _TransformsWriter:
 
     def __init__(
         self,
-        job: ExportInstantNgp,
+        options: InstantNgp,
         lightfield: LightField,
+        suffix: str,
+        places: _Places,
+        training_list: Path | None,
     ) -> None:
-        self.output = job.output
-        self.options = job.settings.options
-        self.suffix = job.settings.suffix
-        trained_by = job.settings.trained_by
-        self.trained_by = Path(trained_by) if trained_by else None
+        self.options = options
         self.lightfield = lightfield
+        self.suffix = suffix
+        self.places = places
+        self.training_list = training_list
         self.lens = lightfield.lens
         try:
             self.lens_keys = lens_keys(self.lens)
@@ -96,31 +219,18 @@ class _TransformsWriter:
             raise UserError(f"{lightfield.path}: {error}") from None
         self.rays = self.lens.pixel_rays()
         self.blind = _blind_pixels(self.lens)
-        self.image_dir = job.image_dir or lightfield.folder
-        # The images written so far.
-        self.pictures: list[Path] = []
-        folder = self.output.parent / "instant_ngp"
-        self.exr_dir = job.exr_dir or folder
-        self.depth_dir = job.depth_dir or folder / "depth"
         # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
         # the axis. All other rays have length 1. The loader ignores a depth of 0.
         self.meaning = conventional_depth(self.lens)
-        keep_apart("--output", self.output, job.input_cfg, self.trained_by)
-        if job.depth_dir and not self.options.depth:
-            raise UserError("--depth-dir: needs options.depth: true in the settings file")
-        if self.suffix == ".exr":
-            keep_apart("--exr-dir", self.exr_dir, self.image_dir)
-        elif self.options.depth:
-            keep_apart("--depth-dir", self.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset from the settings, or fit them to depth, or to the rig."""
-        if self.trained_by:
-            training = read_json(self.trained_by)
+        if self.training_list:
+            training = read_json(self.training_list)
             try:
                 return training["scale"], training["offset"]
             except (LookupError, TypeError):
-                raise UserError(f"{self.trained_by}: has no scale and offset") from None
+                raise UserError(f"{self.training_list}: has no scale and offset") from None
         cameras = np.array([view.position for view in self.lightfield.views])
         if self.options.scale is not None:
             return self.options.scale, placed(cameras, self.options.scale, self.options.middle)
@@ -128,7 +238,7 @@ class _TransformsWriter:
             return _fitted_to_rig(cameras, -self.lightfield.world_from_cameras[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
-            raise UserError(f"{self.image_dir}: no view sees anything at a finite depth")
+            raise UserError(f"{self.places.images}: no view sees anything at a finite depth")
         return fitted(*scene_bounds(cameras, points))
 
     def seen_points(self) -> Iterator[Floats]:
@@ -148,7 +258,7 @@ class _TransformsWriter:
         frames = {}
         missing = []
         for view in self.lightfield.views:
-            image = self.image_dir / f"{view.name}{self.suffix}"
+            image = self.places.images / f"{view.name}{self.suffix}"
             if self.suffix == ".exr":
                 image = self.copied_exr(image)
             else:
@@ -160,14 +270,13 @@ class _TransformsWriter:
                 "transform_matrix": transform_matrix(view).tolist(),
             }
             if self.options.depth:
-                path = self.depth_dir / f"{view.name}.png"
+                path = self.places.depth / f"{view.name}.png"
                 self.depth_maps.write(path, self.depth(view, self.meaning))
-                self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
             frames[view.name] = frame
             progress.done()
         if self.options.depth:
-            self.depth_maps.report(self.output)
+            self.depth_maps.report(self.places.output)
         if missing:
             print(
                 f"warning: {len(missing)} images are missing, the first is {missing[0]}",
@@ -189,14 +298,14 @@ class _TransformsWriter:
 
         A folder beside it may be a link, and is a folder in a package.
         """
-        folder = absolute_path(self.output).parent
+        folder = absolute_path(self.places.output).parent
         if absolute_path(path).is_relative_to(folder):
             return absolute_path(path).relative_to(folder).as_posix()
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
 
     def depth(self, view: View, meaning: str) -> Floats:
         """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance"."""
-        path = self.image_dir / f"{view.name}.exr"
+        path = self.places.images / f"{view.name}.exr"
         return depth_of(path, self.lightfield, self.rays, meaning)
 
     def copied_exr(self, source: Path) -> Path:
@@ -211,7 +320,7 @@ class _TransformsWriter:
             raise UserError(f"{source}: has no channel {missing[0]}")
         check_size(source, self.lightfield, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
-        target = self.exr_dir / source.name
+        target = self.places.exr / source.name
         planes = np.moveaxis(image.colour, -1, 0)
         copied = {
             name: np.where(hidden, -1, plane).astype(np.float16)
@@ -220,7 +329,6 @@ class _TransformsWriter:
         if self.lightfield.transparent:
             copied["A"] = channels["A"]
         images.write_exr(target, copied)
-        self.pictures.append(target)
         return target
 
     def write_mask(self, view: View, image: Path) -> None:
@@ -233,7 +341,6 @@ class _TransformsWriter:
                 hidden = hidden | (channels["A"] == 0)
         path = image.with_name(MASK.format(view=view.name))
         if hidden.any():
-            self.pictures.append(path)
             images.write_png(path, np.where(hidden, 255, 0).astype(np.uint8))
         else:
             # A mask here belongs to an earlier lens of the views.
@@ -427,3 +534,103 @@ def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
 
 def _not_followed(reason: str) -> str:
     return f"camera: instant-ngp cannot follow this lens ({reason}); reproject it to rectilinear"
+
+
+# The key that each flag sets, and the value that the flag gives it. Most of these flags have the
+# names of SILVR's generate_NERF_transforms.py.
+_KEYS: dict[str, tuple[str, Callable[[Any], Any]]] = {
+    "image_suffix": ("suffix", str),
+    "placed_as": ("trained_by", str),
+    "scale": ("options.scale", float),
+    "offset": ("options.offset", tuple),
+    "depth_bounds": ("options.bounds", lambda is_given: "depth" if is_given else "rig"),
+    "aabb_scale": ("options.aabb_scale", int),
+    "render_aabb": ("options.render_aabb", lambda corners: (corners[:3], corners[3:])),
+    "depth_dir": ("options.depth", lambda _: True),
+}
+
+
+class _SilvrFlags(ByHand):
+    """An export for instant-ngp in SILVR's words."""
+
+    image_suffix: Literal[".png", ".exr"] = option("suffix of the views", ".png")
+    scale: Annotated[float, Field(gt=0)] | None = option(
+        "scale from metres to unit cubes (default: fitted to the scene)", None
+    )
+    offset: tuple[float, float, float] | None = option(
+        "position of the mean camera in the unit cube, with --scale (default: 0.5 0.5 0.5)",
+        None,
+        metavar=("X", "Y", "Z"),
+    )
+    depth_bounds: bool = option(
+        "fit the unit cube to the cameras and nine tenths of the points in channel Z of the .exr "
+        "views (default: the rig fills a fifth of the cube, or all if it looks inward)",
+        False,
+    )
+    aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = option(
+        "side of the training volume in unit cubes (instant-ngp's default: 1)", None
+    )
+    render_aabb: tuple[float, float, float, float, float, float] | None = option(
+        "two opposite corners of the part of the unit cube that instant-ngp shows",
+        None,
+        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+    )
+    placed_as: str | None = option(
+        "take scale and offset from this transforms.json, which lists the training views",
+        None,
+        metavar="TRANSFORMS",
+    )
+
+    def settings(self, given: Mapping[str, Any]) -> ExportSettings[InstantNgp]:
+        if self.scale is None and self.offset is not None:
+            raise UserError("--offset: needs --scale; without --scale, both are fitted")
+        flags = {**given, **dict(self)}
+        content: dict[str, Any] = {"options": {"sources": [VIEWS]}}
+        for flag, (key, value_of) in _KEYS.items():
+            if flags.get(flag) is not None:
+                block, _, name = key.rpartition(".")
+                (content[block] if block else content)[name] = value_of(flags[flag])
+        return checked(TypeAdapter(ExportSettings[InstantNgp]), content, "flags")
+
+
+class TransformsByHand(Stage[ExportSettings[InstantNgp]]):
+    """Writes a transforms.json by hand, for views in any folder."""
+
+    name = "export_instant_ngp"
+    function = "lightfield.exporters.instant_ngp:write_by_hand"
+    by_hand = _SilvrFlags
+
+    input_cfg: Path = reads("lightfield.json of the views")
+    output: Path = writes("transforms.json to write")
+    image_dir: Path | None = reads("folder of the views (default: the folder of --input-cfg)", None)
+    exr_dir: Path | None = writes(
+        "folder for the copies of EXR views (default: instant_ngp beside --output)", None
+    )
+    depth_dir: Path | None = writes(
+        "folder for depth maps (16-bit PNG in steps of integer_depth_scale), which are made from "
+        "channel Z of the .exr views (default, if the settings file asks for them: "
+        "instant_ngp/depth beside --output)",
+        None,
+    )
+
+    def made(self) -> Iterator[Path]:
+        # Masks lie beside the views, and the lists of a split beside the output.
+        yield from super().made()
+        yield self.output.parent
+
+
+def write_by_hand(job: TransformsByHand) -> None:
+    """Write the transforms.json that the flags describe."""
+    options, suffix = job.settings.options, job.settings.suffix
+    training_list = Path(job.settings.trained_by) if job.settings.trained_by else None
+    lightfield = LightField.read(job.input_cfg)
+    lightfield.require_centre()
+    places = _Places.of(job.output, job.image_dir or lightfield.folder, job.exr_dir, job.depth_dir)
+    keep_apart("--output", job.output, job.input_cfg, training_list)
+    if job.depth_dir and not options.depth:
+        raise UserError("--depth-dir: needs options.depth: true in the settings file")
+    if suffix == ".exr":
+        keep_apart("--exr-dir", places.exr, places.images)
+    elif options.depth:
+        keep_apart("--depth-dir", places.depth, places.images)
+    _write(options, lightfield, suffix, places, training_list)

@@ -14,13 +14,14 @@ LichtFeld finds masks, depth and normals by the image's name without its suffix.
 Studio's transforms.cpp, blender_loader.cpp, filesystem_utils.hpp and image_exr.cpp.
 """
 
+import math
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from lightfield.configuration.exports import LichtFeld
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, write_json, write_text
 from lightfield.export import cameras
@@ -28,10 +29,20 @@ from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    NOT_EXR,
+    TO_RECTILINEAR,
+    Developed,
+    PointCount,
+    angle,
+)
 from lightfield.formats.depth import check_size
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
@@ -43,34 +54,81 @@ MOST = np.iinfo(np.uint16).max
 _FLIP = np.array([1.0, -1.0, -1.0])
 
 
-def export(source: SourceDataset, settings: LichtFeld, folder: Path) -> None:
-    """Write a source's views into ``folder``."""
-    views = sorted(source.lightfield.views, key=lambda view: view.name)
-    suffix = f".{settings.format}"
-    frames = []
-    picture = f"images/{{}}{suffix}"
-    for view, _ in write_pictures(
-        source,
-        folder,
-        "lichtfeld",
-        picture=picture,
-        mask="masks/{}.png",
-        views=views,
-        write=partial(_write_exr, source) if settings.format == "exr" else None,
-    ):
-        if settings.depth:
-            images.write_png(folder / "depth" / f"{view.name}.png", _depth(source, view))
-        if settings.normals:
-            images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
-        path = picture.format(view.name)
-        frames.append({"file_path": path, "transform_matrix": view.world_from_camera.tolist()})
-    write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
-    parts = splits(source.lightfield)
-    for part, part_views in (("train", parts.train), ("test", parts.test)):
-        names = "".join(f"{view.name}{suffix}\n" for view in part_views)
-        write_text(folder / f"{part}.txt", names)
-    content = {**camera(source.lens), "ply_file_path": POINT_CLOUD, "frames": frames}
-    write_json(folder / "transforms.json", content)
+class LichtFeld(Developed):
+    """A dataset for LichtFeld Studio."""
+
+    name = "lichtfeld"
+    summary = "Dataset for LichtFeld Studio."
+    rank = 10
+    loader = "LichtFeld-Studio --data-path {} --output-path output"
+    is_for_training = True
+    chooses_tests = True
+    needs_surfaces = True
+
+    format: Literal["png", "exr"] = Field(
+        "png", description="Format of the images. exr keeps linear light, for HDR training."
+    )
+    points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
+    depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
+    normals: bool = Field(
+        False, description="Also write normals. The source must have the pass normal."
+    )
+
+    @model_validator(mode="after")
+    def _look_is_of_png(self) -> Self:
+        if self.look and self.format == "exr":
+            raise ValueError("look: is only for format png; an EXR keeps the light")
+        return self
+
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        return ("normal",) if self.normals else ()
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | KannalaBrandt):
+            if lens.fov >= math.pi:
+                return f"{angle(lens)}, but LichtFeld's ends below 180; give it a smaller fov"
+            if isinstance(lens, KannalaBrandt) and lens.coefficients[3] != 0:
+                return "has a fourth coefficient, which LichtFeld drops; reproject to equidistant"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; LichtFeld takes whole ones; {TO_RECTILINEAR}"
+            if self.depth:
+                return "is a panorama, which has no depth along an axis; leave out depth: true"
+        elif not isinstance(lens, Rectilinear):
+            return f"has a lens that LichtFeld lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+        if self.format == "exr" and not has_depth:
+            return NOT_EXR
+        return NO_DEPTH if self.depth and not has_depth else None
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write a source's views into ``folder``."""
+        views = sorted(source.lightfield.views, key=lambda view: view.name)
+        suffix = f".{self.format}"
+        frames = []
+        picture = f"images/{{}}{suffix}"
+        for view, _ in write_pictures(
+            source,
+            folder,
+            "lichtfeld",
+            picture=picture,
+            mask="masks/{}.png",
+            views=views,
+            write=partial(_write_exr, source) if self.format == "exr" else None,
+        ):
+            if self.depth:
+                images.write_png(folder / "depth" / f"{view.name}.png", _depth(source, view))
+            if self.normals:
+                images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
+            path = picture.format(view.name)
+            frames.append({"file_path": path, "transform_matrix": view.world_from_camera.tolist()})
+        write_ply(folder / POINT_CLOUD, lift(source, count=self.points))
+        parts = splits(source.lightfield)
+        for part, part_views in (("train", parts.train), ("test", parts.test)):
+            names = "".join(f"{view.name}{suffix}\n" for view in part_views)
+            write_text(folder / f"{part}.txt", names)
+        content = {**camera(source.lens), "ply_file_path": POINT_CLOUD, "frames": frames}
+        write_json(folder / "transforms.json", content)
 
 
 def camera(lens: Lens) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""The files that are made from finished views and scenes: exports, flow, splits and surfaces."""
