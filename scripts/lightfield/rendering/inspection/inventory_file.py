@@ -75,7 +75,8 @@ def write_of_datasets(
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
         unknown_to_blender = unknown_colours.of_scene(unknown)
         try:
-            contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+            facts = blend_facts.facts(camera_frames, _is_blurred(written))
+            contents = {"blend": facts | {"layers": layers}}
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         if unknown_to_blender:
@@ -145,6 +146,12 @@ def _print_notes(
     uses_look = any(dataset.uses_file_look for dataset in datasets)
     notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera, followed, uses_look)
     print(f"note: {path}: {' · '.join(notes)}")
+
+
+def _is_blurred(written: scene_yaml.Scene | None) -> bool:
+    """Return whether a scene YAML turns motion blur on, by objects or by cameras."""
+    render = written.render if written else None
+    return bool(render and (render.motion_blur or render.camera_motion))
 
 
 def _refuse_fluids(path: Path) -> None:
