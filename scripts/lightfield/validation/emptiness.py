@@ -11,7 +11,7 @@ from lightfield.core.files import read_json
 from lightfield.formats import lightfield
 from lightfield.formats.layout import File, ImageSet
 from lightfield.geometry import framing
-from lightfield.validation.pixels import Facts
+from lightfield.validation.pixels import ImageFacts
 from lightfield.validation.result import Check
 
 # The name of the check.
@@ -19,7 +19,10 @@ NAME = "surfaces"
 
 
 def checks(
-    image_set: ImageSet, facts: Mapping[File, Facts], clearance: Path | None, volumes: Sequence[str]
+    image_set: ImageSet,
+    facts: Mapping[File, ImageFacts],
+    clearance: Path | None,
+    volumes: Sequence[str],
 ) -> list[Check]:
     """Return a check if no view of a rendered set shows a surface. Empty if any does, or may.
 
