@@ -8,12 +8,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from lightfield.configuration import own_builder, scene_yaml
+from lightfield.configuration import own_builder
 from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.scene_blocks import Flow, MeshFiles
 from lightfield.core.names import FILE, PARTS, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
@@ -42,8 +43,8 @@ class Dataset(Capture):
     rig_name: str
     rig_folder: str
     reprojections: dict[str, Reprojection]
-    flow: scene_yaml.Flow | None
-    mesh: scene_yaml.MeshFiles | None
+    flow: Flow | None
+    mesh: MeshFiles | None
     exports: Exports
     # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool

@@ -10,6 +10,8 @@ from lightfield.configuration.exports import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.scene_blocks import MeshFiles
+from lightfield.configuration.scene_checks.rigs import FLOW_PLACES
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, VIEWS, scene_folder
 from lightfield.formats import published
@@ -181,7 +183,7 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
     if written.flow and rig.is_at_one_place():
         raise scene_yaml.mistake(
             scene,
-            f"flow: {scene_yaml.FLOW_PLACES}, but the preset {preset} leaves one of rigs.{name}; "
+            f"flow: {FLOW_PLACES}, but the preset {preset} leaves one of rigs.{name}; "
             "let the preset have more views",
         )
     return rig
@@ -227,7 +229,7 @@ def _check_limited_exports(scene: str, name: str, preset: str, rig: Rig, exports
             )
 
 
-def _mesh_of(name: str, written: scene_yaml.Scene) -> scene_yaml.MeshFiles | None:
+def _mesh_of(name: str, written: scene_yaml.Scene) -> MeshFiles | None:
     """Return which meshes a rig's dataset holds, if any."""
     mesh = written.mesh
     return mesh if mesh and name in (mesh.rigs or written.rigs) else None
