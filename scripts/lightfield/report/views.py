@@ -19,7 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
-from lightfield.measurement.noise import relative_noise
+from lightfield.imaging.noise import relative_noise
 from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,
