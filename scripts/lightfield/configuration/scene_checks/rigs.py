@@ -1,6 +1,7 @@
 """Checks each rig with its camera, its file and what the other blocks make of its views."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from lightfield.configuration.publication import PUBLISHED_FOLDER
@@ -9,7 +10,7 @@ from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks.names import check_folder
 from lightfield.core.names import FILE
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
-from lightfield.geometry.lenses import LENSES, Lens
+from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
@@ -24,6 +25,8 @@ _BLENDER_LIMITS = {
     "fisheye_fov": (0.1745, 31.4159, math.pi / 180, "fov in degrees"),
     "fisheye_lens": (0.01, 100.0, 1.0, "focal length in mm"),
 }
+# Blender makes each side of a smaller image so long.
+SMALLEST_IMAGE = 4
 # Planning more frames or views than these would take hours.
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
@@ -67,7 +70,7 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
             f"must be one of {lenses} (reproject for the others)"
         )
     if blocks.render:
-        _check_blender_limits(f"{key}.camera", lens)
+        _check_blender_limits(f"{key}.camera", camera)
     if blocks.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
         raise ValueError(
             f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
@@ -106,9 +109,24 @@ def _check_without_centre(blocks: SceneBlocks, key: str, name: str) -> None:
             raise ValueError(f"reprojections.{reprojection_name}: {refusal}")
 
 
-def _check_blender_limits(key: str, lens: Lens) -> None:
+def small_image(resolution: Sequence[int]) -> str | None:
+    """Return what is wrong with an image that is smaller than Blender's smallest. Or None."""
+    if min(resolution) >= SMALLEST_IMAGE:
+        return None
+    least = f"{SMALLEST_IMAGE} × {SMALLEST_IMAGE}"
+    return f"is {[*resolution]}; must be at least {least} pixels, the smallest image of Blender"
+
+
+def _check_blender_limits(key: str, settings: CameraSettings) -> None:
     """Refuse a value outside Blender's limits, which Blender would clamp."""
+    if problem := small_image(settings.resolution):
+        raise ValueError(f"{key}.resolution: {problem}")
+    lens = settings.make()
     camera = lens.to_lightfield()["camera"]
+    fov = getattr(settings, "fov", None)
+    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and fov:
+        widest = math.degrees(2 * math.atan(lens.sensor[0] / 2))
+        raise ValueError(f"{key}.fov: is {fov:g}; must be at most {widest:.4g} in Blender")
     for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:
