@@ -34,7 +34,7 @@ _KEYS_OF_VIEWS = ("scene.", "rig.", *_RESULTS_OF_RIG, "camera.", "render.", "dep
 # The name of the scene YAML. It changes no pixel.
 _NAME = "scene.name"
 _SPLIT = "split"
-# The blocks of settings in their order in the output. Other keys come after those of render.
+# The blocks of settings in their order in the output. Other keys come after the keys of render.
 _BLOCKS = ("scene", "rig", *_RESULTS_OF_RIG, _SPLIT, "camera", "render", "", "reprojections")
 # Inputs that change last digits only.
 _MACHINES = ("bpy", "machine")

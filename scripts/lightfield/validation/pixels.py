@@ -502,7 +502,7 @@ def of_passes(facts: Mapping[File, ImageFacts], missing: Sequence[str]) -> Check
             lost[file.of_pass.name] += fact.nan
     for name, number in lost.items():
         check.warnings.append(
-            f"{number} values in {name} were not numbers to Cycles and are 0, as those of bumped "
+            f"{number} values in {name} were not numbers to Cycles and are 0, as on bumped "
             "surfaces at the rim of an image circle"
         )
     return check

@@ -279,7 +279,7 @@ def _render_view(
 class _ViewFiles:
     """Writes the files of rendered views into ``folder`` and beside it, and notes them.
 
-    The seconds of a view count from the view before, so that those of all views add up.
+    The seconds of a view count from the view before, so that the seconds of all views add up.
     """
 
     def __init__(self, lightfield: LightField, folder: Path, progress: Progress) -> None:
