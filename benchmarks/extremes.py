@@ -572,13 +572,14 @@ def render(case: Case, folder: Path) -> tuple[Render, list[str], list[str]]:
         render=RENDER | {"samples": case.samples, "depth_precision": "float"} | dict(case.render),
     )
     view = lightfield.views[0]
-    cycles.set_up(path, None, lightfield, "cpu", 1)
+    opened = cycles.set_up(path, None, lightfield, "cpu", 1)
     positions = view.position[None]
     distances = surroundings(positions).distances
     warned = list(limits.warnings(positions, distances))
     refused = ["inside geometry"] if distances[0] < TOUCHING else []
-    geometry = render_geometry(view.world_from_camera)
-    channels, attributes = shard.colour_channels(render_colour(view.world_from_camera, 1).pixels)
+    geometry = render_geometry(opened, view.world_from_camera)
+    colour_pass = render_colour(opened, view.world_from_camera, 1)
+    channels, attributes = shard.colour_channels(colour_pass.pixels)
     clamped = int(attributes[images.CLAMPED_ATTRIBUTE])
     if clamped:
         warned.append(f"{clamped} values were clamped to the half range")

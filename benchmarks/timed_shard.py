@@ -166,13 +166,13 @@ def change_set_up(cycles: Any, job: TimedShard, clock: Clock) -> None:
     def set_up(*arguments: Any) -> Any:
         import bpy
 
-        device = function(*arguments)
+        opened = function(*arguments)
         # Opening a scene has removed earlier handlers.
         watch_blender(clock)
         bpy.context.scene.cycles.denoising_use_gpu = job.denoise_on_gpu
         if job.osl:
             see_through_shader(bpy.context.scene.camera.data, lens)
-        return device
+        return opened
 
     cycles.set_up = set_up
 

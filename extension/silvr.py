@@ -70,7 +70,7 @@ def rigs(scene: Any) -> Iterator[tuple[str, dict[str, Any], tuple[Any, Any, Any]
 
 
 def _groups(scene: Any) -> list[Mapping[str, Any]]:
-    """Return the properties of each light field. Blender 5 keeps those of add-ons apart."""
+    """Return the properties of each light field. Blender 5 keeps an add-on's properties apart."""
     return list(scene.bl_system_properties_get().get(PROPERTY) or scene.get(PROPERTY) or ())
 
 

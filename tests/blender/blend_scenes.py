@@ -351,6 +351,21 @@ def move_the_camera():
     scene.frame_set(1)
 
 
+def move_the_camera_without_blur():
+    """Let the camera travel as `move_the_camera` does, in a file without motion blur."""
+    import bpy
+
+    move_the_camera()
+    bpy.context.scene.render.use_motion_blur = False
+
+
+def blur():
+    """Turn motion blur on."""
+    import bpy
+
+    bpy.context.scene.render.use_motion_blur = True
+
+
 def open_the_shutter_late():
     import bpy
 

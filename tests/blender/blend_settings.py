@@ -184,7 +184,14 @@ ROWS = [
                 scenes.move_the_camera,
                 scenes.blurred_cube,
                 note="movement of the camera during the exposure ignored",
-            )
+            ),
+            Case(
+                scenes.move_the_camera_without_blur,
+                scenes.blurred_cube,
+                {"render": {"motion_blur": True}},
+                scenes.blur,
+                note="movement of the camera during the exposure ignored",
+            ),
         ],
         "a view's camera stands still",
         "`render: {camera_motion: …}`",

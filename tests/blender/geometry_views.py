@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 
 from lightfield.formats.lightfield import LightField
-from lightfield.rendering.scenes import blend_file, ids
+from lightfield.rendering.scenes import blend_file
 from lightfield.rendering.setup import cycles
 from lightfield.rendering.views import shard
 from lightfield.rendering.views.colour_pass import render_colour
@@ -174,20 +174,20 @@ def main(folder: Path, cases: Path) -> None:
             blend_file.save_scene(path)
         lightfield = LightField.from_json(content)
         pose = lightfield.views[0].world_from_camera
-        cycles.set_up(path, None, lightfield, "cpu", 1)
-        results[f"{name}.alone"] = render_colour(pose, 1).pixels
+        opened = cycles.set_up(path, None, lightfield, "cpu", 1)
+        results[f"{name}.alone"] = render_colour(opened, pose, 1).pixels
         # The first geometry follows a new session, the second a colour render. Both must be equal.
-        cycles.set_up(path, None, lightfield, "cpu", 1)
+        opened = cycles.set_up(path, None, lightfield, "cpu", 1)
         for _ in range(2):
-            geometry = render_geometry(pose, ["normal", "object", "material"])
-            colour = render_colour(pose, 1)
+            geometry = render_geometry(opened, pose, ["normal", "object", "material"])
+            colour = render_colour(opened, pose, 1)
         rays = shard.depth_rays(lightfield)
         results[f"{name}.z"] = shard.depth_channel(geometry.depth, lightfield, rays)
         results[f"{name}.normal"] = geometry.passes["normal"]
         results[f"{name}.objects"] = geometry.passes["object"]
         results[f"{name}.materials"] = geometry.passes["material"]
         for kind in ("object", "material"):
-            results[f"{name}.{kind}_names"] = np.array(list(ids.names(kind)))
+            results[f"{name}.{kind}_names"] = np.array(list(opened.names(kind)))
         results[f"{name}.colour"] = colour.pixels
     np.savez(folder / "views.npz", **results)
 

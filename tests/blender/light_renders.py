@@ -292,8 +292,9 @@ def rendered(path):
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [16, 8]})
     rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0, -2, 1.5]}
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=FRAME, render=RENDER)
-    cycles.set_up(path, None, lightfield, "cpu", 1)
-    return float(render_colour(lightfield.views[0].world_from_camera, 1).pixels.max())
+    opened = cycles.set_up(path, None, lightfield, "cpu", 1)
+    pose = lightfield.views[0].world_from_camera
+    return float(render_colour(opened, pose, 1).pixels.max())
 
 
 def main():

@@ -58,17 +58,18 @@ def lightfield(camera, motion):
 
 def set_up(camera=CAMERA, **motion):
     content = lightfield(camera, motion)
-    cycles.set_up(FOLDER / "wall.blend", None, content, "cpu", 1)
+    opened = cycles.set_up(FOLDER / "wall.blend", None, content, "cpu", 1)
     # The mean of a pixel's square.
     bpy.context.scene.cycles.pixel_filter_type = "BOX"
     bpy.context.scene.cycles.filter_width = 1.0
+    return opened
 
 
-def red(matrix, seed=0):
-    return render_colour(matrix, seed).pixels[..., 0]
+def red(opened, matrix, seed=0):
+    return render_colour(opened, matrix, seed).pixels[..., 0]
 
 
-def sub_frames(motion):
+def sub_frames(opened, motion):
     """Return the mean of still pictures at equal steps of the exposure.
 
     Together they have four times the samples of a blurred picture.
@@ -76,44 +77,44 @@ def sub_frames(motion):
     bpy.context.scene.cycles.samples = RENDER["samples"] * 4 // SUB_FRAMES
     times = (np.arange(SUB_FRAMES) + 0.5) / SUB_FRAMES - 0.5
     poses = [pose_at(np.eye(4), motion["travel"], motion["turn"], time) for time in times]
-    mean = np.mean([red(pose, seed) for seed, pose in enumerate(poses)], axis=0)
+    mean = np.mean([red(opened, pose, seed) for seed, pose in enumerate(poses)], axis=0)
     bpy.context.scene.cycles.samples = RENDER["samples"]
     return mean
 
 
 build()
 pictures = {}
-set_up()
-pictures["still"] = red(np.eye(4))
+opened = set_up()
+pictures["still"] = red(opened, np.eye(4))
 for name, motion in (("travel", TRAVEL), ("turn", TURN)):
-    pictures[f"{name}_sub_frames"] = sub_frames(motion)
-pictures["depth_still"] = render_geometry(np.eye(4)).depth
+    pictures[f"{name}_sub_frames"] = sub_frames(opened, motion)
+pictures["depth_still"] = render_geometry(opened, np.eye(4)).depth
 for name, motion in (("travel", TRAVEL), ("turn", TURN)):
-    set_up(**motion)
-    pictures[name] = red(np.eye(4))
-pictures["depth"] = render_geometry(np.eye(4)).depth
+    opened = set_up(**motion)
+    pictures[name] = red(opened, np.eye(4))
+pictures["depth"] = render_geometry(opened, np.eye(4)).depth
 # Another pose, and back: the keys of one view must not stay in the next.
-red(pose_at(np.eye(4), (1, 0, 0), (0, 30, 0), 1))
-pictures["turn_again"] = red(np.eye(4))
+red(opened, pose_at(np.eye(4), (1, 0, 0), (0, 30, 0), 1))
+pictures["turn_again"] = red(opened, np.eye(4))
 for rolling in (0.01, 0.5):
-    set_up(**TRAVEL, rolling=rolling)
-    pictures[f"rolling_{rolling}"] = red(np.eye(4))
+    opened = set_up(**TRAVEL, rolling=rolling)
+    pictures[f"rolling_{rolling}"] = red(opened, np.eye(4))
 # Wide lenses: a turn about the camera's right moves the horizon.
 TILT = {"travel": [0.1, 0, 0], "turn": [8, 4, 0]}
 for name, camera in WIDE.items():
-    set_up(camera)
-    pictures[f"{name}_still"] = red(np.eye(4))
-    pictures[f"{name}_sub_frames"] = sub_frames(TILT)
+    opened = set_up(camera)
+    pictures[f"{name}_still"] = red(opened, np.eye(4))
+    pictures[f"{name}_sub_frames"] = sub_frames(opened, TILT)
     times = row_times(len(pictures[f"{name}_still"]), 0.01)
     rows = []
     for row, moment in enumerate(times):
         cycles.set_window(0, row, SIZE, 1)
-        rows.append(red(pose_at(np.eye(4), TILT["travel"], TILT["turn"], moment)))
+        rows.append(red(opened, pose_at(np.eye(4), TILT["travel"], TILT["turn"], moment)))
     pictures[f"{name}_rows"] = np.concatenate(rows)
-    set_up(camera, **TILT)
-    pictures[name] = red(np.eye(4))
-    set_up(camera, **TILT, rolling=0.01)
-    pictures[f"{name}_rolling"] = red(np.eye(4))
+    opened = set_up(camera, **TILT)
+    pictures[name] = red(opened, np.eye(4))
+    opened = set_up(camera, **TILT, rolling=0.01)
+    pictures[f"{name}_rolling"] = red(opened, np.eye(4))
 # A window of a view, as measurements of error and time render it.
 blend_file.open_scene(FOLDER / "wall.blend")
 contents = {"left_out": ["animation"], "sampling": cycles.sampling(), "volumes": []}

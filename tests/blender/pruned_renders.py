@@ -159,9 +159,11 @@ def rendered(path, scene_inventory=None, frame=FRAME, seeds=((0, 1), (1, 1)), sa
     lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=render)
     if scene_inventory:
         scene_inventory = scene_inventory | {"left_out": pruning.left_out(scene_inventory)}
-    cycles.set_up(path, scene_inventory, lightfield, "cpu", 1)
+    opened = cycles.set_up(path, scene_inventory, lightfield, "cpu", 1)
     poses = [(lightfield.views[number].world_from_camera, seed) for number, seed in seeds]
-    views = [(render_colour(pose, seed), render_geometry(pose)) for pose, seed in poses]
+    views = [
+        (render_colour(opened, pose, seed), render_geometry(opened, pose)) for pose, seed in poses
+    ]
     return np.stack([np.dstack([colour.pixels, geometry.depth]) for colour, geometry in views])
 
 

@@ -23,14 +23,14 @@ def main(blend: Path, output: Path, cases: Path) -> None:
     results = {}
     for name, content in json.loads(cases.read_text()).items():
         lightfield = LightField.from_json(content)
-        cycles.set_up(blend, None, lightfield, "cpu", 1)
+        opened = cycles.set_up(blend, None, lightfield, "cpu", 1)
         pose = lightfield.views[0].world_from_camera
-        depth = geometry_pass.render_geometry(pose).depth
+        depth = geometry_pass.render_geometry(opened, pose).depth
         z = shard.depth_channel(depth, lightfield, shard.depth_rays(lightfield))
         results[f"{name}.z"] = z.astype(np.float64)
         layer = bpy.context.scene.view_layers[0]
         layer.use_pass_position = layer.use_pass_z = True
-        passes = render_view(pose, 0, {"Position": "XYZ", "Depth": "Z"}).passes
+        passes = render_view(opened, pose, 0, {"Position": "XYZ", "Depth": "Z"}).passes
         missed = passes["Depth"] >= geometry_pass.MISS
         results[f"{name}.points"] = np.where(missed, np.nan, passes["Position"])
     np.savez(output, **results)

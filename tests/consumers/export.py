@@ -14,7 +14,7 @@ sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 
 from sphere import LENSES, enlarged, look, look_at_ball, write_views  # noqa: E402
 
-from lightfield.configuration.scene_yaml import Credits  # noqa: E402
+from lightfield.configuration.publication import Credits  # noqa: E402
 from lightfield.core.files import sha256  # noqa: E402
 from lightfield.export.sequence import SourceSequence  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402

@@ -2,6 +2,8 @@
 
 import json
 import os
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -100,3 +102,57 @@ def test_a_job_does_not_keep_a_receipt_that_names_files_of_others():
         receipt.seal()
     with opened() as receipt:
         assert not receipt.still_holds()
+
+
+def batch(count):
+    """Make files, each from a file of a user, by ``count`` jobs. Return the files' names."""
+    names = [f"made/{count}/{number}.txt" for number in range(count)]
+    Path(f"made/{count}").mkdir(parents=True)
+    for number, name in enumerate(names):
+        path = Path(f"work/receipts/made/{count}/{number}.jsonl")
+        user_file = Path(f"user/{count}/{number}.txt")
+        user_file.parent.mkdir(parents=True, exist_ok=True)
+        user_file.write_text(name)
+        header = {"stage": "job", "version": 1, "settings": {}}
+        with receipts.opened(path, header, [Path(name)]) as receipt:
+            receipts.note_inputs([user_file])
+            Path(name).write_text(name)
+            receipt.note_kept(Path(name))
+            receipt.seal()
+    return names
+
+
+def calls_of(function):
+    """Return how many functions of Python a function calls."""
+    count = 0
+
+    def note(_frame, event, _argument):
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(note)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_twice_as_many_inputs_are_twice_the_work():
+    """A corpus notes thousands of files, and the files from which they were made."""
+    calls = {}
+    for count in (1, 100, 200):
+        names = batch(count)
+        user_files = [name.replace("made", "user") for name in names]
+        receipts.input_sum(names[0])
+        with opened():
+            calls[count] = calls_of(partial(receipts.note_inputs, names + user_files))
+    assert calls[200] < 2.3 * calls[100]
+
+
+def test_a_users_file_that_changed_since_another_input_was_made_is_named():
+    (name,) = batch(1)
+    Path("user/1/0.txt").write_text("changed")
+    for inputs in ([name, "user/1/0.txt"], ["user/1/0.txt", name]):
+        with opened(), pytest.raises(UserError, match=r"^user/1/0\.txt: has changed"):
+            receipts.note_inputs(inputs)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightfield.measurement import noise
+from lightfield.imaging import noise
 
 
 def test_noise_is_measured_and_smooth_light_has_none():

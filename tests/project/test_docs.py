@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 import lightfield
-from lightfield.configuration import reprojections, scene_yaml
+from lightfield.configuration import reprojections
 from lightfield.configuration.keys import VERSIONS as VIEW_VERSIONS
+from lightfield.configuration.scene_checks import rigs
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.geometry import frames
 from lightfield.geometry.rigs.poses import LARGEST_FILE
@@ -196,7 +197,7 @@ def test_the_page_of_changes_has_each_version_of_stages_and_of_views():
 
 def test_the_page_of_limits_has_the_numbers_of_the_code():
     text = (DOCS / "reference/limits.md").read_text()
-    both = f"{scene_yaml.MOST_VIEWS:,}, {scene_yaml.MOST_FRAMES:,}"
+    both = f"{rigs.MOST_VIEWS:,}, {rigs.MOST_FRAMES:,}"
     for name, limit in [
         ("views of a dataset", f"{frames.MOST_VIEWS:,}"),
         ("views of a scene YAML, frames of a sequence", both),

@@ -198,12 +198,22 @@ def test_a_page_of_views_that_contradict_each_other_is_not_called_valid(tiny_bui
     assert f"\n{VALID}" not in result.stderr
 
 
-def test_a_note_of_snakemake_that_is_no_text_is_named(tiny_build):
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"\xff\xfe", "is not text"),
+        (b'"x"', "is no note of Snakemake"),
+        (b"[1]", "is no note of Snakemake"),
+        (b"[" * 100_000, "is no note of Snakemake"),
+    ],
+    ids=["bytes", "text", "list", "deep"],
+)
+def test_a_note_of_snakemake_that_is_none_is_named(tiny_build, content, problem):
     note = next((tiny_build / ".snakemake/metadata").iterdir())
-    note.write_bytes(b"\xff\xfe")
+    note.write_bytes(content)
     result = snakemake(tiny_build, *tiny.CHOSEN, "--dry-run")
     assert result.returncode == 1
-    assert f"error: .snakemake/metadata/{note.name}: is not text" in result.stderr
+    assert f"error: .snakemake/metadata/{note.name}: {problem}" in result.stderr
     assert "Traceback" not in result.stderr
     (remedy,) = re.findall(r"(rm -r \S+);", result.stderr)
     subprocess.run(remedy, shell=True, cwd=tiny_build, check=True)

@@ -18,8 +18,7 @@ from markdown_it import MarkdownIt
 from PIL import Image
 from sphere import LENSES, write_views
 
-from lightfield.configuration.publication import DOCUMENTS
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import DOCUMENTS, Credits
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.engine.bundles import VARIABLE

@@ -14,7 +14,7 @@ from reading.test_reading import CAMERA, CREDITS, RIG, finish, write_dataset, wr
 from sphere import LENSES, make_transparent, write_views
 
 from lightfield import open_dataset
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import Credits
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.cube_map import CubeMap

@@ -18,7 +18,7 @@ from checkouts import ROOT
 from sphere import LENSES, RADIUS, colour_of, write_views
 
 from lightfield import open_corpus, open_dataset
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import Credits
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField

@@ -15,16 +15,15 @@ POSE = np.array([[1, 0, 0, 0], [0, 0, -1, -4], [0, 1, 0, 0], [0, 0, 0, 1]], floa
 
 
 @pytest.fixture
-def render(tmp_path):
-    """Return a function that renders a cube which moves along x, in a scene with some change."""
+def set_up(tmp_path):
+    """Return a function that opens a scene with some change, and a cube which moves along x."""
     import bpy
 
     from lightfield.rendering.inspection import inventory
     from lightfield.rendering.scenes import blend_file
     from lightfield.rendering.setup import cycles, pruning
-    from lightfield.rendering.views.colour_pass import render_colour
 
-    def render(change=None, prunes=False, **settings):
+    def set_up(change=None, prunes=False, **settings):
         blend_file.new_scene()
         scene = bpy.context.scene
         scene.world = bpy.data.worlds.new("grey")
@@ -46,10 +45,17 @@ def render(tmp_path):
         lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [40, 30]})
         rig = {"type": "lattice", "cameras": [1, 1, 1], "size": 0}
         views = LightField.from_rig(rig, lens, depth="z", frame=1, render=RENDER | settings)
-        cycles.set_up(path, content, views, "cpu", 1)
-        return render_colour(POSE, 0).pixels
+        return cycles.set_up(path, content, views, "cpu", 1)
 
-    return render
+    return set_up
+
+
+@pytest.fixture
+def render(set_up):
+    """Return a function that renders what `set_up` opens."""
+    from lightfield.rendering.views.colour_pass import render_colour
+
+    return lambda *change, **settings: render_colour(set_up(*change, **settings), POSE, 0).pixels
 
 
 def leave_out_blur(scene, layer):
@@ -82,21 +88,21 @@ def test_an_empty_in_place_of_a_camera_is_none(render):
 
 
 @pytest.mark.parametrize("size", [(22, 23), (29, 37), (97, 61)])
-def test_a_window_of_a_view_of_any_size_has_the_pixels_of_the_whole(render, size):
+def test_a_window_of_a_view_of_any_size_has_the_pixels_of_the_whole(set_up, size):
     import bpy
 
     from lightfield.rendering.setup import cycles
     from lightfield.rendering.views.colour_pass import render_colour
 
-    render()
+    opened = set_up()
     width, height = size
     bpy.context.scene.render.resolution_x = width
     bpy.context.scene.render.resolution_y = height
-    full_view = render_colour(POSE, 0).pixels
+    full_view = render_colour(opened, POSE, 0).pixels
     assert full_view.shape == (height, width, 3)
     for x, y in ((13, 3), (3, 9), (15, 14), (width - 7, height - 6), (0, 0)):
         cycles.set_window(x, y, 7, 6)
-        window = render_colour(POSE, 0).pixels
+        window = render_colour(opened, POSE, 0).pixels
         np.testing.assert_array_equal(window, full_view[y : y + 6, x : x + 7])
 
 
@@ -121,16 +127,17 @@ def cover_with_muted_fog(scene, layer):
     add_fog(material).is_muted = True
 
 
-def test_a_muted_volume_stays_muted_in_all_views(render):
+def test_a_muted_volume_stays_muted_in_all_views(set_up):
     from lightfield.rendering.views.colour_pass import render_colour
     from lightfield.rendering.views.geometry_pass import render_geometry
 
-    first = render(cover_with_muted_fog)
-    render_geometry(POSE)
-    np.testing.assert_array_equal(render_colour(POSE, 0).pixels, first)
+    opened = set_up(cover_with_muted_fog)
+    first = render_colour(opened, POSE, 0).pixels
+    render_geometry(opened, POSE)
+    np.testing.assert_array_equal(render_colour(opened, POSE, 0).pixels, first)
 
 
-def test_depth_sees_through_fog_with_a_muted_surface(render):
+def test_depth_sees_through_fog_with_a_muted_surface(set_up):
     from lightfield.rendering.views.geometry_pass import render_geometry
 
     def mute_the_surface(scene, layer):
@@ -141,13 +148,12 @@ def test_depth_sees_through_fog_with_a_muted_surface(render):
         output.inputs["Volume"].links[0].is_muted = False
         output.inputs["Surface"].links[0].is_muted = True
 
-    render()
-    expected = render_geometry(POSE).depth
-    render(mute_the_surface)
-    np.testing.assert_array_equal(render_geometry(POSE).depth, expected)
+    expected = render_geometry(set_up(), POSE).depth
+    opened = set_up(mute_the_surface)
+    np.testing.assert_array_equal(render_geometry(opened, POSE).depth, expected)
 
 
-def test_depth_sees_through_the_fog_of_a_layers_world(render):
+def test_depth_sees_through_the_fog_of_a_layers_world(set_up):
     import bpy
 
     from lightfield.rendering.views.geometry_pass import render_geometry
@@ -156,10 +162,9 @@ def test_depth_sees_through_the_fog_of_a_layers_world(render):
         layer.world_override = bpy.data.worlds.new("fog")
         add_fog(layer.world_override)
 
-    render()
-    expected = render_geometry(POSE).depth
-    render(override)
-    np.testing.assert_array_equal(render_geometry(POSE).depth, expected)
+    expected = render_geometry(set_up(), POSE).depth
+    opened = set_up(override)
+    np.testing.assert_array_equal(render_geometry(opened, POSE).depth, expected)
 
 
 @pytest.mark.parametrize("kind", ["world", "material"])

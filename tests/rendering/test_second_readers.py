@@ -111,3 +111,18 @@ def test_long_files_are_read_in_parts(tmp_path, monkeypatch, suffix):
     (mesh,) = reading.read(path, "z", 1).meshes
     assert (mesh.triangles, mesh.area) == (whole.triangles, pytest.approx(whole.area))
     np.testing.assert_allclose(mesh.box, SPHERE.bounds, atol=1e-6)
+
+
+def test_a_usd_that_changes_is_read_again(tmp_path):
+    """A family reads many models in one process, and a user may change one meanwhile."""
+    path = tmp_path / "a.usda"
+    for size in (1.0, 5.0):
+        points = ", ".join(f"({size * x}, {y}, {z})" for x, y, z in SPHERE.vertices)
+        path.write_text(
+            '#usda 1.0\n(\nmetersPerUnit = 1\nupAxis = "Z"\n)\ndef Mesh "a" {\n'
+            f"int[] faceVertexCounts = {[3] * len(SPHERE.faces)}\n"
+            f"int[] faceVertexIndices = {SPHERE.faces.ravel().tolist()}\n"
+            f"point3f[] points = [{points}]\n}}\n"
+        )
+        (mesh,) = reading.read(path, "z", 1).meshes
+        np.testing.assert_allclose(mesh.box, SPHERE.bounds * (size, 1, 1), rtol=1e-6)

@@ -24,7 +24,7 @@ TILE = 32
 
 @pytest.fixture
 def set_up(room):
-    """Return a function that opens the room for a view of a camera, and returns the view."""
+    """Return a function that opens the room for a camera, and returns the scene and its views."""
     from lightfield.rendering.setup import cycles
 
     def open_room(camera, path=room, device="cpu", **settings):
@@ -32,21 +32,20 @@ def set_up(room):
         rig = {"type": "plane", "cameras": [1, 1], "center": [0, 0, 1.5]}
         depth = "z" if lens.has_z_depth else "distance"
         lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1, render=RENDER | settings)
-        cycles.set_up(path, None, lightfield, device, 1)
-        return lightfield
+        return cycles.set_up(path, None, lightfield, device, 1), lightfield
 
     return open_room
 
 
-def images(lightfield):
+def images(opened, lightfield):
     """Return all images of the open scene's first view by name."""
     from lightfield.rendering.views.colour_pass import render_colour
     from lightfield.rendering.views.geometry_pass import render_geometry
 
     pose = lightfield.views[0].world_from_camera
     names = [each.name for each in lightfield.passes if not each.of_colour]
-    geometry = render_geometry(pose, names)
-    colour = render_colour(pose, 1, lightfield.passes)
+    geometry = render_geometry(opened, pose, names)
+    colour = render_colour(opened, pose, 1, lightfield.passes)
     return {"colour": colour.pixels, "depth": geometry.depth, **colour.passes, **geometry.passes}
 
 
@@ -68,11 +67,11 @@ def test_tiles_change_no_pixel(set_up, camera, window, settings):
 
     rendered = []
     for tile in (2048, TILE):
-        lightfield = set_up(camera, **settings)
+        opened = set_up(camera, **settings)
         bpy.context.scene.cycles.tile_size = tile
         if window:
             cycles.set_window(*window)
-        rendered.append(images(lightfield))
+        rendered.append(images(*opened))
     np.testing.assert_equal(rendered[1], rendered[0])
 
 
@@ -82,10 +81,10 @@ def test_a_blends_own_tiles_do_not_change_a_denoised_view(set_up, room, tmp_path
     from lightfield.rendering.scenes import blend_file
 
     # Tiles of 32² change the last digits of this view after denoising.
-    expected = images(set_up("small fisheye", denoise=True))
+    expected = images(*set_up("small fisheye", denoise=True))
     bpy.context.scene.cycles.tile_size = TILE
     blend_file.save_scene(tmp_path / "tiles.blend")
-    changed = images(set_up("small fisheye", tmp_path / "tiles.blend", denoise=True))
+    changed = images(*set_up("small fisheye", tmp_path / "tiles.blend", denoise=True))
     np.testing.assert_equal(changed, expected)
 
 

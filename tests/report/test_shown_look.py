@@ -14,7 +14,8 @@ from PIL import Image
 from sphere import look_at_ball, write_views
 from test_walk import EYE, RIG, look_from, matrix_of, psnr, wait
 
-from lightfield.configuration.scene_yaml import Credits, Scene
+from lightfield.configuration.publication import Credits
+from lightfield.configuration.scene_yaml import Scene
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.files import sha256, write_json
 from lightfield.export.source import SourceDataset

@@ -17,7 +17,7 @@ from checkouts import ROOT
 from reading.test_reading import CREDITS
 from test_report_html import SPHERE, make_page, write_dataset
 
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import Credits
 from lightfield.core.files import sha256, write_json
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images

@@ -13,6 +13,7 @@ from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.scene_blocks import Flow, MeshFiles
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
 from lightfield.exporters import BESIDE_VIEWS, Exports
@@ -45,8 +46,8 @@ class Dataset(Capture):
     # The scene YAML, in which `source`, `render` and `rig` are without the preset's limits.
     written: scene_yaml.Scene
     reprojections: dict[str, Reprojection]
-    flow: scene_yaml.Flow | None
-    mesh: scene_yaml.MeshFiles | None
+    flow: Flow | None
+    mesh: MeshFiles | None
     exports: Exports
     # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool

@@ -1,13 +1,14 @@
-"""What only the author of a dataset knows, and publishing needs: the key `publish` of a scene YAML.
+"""What only the author of a dataset knows: the texts and the key `publish` of a scene YAML.
 
 Croissant and Hugging Face ask for these facts. The responsible-AI texts are
 those that NeurIPS asks for since 2026.
 """
 
 import datetime
-from typing import Annotated, Any, Literal
+import re
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from lightfield.core.names import READER
 from lightfield.settings.base import Address, Settings, pattern
@@ -150,3 +151,45 @@ class Publication(Settings):
     def missing_keys(self) -> list[str]:
         """The keys without a value that repositories ask for."""
         return [name for name in _EXPECTED if getattr(self, name) is None]
+
+
+class Credits(Settings):
+    """What a package's card says about the scene, and what publishing needs in addition."""
+
+    description: str | None = Field(None, description="Description of the scene, in one line.")
+    licence: str | None = Field(
+        None,
+        description="Licence of the scene, for a package's card. It is also the licence of the "
+        "data, unless publish has another.",
+    )
+    credit: str | None = Field(None, description="How to cite the artist of the scene.")
+    publish: Publication | None = Field(
+        None,
+        description="What a repository of datasets needs to know. With this key, its metadata and "
+        "shards are also written. Without it, a package is only an archive.",
+    )
+
+    @property
+    def data_licence(self) -> str | None:
+        """The short name of the data's licence: its own, or else the scene's."""
+        if self.publish and self.publish.licence:
+            return self.publish.licence
+        is_short_name = self.licence and re.fullmatch(SPDX, self.licence)
+        return self.licence if is_short_name else None
+
+    @property
+    def missing_texts(self) -> list[str]:
+        """The keys without a value that a published dataset should have."""
+        keys = [] if self.description else ["description"]
+        if self.publish:
+            keys += [f"publish.{key}" for key in self.publish.missing_keys]
+        return keys
+
+    @model_validator(mode="after")
+    def _can_be_published(self) -> Self:
+        if self.publish and self.data_licence is None:
+            raise ValueError(
+                "publish.licence: is missing; must be a short name from https://spdx.org/licenses, "
+                "unless the scene's licence is one"
+            )
+        return self

@@ -176,7 +176,7 @@ class Reprojection(ReprojectionOptions):
         return self.as_json({*OPTICS})
 
     def development(self, look: Look | None) -> dict[str, Any]:
-        """Return the settings that turn light into pixels. ``look`` is that of `look`."""
+        """Return the settings that turn light into pixels. ``look`` is the look of `look`."""
         settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
         if self.sensor:
             settings = {"sensor": self.sensor.as_json()}

@@ -65,7 +65,7 @@ _AVX2_KERNELS = {
     "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL "
     "AVX512_SPR X86_V4",
     "NUMBA_CPU_NAME": "x86-64-v3",
-    # None beside those of this name.
+    # None beside the features of this name.
     "NUMBA_CPU_FEATURES": "",
 }
 

@@ -299,6 +299,7 @@ class OpenReceipt:
         # The SHA-256 of files that other jobs made, and of files that the makers of inputs read.
         self._made_files: dict[str, str | None] = {}
         self._read_before: dict[str, str | None] = {}
+        self._makers: set[Path] = set()
         self._lock = _locked(self._part)
         self._earlier = earlier = read(path)
         self._known = {**(earlier.outputs if earlier else {}), **read_part(path)[0]}
@@ -319,14 +320,26 @@ class OpenReceipt:
             for made, output in receipt.outputs.items():
                 self._made_files[made] = output.stamp.sha256
             return
-        if found := find_output(name, self.work):
-            maker = read(found[0])
-            self._read_before |= maker.inputs if maker else {}
+        # Compare only what is new, or many inputs would take the square of their number.
+        compared = [name, *self._note_maker(name)]
         self.inputs[name] = self._sum_of_input(name)
-        for each in self.inputs.keys() & self._read_before.keys():
+        for each in compared:
+            if each not in self.inputs or each not in self._read_before:
+                continue
             is_of_user = not is_receipt(each) and self._made(each) is None
             if is_of_user and self.inputs[each] != self._read_before[each]:
                 raise changed_since_plan(each)
+
+    def _note_maker(self, name: str) -> Iterable[str]:
+        """Note what the job read that made an input. Return these files if they are new."""
+        found = find_output(name, self.work)
+        if found is None or found[0] in self._makers:
+            return ()
+        self._makers.add(found[0])
+        maker = read(found[0])
+        inputs = maker.inputs if maker else {}
+        self._read_before |= inputs
+        return inputs.keys()
 
     def _sum_of_input(self, name: str) -> str | None:
         """Return the SHA-256 of an input. None if it is missing, because scenes may lack files.

@@ -15,6 +15,7 @@ from lightfield.configuration import scene_yaml
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
+from lightfield.configuration.scene_checks.rigs import MOST_VIEWS
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core import leftovers
 from lightfield.core.disk_space import check_folder
@@ -173,7 +174,7 @@ class MemberBuild:
             "results_root": self.settings.results,
             "work_root": self.settings.work,
             # One shard has all views.
-            "views_per_shard": scene_yaml.MOST_VIEWS,
+            "views_per_shard": MOST_VIEWS,
             "member": self.member.name,
         }
         settings = self.settings

@@ -120,7 +120,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class _Difference:
+class _PictureDifference:
     """How a change moves the picture: ``bias``, ``noise`` and ``light`` of a `Saving`."""
 
     bias: float
@@ -326,7 +326,7 @@ def _unchanged_figures(experiment: Experiment, method: Method) -> dict[str, Any]
     }
 
 
-def _picture_differences(experiment: Experiment, change: Change) -> dict[str, _Difference]:
+def _picture_differences(experiment: Experiment, change: Change) -> dict[str, _PictureDifference]:
     """Return how a change moves the picture, by stratum and of whole views."""
     changed = experiment.renders(change.method)
     unchanged = experiment.renders(_UNCHANGED[change.compared_with][1])
@@ -349,8 +349,8 @@ def _picture_differences(experiment: Experiment, change: Change) -> dict[str, _D
             light = fmean(float(now.colour[counted].mean()) for now, _ in pairs)
             light_before = fmean(float(before.colour[counted].mean()) for _, before in pairs)
             lights.append(light / light_before - 1 if light_before else 0.0)
-        by_stratum[stratum] = _Difference(fmean(biases), fmean(noises), fmean(lights))
-    by_stratum[WHOLE_VIEWS] = _Difference(
+        by_stratum[stratum] = _PictureDifference(fmean(biases), fmean(noises), fmean(lights))
+    by_stratum[WHOLE_VIEWS] = _PictureDifference(
         bias=experiment.over_views({s: d.bias for s, d in by_stratum.items()}),
         noise=experiment.over_views({s: d.noise for s, d in by_stratum.items()}),
         light=experiment.over_views({s: d.light for s, d in by_stratum.items()}),

@@ -50,7 +50,7 @@ _LEAST_THRESHOLD = 1e-4
 # this many times the error of all pixels of plain path tracing at the target. More hides fireflies.
 _MOST_OF_PLAIN = 2
 
-# The least error that is worth a target: about that of rounding light to the views' half floats.
+# The least error that is worth a target: about the error of rounding light to half floats.
 _LEAST_TARGET = 1e-8
 
 # An error within this part of the target counts as on the target.

@@ -22,7 +22,7 @@ from lightfield.formats.layout import IMAGES, PACKAGED, REPORT, SUMS, VALIDATION
 from lightfield.formats.lightfield import NAME
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.measurement import dataset_facts, picture_difference
-from lightfield.measurement.dataset_facts import Facts, shortened
+from lightfield.measurement.dataset_facts import DatasetFacts, shortened
 from lightfield.measurement.picture_difference import PictureDifference
 from lightfield.stages.checks import Diff
 
@@ -34,7 +34,7 @@ _KEYS_OF_VIEWS = ("scene.", "rig.", *_RESULTS_OF_RIG, "camera.", "render.", "dep
 # The name of the scene YAML. It changes no pixel.
 _NAME = "scene.name"
 _SPLIT = "split"
-# The blocks of settings in their order in the output. Other keys come after those of render.
+# The blocks of settings in their order in the output. Other keys come after the keys of render.
 _BLOCKS = ("scene", "rig", *_RESULTS_OF_RIG, _SPLIT, "camera", "render", "", "reprojections")
 # Inputs that change last digits only.
 _MACHINES = ("bpy", "machine")
@@ -43,7 +43,7 @@ _EQUAL_BYTES = "docs/explanation/equal-bytes.md"
 
 def compare(job: Diff) -> None:
     """Print how the datasets of a job differ. Exits with status 1 if they do."""
-    difference = _Difference(dataset_facts.read(job.a), dataset_facts.read(job.b))
+    difference = _DatasetDifference(dataset_facts.read(job.a), dataset_facts.read(job.b))
     difference.find()
     print(difference.cause())
     if difference.is_empty:
@@ -56,11 +56,11 @@ def compare(job: Diff) -> None:
 
 
 @dataclass
-class _Difference:
+class _DatasetDifference:
     """All differences of two datasets."""
 
-    a: Facts
-    b: Facts
+    a: DatasetFacts
+    b: DatasetFacts
     settings: dict[str, str] = field(default_factory=dict)
     inputs: dict[str, str] = field(default_factory=dict)
     only_in: dict[str, list[str]] = field(default_factory=dict)

@@ -33,7 +33,7 @@ _OTHER_FORMS = {
 
 
 @dataclass(frozen=True)
-class Facts:
+class DatasetFacts:
     """What a dataset says of itself.
 
     ``lightfields`` are its lightfield.json files, by their folders in it. ``settings`` have the
@@ -56,7 +56,7 @@ class ReceiptFacts:
     inputs: Mapping[str, Any] = field(default_factory=dict)
 
 
-def read(folder: Path) -> Facts:
+def read(folder: Path) -> DatasetFacts:
     """Return what a dataset says of itself. Raises `UserError` for a folder that is no dataset."""
     if not folder.is_dir():
         hint = "; unpack a package first" if folder.suffix == ".tar" else ""
@@ -77,7 +77,7 @@ def read(folder: Path) -> Facts:
         + [_of_export(name, path) for name, path in _lists(folder)]
     )
     inputs = _merged([*map(_inputs, lightfields.values()), *_versions(folder, lightfields)])
-    return Facts(folder, lightfields, settings, inputs, _of_receipts(folder, lightfields))
+    return DatasetFacts(folder, lightfields, settings, inputs, _of_receipts(folder, lightfields))
 
 
 def reprojection_of(place: str) -> str:

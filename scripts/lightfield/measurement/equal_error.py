@@ -1,4 +1,4 @@
-"""Compares the time of plain path tracing with that of denoised views of the same error.
+"""Compares the time of plain path tracing with the time of denoised views of the same error.
 
 The figures come from what was measured for a scene: its calibration, or its `error_vs_time`.
 """
@@ -24,7 +24,7 @@ _OUT_OF_REACH = 1e4
 class EqualError:
     """Two ways to render a dataset with one error. A figure is None if nobody knows it.
 
-    - ``plain``: the time of plain path tracing, over that of the dataset's own settings.
+    - ``plain``: the time of plain path tracing, over the time of the dataset's own settings.
     - ``cheapest``: the same for the cheapest setting, which is usually denoised.
     - ``bias``: the part of the cheapest setting's error of all pixels that is squared bias.
     - ``correlation``: of its bias between neighbouring views.

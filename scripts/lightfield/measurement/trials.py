@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.planning.sampling import PLAIN, calibrated
 from lightfield.stages.measurement import CalibratedTrialStage, TrialStage
 from lightfield.validation.consistency import Camera
+
+if TYPE_CHECKING:
+    from lightfield.rendering.scenes.open_scene import OpenScene
 
 # Seeds of references begin here, and seeds of trials at 1. So no trial is part of its reference.
 _REFERENCE_SEED = 1000
@@ -125,7 +128,7 @@ class Trials:
         self._device = device
         self._threads = threads
         self._cache = cache
-        self._started = False
+        self._opened: OpenScene | None = None
 
     @classmethod
     def of(cls, job: TrialStage[Any], lightfield: LightField) -> "Trials":
@@ -245,22 +248,23 @@ class Trials:
             from lightfield.rendering.views.colour_pass import render_colour
             from lightfield.rendering.views.geometry_pass import render_geometry
 
-        if not self._started:
-            self._start(settings)
+        opened = self._opened = self._opened or self._open(settings)
         # Restore the .blend's settings that an earlier trial changed.
         cycles.set_sampling(RenderBlock(**{**self.inventory["sampling"], **settings.to_json()}))
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings.seed, window.view.name)
-        raw = render_colour(window.view.world_from_camera, seed, self.lightfield.passes)
+        pose = window.view.world_from_camera
+        raw = render_colour(opened, pose, seed, self.lightfield.passes)
         assert raw.samples is not None and raw.worked_seconds is not None
-        seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
+        seconds = raw.worked_seconds if opened.device == "CPU" else raw.render_seconds
         channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
         channels |= {f"{name}.Y": part.mean(axis=-1) for name, part in raw.passes.items()}
         if raw.passes:
-            geometry = render_geometry(window.view.world_from_camera, ["material"])
-            channels |= self._surfaces(geometry.passes["material"])
+            geometry = render_geometry(opened, pose, ["material"])
+            numbers = opened.names("material")
+            channels |= self._surfaces(numbers, geometry.passes["material"])
         elif self.lightfield.depth:
-            channels["Z"] = render_geometry(window.view.world_from_camera).depth
+            channels["Z"] = render_geometry(opened, pose).depth
         images.write_exr(
             path,
             channels,
@@ -268,15 +272,17 @@ class Trials:
                 images.KEY_ATTRIBUTE: key,
                 _SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(window)].mean()),
                 _SECONDS_ATTRIBUTE: seconds,
-                _DEVICE_ATTRIBUTE: self._on,
+                _DEVICE_ATTRIBUTE: opened.device,
             },
         )
 
-    def _surfaces(self, materials: NDArray[np.uint16]) -> dict[str, NDArray[np.float32]]:
-        """Return a channel for each of `SURFACES`, 1 or 0, from the numbers of materials (h, w)."""
-        from lightfield.rendering.scenes import ids
+    def _surfaces(
+        self, numbers: Mapping[str, int], materials: NDArray[np.uint16]
+    ) -> dict[str, NDArray[np.float32]]:
+        """Return a channel for each of `SURFACES`, 1 or 0, from the materials (h, w) of a window.
 
-        numbers = ids.names("material")
+        ``numbers`` are the materials' numbers by their names.
+        """
         channels = {}
         for surface, features in SURFACES.items():
             names = {name for feature in features for name in self.inventory[feature]}
@@ -284,24 +290,25 @@ class Trials:
             channels[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
         return channels
 
-    def _start(self, settings: RenderBlock) -> None:
+    def _open(self, settings: RenderBlock) -> "OpenScene":
+        """Open the scene, and set Cycles up for the trials."""
         from lightfield.rendering.setup import cycles
         from lightfield.rendering.views import colour_pass, gpu_kernels
 
-        self._on = cycles.set_up(
+        opened = cycles.set_up(
             self._blend,
             self.inventory,
             self.lightfield.changed(render=settings.to_json()),
             self._device,
             self._threads,
         )
-        gpu_kernels.compile_first(self.lightfield.views[0].world_from_camera)
+        gpu_kernels.compile_first(opened, self.lightfield.views[0].world_from_camera)
         colour_pass.watch_samples()
         # The first render also loads shared data, so it does not count.
         cycles.set_sampling(settings.changed(samples=1, denoise=True))
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
-        colour_pass.render_colour(self.lightfield.views[0].world_from_camera, 0)
-        self._started = True
+        colour_pass.render_colour(opened, self.lightfield.views[0].world_from_camera, 0)
+        return opened
 
 
 def of_calibrated(job: CalibratedTrialStage[Any]) -> tuple[LightField, Trials]:

@@ -9,6 +9,8 @@ from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
+from lightfield.configuration.scene_blocks import MeshFiles
+from lightfield.configuration.scene_checks.rigs import FLOW_PLACES, small_image
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, VIEWS, scene_folder
 from lightfield.exporters import Exports
@@ -179,13 +181,13 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
     except UserError as error:
         problem = f"rigs.{name}: {error}; let the preset have more views"
         raise scene_yaml.mistake(scene, problem) from None
-    if written.render and (too_small := scene_yaml.small_image(rig.camera.resolution)):
+    if written.render and (too_small := small_image(rig.camera.resolution)):
         problem = f"rigs.{name}.camera.resolution: under the preset {preset}, {too_small}"
         raise scene_yaml.mistake(scene, f"{problem}; let the preset have more pixels")
     if written.flow and rig.is_at_one_place():
         raise scene_yaml.mistake(
             scene,
-            f"flow: {scene_yaml.FLOW_PLACES}, but the preset {preset} leaves one of rigs.{name}; "
+            f"flow: {FLOW_PLACES}, but the preset {preset} leaves one of rigs.{name}; "
             "let the preset have more views",
         )
     return rig
@@ -231,7 +233,7 @@ def _check_limited_exports(scene: str, name: str, preset: str, rig: Rig, exports
             )
 
 
-def _mesh_of(name: str, written: scene_yaml.Scene) -> scene_yaml.MeshFiles | None:
+def _mesh_of(name: str, written: scene_yaml.Scene) -> MeshFiles | None:
     """Return which meshes a rig's dataset holds, if any."""
     mesh = written.mesh
     return mesh if mesh and name in (mesh.rigs or written.rigs) else None

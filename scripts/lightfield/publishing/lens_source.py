@@ -1,6 +1,6 @@
 """Writes lenses as Python source that needs only numpy, for the file read.py of a package.
 
-The source is that of the lenses' own methods, without annotations. Everything else that a method
+The source comes from the lenses' own methods, without annotations. Everything else that a method
 asks of its lens becomes a number, whether it is a parameter or follows from parameters.
 """
 

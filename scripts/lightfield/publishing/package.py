@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, open_file, read_json, read_keys, sha256, write_json

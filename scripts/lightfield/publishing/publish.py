@@ -6,8 +6,7 @@ Equal datasets and settings give equal bytes, because the date is the author's.
 import sys
 from pathlib import Path
 
-from lightfield.configuration.publication import CARD, CROISSANT
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import CARD, CROISSANT, Credits
 from lightfield.configuration.shown_look import ShownLook
 from lightfield.core import units
 from lightfield.core.errors import UserError

@@ -4,8 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from lightfield.configuration.publication import Creator, Publication
-from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.publication import Creator, Credits, Publication
 from lightfield.formats.lightfield import LightField
 from lightfield.publishing.markdown import one_line
 

@@ -19,7 +19,7 @@ def source(
 ) -> str:
     """Return the content of read.py.
 
-    ``lightfields`` has the dataset's own by the name "", and that of each reprojection by its name.
+    ``lightfields`` has the dataset's own by the name "", and each reprojection's by its name.
     With ``shards``, read.py reads the shards beside it, or else the folder that it lies in.
     """
     own = lightfields[""]

@@ -282,7 +282,7 @@ class Dataset:
 
     @cached_property
     def views(self) -> Views:
-        """All views. In a sequence, all views of a frame come before those of the next."""
+        """All views. In a sequence, frame follows frame."""
         return Views(
             View(frame, camera) for frame in self.frames for camera in frame.lightfield.views
         )

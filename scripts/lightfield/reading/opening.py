@@ -111,7 +111,7 @@ def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
     parts_of_package = {archive: further_parts(archive) for archive in archives}
     further = [part for parts in parts_of_package.values() for part in parts]
     members = {archive: members_of(archive) for archive in {*archives, *further}}
-    # The files of a package lie in its folder, and those of a shard in none.
+    # The files of a package lie in its folder, and the files of a shard in none.
     if any("/" in name for name in members[archives[0]]):
         packages = [
             _package([archive, *parts_of_package[archive]], members)

@@ -22,10 +22,9 @@ from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
-from lightfield.imaging import images, pictures
+from lightfield.imaging import images, noise, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
-from lightfield.measurement import noise
 from lightfield.report import contact_sheet
 from lightfield.stages.report import ReportFigures
 

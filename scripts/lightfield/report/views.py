@@ -20,7 +20,7 @@ from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.imaging.look import Look
-from lightfield.measurement.noise import relative_noise
+from lightfield.imaging.noise import relative_noise
 from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,

@@ -41,7 +41,7 @@ def collect(
     """Return the data of the walk.
 
     ``lens`` is the lens of the embedded views. ``places`` (n, 3) are the positions of all cameras.
-    ``world_from_cameras`` (m, 4, 4) and ``distances`` (m, height, width), in metres, are those of
+    ``world_from_cameras`` (m, 4, 4) and ``distances`` (m, height, width), in metres, belong to
     the embedded views. ``first`` is the number of the embedded view in the middle of the rig.
     ``fills_holes`` is as in `lightfield.synthesis.view.Sources`. Some of the keys:
 

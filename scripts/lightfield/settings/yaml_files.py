@@ -153,7 +153,7 @@ def parse_yaml(text: str, file: str) -> Any:
 
 
 def located(problem: str, text: str, file: str) -> str:
-    """Return ``file:line: problem``. The line is that of the key with which the problem begins.
+    """Return ``file:line: problem``. The line has the key with which the problem begins.
 
     ``text`` is the file's text, which `parse_yaml` has read.
     """

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from lightfield.configuration.scene_yaml import Credits, load_scene
+from lightfield.configuration.publication import Credits
+from lightfield.configuration.scene_yaml import load_scene
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.settings.base import ReaderSettings

@@ -150,7 +150,7 @@ class Inventory(Stage[InventorySettings]):
 
     name = "inventory"
     function = "lightfield.rendering.inspection.inventory_file:make"
-    version = 7
+    version = 8
 
     settings: InventorySettings = InventorySettings()
     scene: str | None = option("name of the file in configs/scenes/ that uses this .blend", None)

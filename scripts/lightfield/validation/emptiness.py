@@ -13,7 +13,7 @@ from lightfield.formats import lightfield
 from lightfield.formats.layout import File, ImageSet
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import framing
-from lightfield.validation.pixels import Facts
+from lightfield.validation.pixels import ImageFacts
 from lightfield.validation.result import Check
 
 # The name of the check.
@@ -21,7 +21,10 @@ NAME = "surfaces"
 
 
 def checks(
-    image_set: ImageSet, facts: Mapping[File, Facts], clearance: Path | None, volumes: Sequence[str]
+    image_set: ImageSet,
+    facts: Mapping[File, ImageFacts],
+    clearance: Path | None,
+    volumes: Sequence[str],
 ) -> list[Check]:
     """Return a check of a rendered set if views of it show nothing. Empty if all show something.
 
@@ -48,7 +51,7 @@ def checks(
     return [Check(NAME, True, "", warnings=[f"no view shows a surface{maybe}{where}"])]
 
 
-def _misses(fact: Facts, has_depth: bool) -> bool:
+def _misses(fact: ImageFacts, has_depth: bool) -> bool:
     """Return whether a view shows no surface. Without depth, only transparent views tell."""
     return fact.missed == 1 if has_depth else fact.empty
 

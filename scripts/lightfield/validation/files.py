@@ -86,7 +86,7 @@ def _poses(image_set: ImageSet) -> Check:
             + np.abs(view.world_from_camera[3] - (0, 0, 0, 1)).max()
         )
         if not difference < tolerance:
-            faults[view.name] = "world_matrix: is not that of its position and rotation"
+            faults[view.name] = "world_matrix: does not follow from its position and rotation"
         elif view.split not in (None, *PARTS):
             faults[view.name] = f"split: is {view.split!r}; must be {', '.join(PARTS)}, or missing"
         elif _moves_elsewhere(view, tolerance):

@@ -127,8 +127,8 @@ def _judge(
     if 2 * len(bad_views) > len(verdicts):
         problems.insert(
             0,
-            f"{path}: most views contradict each other: lens, axes or the meaning of depth are not "
-            "those of the images",
+            f"{path}: most views contradict each other: lens, axes or the meaning of depth do not "
+            "belong to the images",
         )
     scales = _scales(pairs, set(bad_views))
     scale_limit = _REPROJECTED_SCALE_LIMIT if grain_of(image_set) else SCALE_LIMIT

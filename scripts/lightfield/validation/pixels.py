@@ -48,7 +48,7 @@ _MOST_REGIONS = 16
 
 
 @dataclass
-class Facts:
+class ImageFacts:
     """The findings about one image file, without comparison with other views.
 
     - ``faults``: texts by the check to which they belong.
@@ -100,10 +100,10 @@ class Examiner:
         self.regions: dict[Any, tuple[Bools, Bools]] = {}
         self.numbers: dict[Pass, set[int]] = {}
 
-    def examine(self, file: File) -> Facts:
+    def examine(self, file: File) -> ImageFacts:
         """Read an image file, and return the findings about it."""
         path = self.dataset / file.path
-        facts = Facts(sha256(path), path.stat().st_size)
+        facts = ImageFacts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
         lens = image_set.lightfield.lens
         check = "passes" if file.of_pass else "images"
@@ -141,7 +141,7 @@ class Examiner:
             for asking, patches in questions
         ]
 
-    def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
+    def _examine_view(self, file: File, image: images.Image, facts: ImageFacts) -> None:
         image_set = self.sets[file.set]
         is_rendered = not image_set.name
         in_circle, outside = self._of_lens(image_set.lightfield.lens)
@@ -174,7 +174,7 @@ class Examiner:
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
     def _add_up_light(
-        self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
+        self, image_set: ImageSet, file: File, image: images.Image, facts: ImageFacts
     ) -> None:
         """Compare the sum of a view's light groups with its colour."""
         lightfield = image_set.lightfield
@@ -191,7 +191,7 @@ class Examiner:
             facts.fault("light_groups", text, is_off)
 
     def _examine_colour(
-        self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
+        self, image_set: ImageSet, file: File, image: images.Image, facts: ImageFacts
     ) -> None:
         is_rendered = not image_set.name
         in_circle, outside = self._of_lens(image_set.lightfield.lens)
@@ -218,7 +218,9 @@ class Examiner:
             is_lit = (colour[:, outside] > _FAINT).mean() > _MOST_LIT_OUTSIDE
             facts.fault("colour", "has colour where the lens sees nothing", is_lit)
 
-    def _examine_pass(self, file: File, view_pass: Pass, image: images.Image, facts: Facts) -> None:
+    def _examine_pass(
+        self, file: File, view_pass: Pass, image: images.Image, facts: ImageFacts
+    ) -> None:
         problem = _channels_problem(image, dict.fromkeys(view_pass.channels, view_pass.dtype))
         if problem:
             facts.fault("passes", problem)
@@ -329,7 +331,7 @@ class Examiner:
                 self.numbers[view_pass] = set()
         return self.numbers[view_pass]
 
-    def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
+    def _compare_marks(self, file: File, image: images.Image, facts: ImageFacts) -> None:
         """Check that exactly the pixels that the source cannot see are marked as without source."""
         regions = self._of_source(file)
         target = self.sets[file.set].lightfield
@@ -352,7 +354,7 @@ class Examiner:
         coloured = any(image.channels[name][without].any() for name in "RGB")
         facts.fault("marks", "has colour in pixels without a source", coloured)
 
-    def _compare_with_source(self, file: File, image: images.Image, facts: Facts) -> None:
+    def _compare_with_source(self, file: File, image: images.Image, facts: ImageFacts) -> None:
         """Check that a reprojected view shows what the rendered view shows."""
         target = self.sets[file.set]
         source = rendered(self.sets)
@@ -409,7 +411,7 @@ class Examiner:
 
 
 def checks(
-    image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[str] = ()
+    image_set: ImageSet, facts: Mapping[File, ImageFacts], volumes: Sequence[str] = ()
 ) -> list[Check]:
     """Return the checks of a set's images. An image passes or fails each by itself.
 
@@ -458,7 +460,7 @@ def checks(
     return [*checks, check]
 
 
-def _of_light_groups(image_set: ImageSet, facts: Mapping[File, Facts]) -> Check:
+def _of_light_groups(image_set: ImageSet, facts: Mapping[File, ImageFacts]) -> Check:
     """Return the check that the light groups of each view add up to its colour."""
     reasons = {fact.not_summed for fact in facts.values() if fact.not_summed}
     if reasons:
@@ -472,7 +474,7 @@ def _of_light_groups(image_set: ImageSet, facts: Mapping[File, Facts]) -> Check:
     return check
 
 
-def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim: str) -> Check:
+def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, ImageFacts], claim: str) -> Check:
     """Return the check ``name`` of the images. ``claim`` says in words what they must satisfy."""
     if not facts:
         return Check(f"{image_set.prefix}{name}", None, f"no image to see if they {claim}")
@@ -485,7 +487,7 @@ def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim:
     return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
-def of_passes(facts: Mapping[File, Facts], missing: Sequence[str]) -> Check:
+def of_passes(facts: Mapping[File, ImageFacts], missing: Sequence[str]) -> Check:
     """Return the check of the views' passes. ``missing`` are the paths of missing files."""
     faults = dict.fromkeys(missing, "is missing")
     faults |= {
@@ -500,13 +502,13 @@ def of_passes(facts: Mapping[File, Facts], missing: Sequence[str]) -> Check:
             lost[file.of_pass.name] += fact.nan
     for name, number in lost.items():
         check.warnings.append(
-            f"{number} values in {name} were not numbers to Cycles and are 0, as those of bumped "
+            f"{number} values in {name} were not numbers to Cycles and are 0, as on bumped "
             "surfaces at the rim of an image circle"
         )
     return check
 
 
-def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
+def with_extras(exports: Check, extras: Mapping[File, ImageFacts]) -> Check:
     """Return the check of the exports, extended by the faults of pictures for trainers."""
     problems = [
         f"{file.path}: {text}"

@@ -173,7 +173,7 @@ def _depth_faults(
     if wrong > _MOST_WRONG:
         yield f"{wrong:.0%} of its depths are not those at their places in"
     elif not abs(np.log(scale)) <= _MEDIAN_OFF:
-        yield f"its depths are {scale:.4g} times those of"
+        yield f"its depths are {scale:.4g} times the depths of"
 
 
 def _four_around(source: ImageSet, original: Image, rays: _Rays) -> tuple[Floats, Floats]:

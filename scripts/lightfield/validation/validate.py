@@ -31,7 +31,7 @@ from lightfield.formats.layout import File, ImageSet
 from lightfield.formats.lightfield import MACHINE, LightField
 from lightfield.validation import clipping, emptiness, files, geometry, pixels, splits_check
 from lightfield.validation.consistency import Answer
-from lightfield.validation.pixels import Examiner, Facts
+from lightfield.validation.pixels import Examiner, ImageFacts
 from lightfield.validation.result import Check, Result
 
 
@@ -105,7 +105,7 @@ _UNLISTED = Check("files", None, "a lightfield.json that cannot be understood li
 
 def _emptiness_checks(
     sets: Sequence[ImageSet],
-    facts: Mapping[File, Facts],
+    facts: Mapping[File, ImageFacts],
     clearance: Path | None,
     volumes: Sequence[str],
 ) -> list[Check]:
@@ -120,7 +120,7 @@ def _emptiness_checks(
 def _clipping_checks(
     dataset: Path,
     sets: Sequence[ImageSet],
-    facts: Mapping[File, Facts],
+    facts: Mapping[File, ImageFacts],
     export_lists: Collection[Path] | None,
 ) -> list[Check]:
     """Return a check of the pictures in which light is lost, if there are any."""
@@ -160,7 +160,7 @@ def _check_images(
     presence_checks: Sequence[Check],
     volumes: Sequence[str],
     parallel_map: _ParallelMap,
-) -> tuple[dict[File, Facts], list[Check]]:
+) -> tuple[dict[File, ImageFacts], list[Check]]:
     """Read all images. Return their facts, and the checks of each set.
 
     A set's check in ``presence_checks`` comes before the set's other checks.
@@ -176,9 +176,9 @@ def _check_images(
 
 def _read_images(
     dataset: Path, images: Sequence[File], parallel_map: _ParallelMap
-) -> dict[File, Facts]:
+) -> dict[File, ImageFacts]:
     """Read each image once, and return the findings about it."""
-    facts: dict[File, Facts] = {}
+    facts: dict[File, ImageFacts] = {}
     progress = Progress(len(images), f"validate {dataset.name}", "files")
     for file, fact in parallel_map(_examine, images):
         facts[file] = fact
@@ -188,7 +188,7 @@ def _read_images(
 
 def _check_set(
     image_set: ImageSet,
-    facts: Mapping[File, Facts],
+    facts: Mapping[File, ImageFacts],
     volumes: Sequence[str],
     parallel_map: _ParallelMap,
 ) -> list[Check]:
@@ -224,7 +224,7 @@ def _machines_checks(lightfield: LightField, machines: Iterable[str | None]) -> 
 def _check_files(
     dataset: Path,
     sets: Sequence[ImageSet],
-    facts: Mapping[File, Facts],
+    facts: Mapping[File, ImageFacts],
     export_files: Sequence[str],
     made: Mapping[str, Output],
 ) -> tuple[dict[str, str], list[Check]]:
@@ -290,7 +290,7 @@ def _start_worker(examiner: Examiner, made: Mapping[str, str] | None = None) -> 
         read_watchers.append(lambda path: _read_files.read_made(str(path), sums.get(str(path))))
 
 
-def _examine(file: File) -> tuple[File, Facts]:
+def _examine(file: File) -> tuple[File, ImageFacts]:
     facts = _examiner.examine(file)
     _read_files.check()
     return file, facts

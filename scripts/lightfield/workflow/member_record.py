@@ -60,7 +60,7 @@ class MemberRecord(_Record):
     def _has_datasets_in_its_folder(self) -> Self:
         for rig in self.datasets:
             if not leads_inside(rig):
-                raise ValueError(f"datasets: {rig!r} must be a folder in that of the member")
+                raise ValueError(f"datasets: {rig!r} must be a folder in the member's folder")
         return self
 
     @property
@@ -95,5 +95,5 @@ def read_member(folder: Path) -> MemberRecord:
     path = folder / RECORD
     member = checked(_MEMBER, read_json(path), str(path))
     if member.name != folder.name:
-        raise UserError(f"{path}: name: is {member.name!r}; must be that of its folder")
+        raise UserError(f"{path}: name: is {member.name!r}; must be the name of its folder")
     return member

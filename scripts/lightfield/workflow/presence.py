@@ -133,14 +133,25 @@ def time_of(path: str) -> float:
 
 
 def check_notes(folder: Path) -> None:
-    """Raise `UserError` for a note of Snakemake that is no text, at which Snakemake would crash."""
+    """Raise `UserError` for a file that is no note of Snakemake, at which Snakemake would crash."""
     for path in files_below(folder, strict=False):
         try:
-            read_text(path)
+            if not _may_be_note(read_text(path)):
+                raise UserError(f"{path}: is no note of Snakemake, but other JSON")
         except UserError as error:
             raise UserError(
                 f"{error}; remove the folder: rm -r {folder}; no plan needs it"
             ) from None
+
+
+def _may_be_note(text: str) -> bool:
+    """Return whether Snakemake can read a note. It passes over a note that is not JSON."""
+    try:
+        return isinstance(json.loads(text), dict)
+    except RecursionError:
+        return False
+    except ValueError:
+        return True
 
 
 def check_imported(dataset: Dataset) -> None:

@@ -342,7 +342,7 @@ class RunDisplay:
                 self._compilations[-1][1] = time.time()
 
     def _worked(self, began: float, now: float) -> float:
-        """Return the seconds of work from ``began`` to ``now``, without those of compilations."""
+        """Return the seconds of work from ``began`` to ``now``, without compilations."""
         compiled = sum(
             max(0.0, min(end, now) - max(start, began)) for start, end in self._compilations
         )

@@ -84,9 +84,9 @@ def _of_tum(index: int, words: Sequence[str], numbers: Floats) -> tuple[str, Flo
     return words[0], _matrix(numbers[1:4], numbers[[7, 4, 5, 6]])
 
 
-_Reader = Callable[[int, Sequence[str], Floats], tuple[str, Floats]]
+_LineReader = Callable[[int, Sequence[str], Floats], tuple[str, Floats]]
 # By how many numbers a line has.
-_READERS: Mapping[int, _Reader] = {12: _of_kitti, 8: _of_tum}
+_READERS: Mapping[int, _LineReader] = {12: _of_kitti, 8: _of_tum}
 
 
 def read_kubric(content: Mapping[str, Any]) -> list[Frame] | None:

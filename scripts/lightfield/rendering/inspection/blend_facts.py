@@ -16,12 +16,13 @@ from lightfield.rendering.setup.cycles import view_layer
 _CURVE_STEPS = 256
 
 
-def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
+def facts(camera_frames: Iterable[float | None], is_blurred: bool = False) -> dict[str, Any]:
     """Return the open .blend's render settings, and its camera at some frames.
 
     None stands for the frame that the file was saved at. Without ``camera_frames``, no view is the
-    camera's. Raises `UserError` if the camera does not have the same lens at all frames, or if a
-    view cannot have its pose.
+    camera's. ``is_blurred`` says whether motion blurs the views even if the file has no blur.
+    Raises `UserError` if the camera does not have the same lens at all frames, or if a view cannot
+    have its pose.
     """
     scene = bpy.context.scene
     layer = view_layer(scene)
@@ -31,7 +32,8 @@ def facts(camera_frames: Iterable[float | None]) -> dict[str, Any]:
     frame = frames.current()
     nodes = scene.compositing_node_group
     views = [frame if each is None else each for each in camera_frames]
-    camera = _camera(views or [frame], is_taken=bool(views))
+    may_blur = is_blurred or motion_blur.is_on()
+    camera = _camera(views or [frame], is_taken=bool(views), may_blur=may_blur)
     frames.go_to(frame)
     return {
         "scenes": [other.name for other in bpy.data.scenes],
@@ -158,12 +160,13 @@ def _samples(cycles: Any, layer: Any) -> int:
     )
 
 
-def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None:
+def _camera(camera_frames: list[float], is_taken: bool, may_blur: bool) -> dict[str, Any] | None:
     """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
 
     Return None if the scene has no camera. A marker may change the camera with the frame.
-    ``is_taken`` says whether views have the camera's poses. Only then, ``moves`` says whether the
-    camera moves during a blurred exposure. Raises `UserError` if they cannot.
+    ``is_taken`` says whether views have the camera's poses. Only then, and if motion ``may_blur``
+    them, ``moves`` says whether the camera moves during the exposure. Raises `UserError` if views
+    cannot have its poses.
     """
     scene = bpy.context.scene
     lenses = []
@@ -185,7 +188,7 @@ def _camera(camera_frames: list[float], is_taken: bool) -> dict[str, Any] | None
         world_from_cameras[str(frame)] = [list(row) for row in world_from_camera]
         if is_taken:
             _check_pose(names[-1], frame, np.array(world_from_camera))
-            moves = moves or (motion_blur.is_on() and _moves(scene.camera, frame))
+            moves = moves or (may_blur and _moves(scene.camera, frame))
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has a different lens at frame {frame} than at frame "

@@ -81,7 +81,9 @@ def write(
         ]
         unknown_to_blender = unknown_colours.of_scene(unknown)
         try:
-            contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+            is_blurred = bool(settings.motion_blur)
+            facts = blend_facts.facts(camera_frames, is_blurred)
+            contents = {"blend": facts | {"layers": layers}}
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         if unknown_to_blender:

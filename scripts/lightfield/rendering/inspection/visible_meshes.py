@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.mesh import Mesh, Placed, SceneSurface
 from lightfield.rendering.scenes import blend_file, frames, ids, instances, volumes
-from lightfield.rendering.scenes.ids import has_no_surface
+from lightfield.rendering.scenes.ids import Numbers, has_no_surface
 from lightfield.rendering.scenes.render_graph import in_render
 from lightfield.rendering.setup import pruning
 from lightfield.stages.exports import WriteSurface
@@ -46,24 +46,23 @@ def surface_of(job: WriteSurface) -> tuple[SceneSurface, int]:
         pruning.remove_objects(hidden)
     if isinstance(settings.frame, int):
         frames.go_to(settings.frame)
-    if settings.numbered:
-        ids.assign(["object"])
-    return visible_surface(settings.numbered), bpy.context.scene.frame_current
+    numbers = ids.assign(["object"])["object"] if settings.numbered else None
+    return visible_surface(numbers), bpy.context.scene.frame_current
 
 
-def visible_surface(numbered: bool) -> SceneSurface:
+def visible_surface(numbers: Numbers | None) -> SceneSurface:
     """Return what cameras can see of the open scene at its frame.
 
-    ``numbered`` says whether the objects have the indices of the id passes: see `ids.assign`.
+    ``numbers`` are the objects' numbers in the id passes, from `ids.assign`. None for none.
     """
-    return in_render(lambda depsgraph: _MeshReader(numbered).read(depsgraph))
+    return in_render(lambda depsgraph: _MeshReader(numbers).read(depsgraph))
 
 
 class _MeshReader:
     """Collects the meshes of a dependency graph."""
 
-    def __init__(self, numbered: bool) -> None:
-        self.numbered = numbered
+    def __init__(self, numbers: Numbers | None) -> None:
+        self.numbers = numbers
         self.meshes: list[Mesh] = []
         self.placed: list[Placed] = []
         self.left_out: dict[str, str] = {}
@@ -93,16 +92,19 @@ class _MeshReader:
         index = self._mesh(entry.object)
         if index is None:
             return
-        name, number, object_number = instances.name_and_numbers(entry)
+        of_passes = {}
+        if self.numbers:
+            _, number, object_number = instances.name_and_numbers(entry, self.numbers)
+            of_passes = {"object": object_number, "instance": number}
         if entry.is_instance and entry.parent.original == entry.object.original:
             self.parts_of_itself.setdefault(original, []).append(len(self.placed))
         self.placed.append(
             Placed(
-                name,
+                instances.name_of(entry),
                 original,
                 index,
                 np.array(entry.matrix_world, np.float64),
-                {"object": object_number, "instance": number} if self.numbered else {},
+                of_passes,
             )
         )
 

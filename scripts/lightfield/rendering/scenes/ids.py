@@ -10,7 +10,7 @@ an index that no other block has, and what reads an index computes the file's ow
 
 import re
 from collections.abc import Collection, Iterable
-from functools import cache
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -31,14 +31,26 @@ _OWN = "plenoforge_pass_index"
 _INDEX_OUTPUTS = {"object": "Object Index", "material": "Material Index"}
 
 
-def assign(kinds: Collection[str]) -> None:
+@dataclass(frozen=True)
+class Numbers:
+    """The numbers of the open scene's blocks of a kind.
+
+    - ``names``: the number of each block by its full name.
+    - ``of_index`` (32768,): uint16, the number of the block with each pass index, 0 for none.
+    """
+
+    names: dict[str, int]
+    of_index: NDArray[np.uint16]
+
+
+def assign(kinds: Collection[str]) -> dict[str, Numbers]:
     """Give the blocks of some ``kinds``, "object" and "material", an index of their own.
 
-    The scene must be at its frame. Raises `UserError` for too many blocks of a kind.
+    Return the numbers of each kind. The scene must be at its frame. Raises `UserError` for too many
+    blocks of a kind.
     """
-    numbers.cache_clear()
     if not kinds:
-        return
+        return {}
     own = _own_indices([*bpy.data.objects, *bpy.data.materials])
     for block, index in own.items():
         block[_OWN] = index
@@ -69,6 +81,7 @@ def assign(kinds: Collection[str]) -> None:
         if material.node_tree:
             of_material = {"material": [(0, own[material])]} if "material" in steps else {}
             _restore_indices(material.node_tree, steps | of_material)
+    return {kind: _numbers(kind) for kind in kinds}
 
 
 def _own_indices(blocks: Iterable[Any]) -> dict[Any, int]:
@@ -152,20 +165,16 @@ def _restored(tree: Any, index: Any, steps: list[tuple[int, int]]) -> Any:
     return result
 
 
-def names(kind: str) -> dict[str, int]:
-    """Return the numbers of the blocks of a kind, by full name."""
-    return {str(block.name_full): number for number, block in enumerate(_by_name(kind), 1)}
-
-
-@cache
-def numbers(kind: str) -> NDArray[np.uint16]:
-    """Return the number of the block with each index from `assign`, 0 for none."""
-    table = np.zeros(MOST + 1, np.uint16)
+def _numbers(kind: str) -> Numbers:
+    """Return the numbers of the blocks of a kind, which have an index of their own."""
+    names = {}
+    of_index = np.zeros(MOST + 1, np.uint16)
     for number, block in enumerate(_by_name(kind), 1):
-        table[block.pass_index] = number
+        names[str(block.name_full)] = number
+        of_index[block.pass_index] = number
     # A miss has this index.
-    table[0] = 0
-    return table
+    of_index[0] = 0
+    return Numbers(names, of_index)
 
 
 def _by_name(kind: str) -> list[Any]:

@@ -9,15 +9,13 @@ that is not an instance has its number of `lightfield.rendering.scenes.ids`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.rendering.scenes import ids
-from lightfield.rendering.scenes.ids import has_no_surface
+from lightfield.rendering.scenes.ids import Numbers, has_no_surface
 from lightfield.rendering.scenes.render_graph import in_render
 
 Array = NDArray[Any]
@@ -48,10 +46,26 @@ class Instances:
     objects: Array
     shown_itself: Array
 
+    def decoded(self, passes: Mapping[str, Array], objects: Array) -> Array:
+        """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
 
-def set_up(layer: Any) -> None:
+        ``passes`` holds the `CYCLES_PASSES` by name. ``objects`` (height, width) are the objects'
+        numbers. Surfaces without a material, and surfaces beyond the last layer, write no number.
+        They get the object's number, if the object itself is shown.
+        """
+        layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
+        last = passes[_COUNT].astype(int).clip(1, _LAYERS) - 1
+        random = np.take_along_axis(layers, last, axis=-1)[..., 0]
+        numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
+        # Accept a number only if it is one of this object's.
+        keys = self.numbers * 2**16 + self.objects
+        pixel_keys = numbers.astype(np.int64) * 2**16 + objects
+        place = np.searchsorted(keys, pixel_keys).clip(0, len(keys) - 1)
+        return np.where(keys[place] == pixel_keys, numbers, self.shown_itself[objects])
+
+
+def write_numbers(layer: Any) -> None:
     """Make every material of the scene write the numbers into new passes of the layer."""
-    shown.cache_clear()
     group = _node_group()
     for material in bpy.data.materials:
         if material.node_tree:
@@ -91,56 +105,43 @@ def _node_group() -> Any:
     return tree
 
 
-@cache
-def shown() -> Instances:
-    """Return what the open scene shows at its frame."""
-    entries = in_render(_entries)
-    shown_itself = np.zeros(len(ids.names("object")) + 1, np.uint32)
+def shown(objects: Numbers) -> Instances:
+    """Return what the open scene shows at its frame. ``objects`` are the objects' numbers."""
+    entries = in_render(lambda depsgraph: _entries(depsgraph, objects))
+    shown_itself = np.zeros(len(objects.names) + 1, np.uint32)
     for number, object_number, is_instance in entries.values():
         if not is_instance:
             shown_itself[object_number] = number
     names = {name: number for name, (number, *_) in sorted(entries.items())}
     pairs = sorted((number, object_number) for number, object_number, _ in entries.values())
-    numbers, objects = np.array(pairs, np.int64).reshape(-1, 2).T
-    return Instances(names, numbers, objects, shown_itself)
+    numbers, object_numbers = np.array(pairs, np.int64).reshape(-1, 2).T
+    return Instances(names, numbers, object_numbers, shown_itself)
 
 
-def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
+def _entries(depsgraph: Any, objects: Numbers) -> dict[str, tuple[int, int, bool]]:
     """Return by name the number, the object's number, and whether it is an instance."""
     entries = {}
     for entry in depsgraph.object_instances:
         if not has_no_surface(entry.object.original):
-            name, number, object_number = name_and_numbers(entry)
+            name, number, object_number = name_and_numbers(entry, objects)
             entries[name] = (number, object_number, bool(entry.is_instance))
     return entries
 
 
-def name_and_numbers(entry: Any) -> tuple[str, int, int]:
+def name_and_numbers(entry: Any, objects: Numbers) -> tuple[str, int, int]:
     """Return the name, the number and the object's number of an entry of a dependency graph."""
     obj = entry.object.original
-    name = str(obj.name_full)
-    object_number = int(ids.numbers("object")[obj.pass_index])
+    object_number = int(objects.of_index[obj.pass_index])
+    if entry.is_instance:
+        random_number = int(np.float32(entry.random_id & 0xFFFFFFFF))
+        return name_of(entry), min(random_number, _LARGEST), object_number
+    return name_of(entry), object_number, object_number
+
+
+def name_of(entry: Any) -> str:
+    """Return the name of an entry of a dependency graph: an object's, or an instance's."""
+    name = str(entry.object.original.name_full)
     if not entry.is_instance:
-        return name, object_number, object_number
+        return name
     places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
-    name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
-    return name, min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST), object_number
-
-
-def decoded(passes: Mapping[str, Array], objects: Array) -> Array:
-    """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
-
-    ``passes`` holds the `CYCLES_PASSES` by name. ``objects`` (height, width) are the objects'
-    numbers. Surfaces without a material, and surfaces beyond the last layer, write no number. They
-    get the object's number, if the object itself is shown.
-    """
-    instances = shown()
-    layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
-    last = passes[_COUNT].astype(int).clip(1, _LAYERS) - 1
-    random = np.take_along_axis(layers, last, axis=-1)[..., 0]
-    numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
-    # Accept a number only if it is one of this object's.
-    keys = instances.numbers * 2**16 + instances.objects
-    pixel_keys = numbers.astype(np.int64) * 2**16 + objects
-    place = np.searchsorted(keys, pixel_keys).clip(0, len(keys) - 1)
-    return np.where(keys[place] == pixel_keys, numbers, instances.shown_itself[objects])
+    return f"{entry.parent.name_full} > {name} {' '.join(places)}"

@@ -6,16 +6,14 @@ Random depends on the name. So such objects get their full names only while a ma
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 from lightfield.rendering.scenes.ids import has_no_surface
 from lightfield.rendering.scenes.render_graph import in_render
 
 
-@cache
 def shown() -> list[Any]:
     """Return the objects of the open scene that another object shares its name with."""
     objects = in_render(_objects)
@@ -29,9 +27,9 @@ def _objects(depsgraph: Any) -> set[Any]:
 
 
 @contextmanager
-def under_full_names() -> Iterator[None]:
-    """Give the objects of `shown` their full names for a while, as in ``Cube [library.blend]``."""
-    names = {obj: str(obj.name) for obj in shown()}
+def under_full_names(objects: Iterable[Any]) -> Iterator[None]:
+    """Give ``objects`` their full names for a while, as in ``Cube [library.blend]``."""
+    names = {obj: str(obj.name) for obj in objects}
     try:
         for obj in names:
             obj.rename(str(obj.name_full))

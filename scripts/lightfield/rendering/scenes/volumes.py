@@ -1,7 +1,6 @@
 """Finds the objects of a scene that are only volumes, such as fog and smoke."""
 
 from collections.abc import Iterator
-from functools import cache
 from typing import Any
 
 import bpy
@@ -9,7 +8,6 @@ import bpy
 from lightfield.rendering.scenes.render_graph import in_render
 
 
-@cache
 def alone() -> frozenset[str]:
     """Return the full names of the open scene's objects that are only volumes at its frame."""
     objects = bpy.data.objects

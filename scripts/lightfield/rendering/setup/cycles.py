@@ -24,6 +24,7 @@ from lightfield.rendering.scenes import (
     namesakes,
     volumes,
 )
+from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.setup import (
     drawings,
     followed_camera,
@@ -59,8 +60,8 @@ def set_up(
     lightfield: LightField,
     device: str,
     threads: int,
-) -> str:
-    """Open a scene and set it up for the views of a light field. Return its device: CPU or GPU.
+) -> OpenScene:
+    """Open a scene and set it up for the views of a light field.
 
     Leaves out what no pixel depends on, according to the scene's ``inventory``. Raises `UserError`
     if the scene cannot be opened, or if the ``device`` is missing.
@@ -77,7 +78,7 @@ def set_up(
     scene = bpy.context.scene
     # A marker may choose the artist's camera at this frame. Remove all markers' cameras afterwards.
     frames.go_to(lightfield.frame)
-    ids.assign({"object" if kind == "instance" else kind for kind in numbered})
+    numbers = ids.assign({"object" if kind == "instance" else kind for kind in numbered})
     focused = scene.camera if lightfield.render.depth_of_field else None
     file_camera = scene.camera
     if file_camera and lightfield.content.get("scene", {}).get("followed_camera") == FILE:
@@ -97,14 +98,12 @@ def set_up(
     _set_camera(scene, lightfield.content)
     drawings.set_up(view_layer(scene), scene.camera.data.type, bool(groups))
     _hide_empty_point_clouds()
-    namesakes.shown.cache_clear()
-    if any(each.kind == "matte" for each in passes):
-        namesakes.shown()
-    volumes.alone.cache_clear()
-    volumes.alone()
+    shares_names = namesakes.shown() if any(each.kind == "matte" for each in passes) else []
+    only_volumes = volumes.alone()
+    shown_instances = None
     if "instance" in numbered:
-        instances.set_up(view_layer(scene))
-        instances.shown()
+        instances.write_numbers(view_layer(scene))
+        shown_instances = instances.shown(numbers["object"])
     if OMNIDIRECTIONAL in lightfield.content:
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
@@ -114,8 +113,17 @@ def set_up(
     if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
-    moving_camera.set_up(lightfield.render.camera_motion)
-    return str(scene.cycles.device)
+    motion = lightfield.render.camera_motion
+    if motion:
+        moving_camera.blur(motion)
+    return OpenScene(
+        device=str(scene.cycles.device),
+        numbers=numbers,
+        instances=shown_instances,
+        namesakes=shares_names,
+        volumes=only_volumes,
+        motion=motion,
+    )
 
 
 def _hide_empty_point_clouds() -> None:

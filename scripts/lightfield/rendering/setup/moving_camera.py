@@ -13,19 +13,12 @@ from lightfield.rendering.setup import motion_blur
 
 Array = np.ndarray[Any, Any]
 
-# The motion of the current light field's camera. Empty if it stands still.
-_motions: list[CameraMotion] = []
 
-
-def set_up(motion: CameraMotion | None) -> None:
+def blur(motion: CameraMotion) -> None:
     """Blur the following views by the camera's ``motion``.
 
     Objects are blurred only if they were before. Cycles must be set up for all else.
     """
-    _motions.clear()
-    if motion is None:
-        return
-    _motions.append(motion)
     scene = bpy.context.scene
     if not motion_blur.is_on():
         for obj in bpy.data.objects:
@@ -37,18 +30,18 @@ def set_up(motion: CameraMotion | None) -> None:
     scene.camera.rotation_mode = "QUATERNION"
 
 
-def place_camera(world_from_camera: Array) -> None:
+def place_camera(world_from_camera: Array, motion: CameraMotion | None) -> None:
     """Place the scene's camera at ``world_from_camera``, (4, 4) camera-to-world.
 
-    A moving camera is there in the middle of the exposure.
+    `blur` must have set the ``motion`` up, if there is one. A moving camera is at this place in the
+    middle of the exposure.
     """
     scene = bpy.context.scene
     camera = scene.camera
-    if not _motions:
+    if motion is None:
         camera.matrix_world = mathutils.Matrix(np.asarray(world_from_camera).tolist())
         return
     middle = np.asarray(world_from_camera, np.float64)
-    (motion,) = _motions
     render = scene.render
     # Blender remaps frames before it reads keys.
     shutter = render.motion_blur_shutter * render.frame_map_old / render.frame_map_new

@@ -14,6 +14,7 @@ import numpy as np
 from lightfield.formats.passes import Pass
 from lightfield.imaging.images import Attribute
 from lightfield.rendering.scenes import namesakes
+from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.scenes.render_graph import changed
 from lightfield.rendering.setup.cycles import view_layer
 from lightfield.rendering.views.view import Array, Rendered, render_view
@@ -46,18 +47,22 @@ class Colour:
 
 
 def render_colour(
-    world_from_camera: Array, seed: int, passes: Iterable[Pass] = (), alpha: bool = False
+    opened: OpenScene,
+    world_from_camera: Array,
+    seed: int,
+    passes: Iterable[Pass] = (),
+    alpha: bool = False,
 ) -> Colour:
     """Render the view of a camera at ``world_from_camera``, (4, 4) camera-to-world.
 
-    Also returns the ``passes`` that belong to colour. Cycles must be set up for them.
+    Also returns the ``passes`` that belong to colour. The scene must be set up for them.
     """
     counts_samples = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
     mattes = [view_pass for view_pass in colour_passes if view_pass.kind == "matte"]
     matte = None
-    if mattes and namesakes.shown():
-        matte = _render_matte(world_from_camera, seed, mattes)
+    if mattes and opened.namesakes:
+        matte = _render_matte(opened, world_from_camera, seed, mattes)
     _reports.clear()
     needed: dict[str, str] = {}
     for view_pass in colour_passes:
@@ -68,7 +73,7 @@ def render_colour(
     needed["Combined"] = "RGBA" if alpha else "RGB"
     if counts_samples:
         needed[_COUNTS] = "X"
-    rendered = render_view(world_from_camera, seed, needed)
+    rendered = render_view(opened, world_from_camera, seed, needed)
     if matte:
         rendered.passes.update(matte.passes)
     samples = None
@@ -95,7 +100,9 @@ def render_colour(
     )
 
 
-def _render_matte(world_from_camera: Array, seed: int, mattes: Iterable[Pass]) -> Rendered:
+def _render_matte(
+    opened: OpenScene, world_from_camera: Array, seed: int, mattes: Iterable[Pass]
+) -> Rendered:
     """Render ``mattes`` in which objects of equal names have their full names.
 
     The camera's rays are the same as for the colour. Cycles follows no other rays.
@@ -105,8 +112,8 @@ def _render_matte(world_from_camera: Array, seed: int, mattes: Iterable[Pass]) -
     with ExitStack() as stack:
         for name, value in _MATTE_SAMPLING.items():
             stack.enter_context(changed(cycles, name, value))
-        stack.enter_context(namesakes.under_full_names())
-        return render_view(world_from_camera, seed, needed)
+        stack.enter_context(namesakes.under_full_names(opened.namesakes))
+        return render_view(opened, world_from_camera, seed, needed)
 
 
 def _to_rec_709() -> Array | None:

@@ -15,7 +15,8 @@ import numpy as np
 
 from lightfield.formats import passes
 from lightfield.imaging.images import LEAST_ALPHA
-from lightfield.rendering.scenes import ids, instances, volumes
+from lightfield.rendering.scenes import instances, volumes
+from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.scenes.render_graph import changed
 from lightfield.rendering.setup.cycles import pass_property, view_layer
 from lightfield.rendering.views.view import Array, render_view
@@ -78,12 +79,12 @@ def cleared(pixels: Array, where: Array) -> Array:
 
 
 def render_geometry(
-    world_from_camera: Array, names: Collection[str] = (), alpha: bool = False
+    opened: OpenScene, world_from_camera: Array, names: Collection[str] = (), alpha: bool = False
 ) -> ViewGeometry:
     """Render the geometry that a camera at ``world_from_camera``, (4, 4) camera-to-world, sees.
 
-    ``names`` are the passes that it has beside its depth. ``alpha`` adds this field. Cycles must be
-    set up for them.
+    ``names`` are the passes that it has beside its depth. ``alpha`` adds this field. The scene must
+    be set up for them.
     """
     built_in = {"Depth": "Z"} | {
         cycles_pass: _CHANNELS[cycles_pass]
@@ -93,36 +94,38 @@ def render_geometry(
     needed = built_in | (instances.CYCLES_PASSES if "instance" in names else {})
     if alpha:
         needed = needed | {"Combined": "RGBA"}
-    with _geometry_settings(built_in):
-        rendered = render_view(world_from_camera, 0, needed)
+    with _geometry_settings(opened, built_in):
+        rendered = render_view(opened, world_from_camera, 0, needed)
     depth = rendered.passes["Depth"]
     # Cycles leaves NaN where the lens sees nothing.
     hit = depth < MISS
     return ViewGeometry(
         np.where(hit, depth, np.float32(np.inf))[..., 0],
-        {name: _pass(name, rendered.passes, hit) for name in names},
+        {name: _pass(opened, name, rendered.passes, hit) for name in names},
         rendered.passes["Combined"][..., 3] if alpha else None,
         rendered.render_seconds,
         rendered.synchronization_seconds,
     )
 
 
-def _pass(name: str, cycles_passes: Mapping[str, Array], hit: Array) -> Array:
+def _pass(opened: OpenScene, name: str, cycles_passes: Mapping[str, Array], hit: Array) -> Array:
     """Return a pass as `ViewGeometry` has it. ``hit`` (height, width, 1) is False for a miss."""
     if name == "instance":
-        return instances.decoded(cycles_passes, _pass("object", cycles_passes, hit).astype(int))
+        assert opened.instances
+        objects = _pass(opened, "object", cycles_passes, hit)
+        return opened.instances.decoded(cycles_passes, objects.astype(int))
     (cycles_name,) = passes.by_name(name).cycles
     pixels = cycles_passes[cycles_name]
     if name == "motion":
         pixels = pixels * _MOTION_SIGNS
     pixels = np.where(hit, pixels, np.float32(0))
     if name in ("object", "material"):
-        return ids.numbers(name)[pixels[..., 0].astype(np.uint16)]
+        return opened.numbers[name].of_index[pixels[..., 0].astype(np.uint16)]
     return pixels
 
 
 @contextmanager
-def _geometry_settings(cycles_passes: Iterable[str]) -> Iterator[None]:
+def _geometry_settings(opened: OpenScene, cycles_passes: Iterable[str]) -> Iterator[None]:
     """Set Cycles up for geometry with these passes. Restore all settings afterwards."""
     scene = bpy.context.scene
     layer = view_layer(scene)
@@ -139,7 +142,7 @@ def _geometry_settings(cycles_passes: Iterable[str]) -> Iterator[None]:
         stack.enter_context(changed(layer, "pass_alpha_threshold", LEAST_ALPHA))
         stack.enter_context(changed(layer.cycles, "pass_debug_sample_count", False))
         for obj in bpy.data.objects:
-            if obj.visible_camera and obj.name_full in volumes.alone():
+            if obj.visible_camera and obj.name_full in opened.volumes:
                 stack.enter_context(changed(obj, "visible_camera", False))
         worlds = {scene.world, layer.world_override}
         for shader in (*bpy.data.materials, *worlds):

@@ -24,6 +24,7 @@ from lightfield.core import gpus
 from lightfield.core.locks import lock
 from lightfield.core.progress import COMPILED, COMPILING
 from lightfield.core.units import duration
+from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.scenes.render_graph import changed
 from lightfield.rendering.setup import cycles
 from lightfield.rendering.views.view import Array, render_view
@@ -34,12 +35,12 @@ _EXPECTED = "about 7 minutes"
 _SIZE = 8
 
 
-def compile_first(world_from_camera: Array) -> float:
+def compile_first(opened: OpenScene, world_from_camera: Array) -> float:
     """Compile Cycles' kernels if this process's GPU needs that, and no process has done it before.
 
     Returns for how many seconds this process compiled, or waited for another that did.
 
-    Cycles must be set up. This renders a tiny view of a camera at ``world_from_camera``, (4, 4)
+    This renders a tiny view of a camera at ``world_from_camera``, (4, 4)
     camera-to-world. It leaves nothing of it in memory, so that the next view is as without it.
     """
     started = time.monotonic()
@@ -53,7 +54,7 @@ def compile_first(world_from_camera: Array) -> float:
                 continue
             _tell(f"{COMPILING}Cycles' kernels for {model}: once, {_EXPECTED}")
             began = time.monotonic()
-            _render_tiny_view(world_from_camera)
+            _render_tiny_view(opened, world_from_camera)
             took = duration(time.monotonic() - began)
             _tell(f"{COMPILED}Cycles' kernels for {model} in {took}")
             mark.write(f"compiled in {took}\n")
@@ -109,7 +110,7 @@ def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def _render_tiny_view(world_from_camera: Array) -> None:
+def _render_tiny_view(opened: OpenScene, world_from_camera: Array) -> None:
     scene = bpy.context.scene
     with ExitStack() as stack:
         for owner, name, value in (
@@ -120,4 +121,4 @@ def _render_tiny_view(world_from_camera: Array) -> None:
             (scene.cycles, "samples", 1),
         ):
             stack.enter_context(changed(owner, name, value))
-        render_view(world_from_camera, 0, {"Combined": "RGB"})
+        render_view(opened, world_from_camera, 0, {"Combined": "RGB"})

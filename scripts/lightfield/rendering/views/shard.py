@@ -43,6 +43,7 @@ from lightfield.workflow import shard_log
 from lightfield.workflow.history import History, is_suspect
 
 if TYPE_CHECKING:
+    from lightfield.rendering.scenes.open_scene import OpenScene
     from lightfield.rendering.views.colour_pass import Colour
     from lightfield.rendering.views.geometry_pass import ViewGeometry
 
@@ -74,11 +75,11 @@ def render(job: RenderShard) -> None:
     label = f"render {folder.parent}" + (f" {job.views}" if job.views != ":" else "")
     progress = Progress(len(missing_views), label, already=len(chosen_views) - len(missing_views))
     if missing_views or missing_name_files:
-        _open_scene(job, lightfield, history)
+        opened = _open_scene(job, lightfield, history)
         for path in missing_name_files:
-            write_json(path, _names(path.parent.name))
+            write_json(path, opened.names(path.parent.name))
             shard_log.add(path, names_key)
-        _render_views(missing_views, lightfield, folder, progress, job.stall)
+        _render_views(opened, missing_views, lightfield, folder, progress, job.stall)
     history.end()
 
 
@@ -105,14 +106,7 @@ def _name_files(lightfield: LightField, folder: Path) -> list[Path]:
     ]
 
 
-def _names(kind: str) -> dict[str, int]:
-    """Return the numbers of the scene's objects, materials or instances by their names."""
-    from lightfield.rendering.scenes import ids, instances
-
-    return instances.shown().names if kind == "instance" else ids.names(kind)
-
-
-def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> None:
+def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> "OpenScene":
     """Open the scene in Blender, set Cycles up, and note how long that took."""
     contents = read_inventory(job.inventory, "left_out") if job.inventory else None
     _check_memory(job.blend, contents or {}, lightfield)
@@ -123,19 +117,20 @@ def _open_scene(job: RenderShard, lightfield: LightField, history: History) -> N
         from lightfield.rendering.views import gpu_kernels
     # An earlier shard of this process may have waited for the GPU.
     waited_before = gpus.waited_seconds()
-    used_device = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
+    opened = cycles.set_up(job.blend, contents, lightfield, job.device, threads)
     waited = gpus.waited_seconds() - waited_before
-    waited += gpu_kernels.compile_first(lightfield.views[0].world_from_camera)
+    waited += gpu_kernels.compile_first(opened, lightfield.views[0].world_from_camera)
     start = {
         "start_up_seconds": round(time.time() - history.started - waited, 4),
         "start_up_cpu_seconds": round(time.process_time(), 4),
-        "device": used_device,
+        "device": opened.device,
         "threads": threads,
     }
-    if used_device != "CPU":
+    if opened.device != "CPU":
         # For its GPU, and for Cycles' kernels.
         start["waited_seconds"] = round(waited, 4)
     shard_log.log(start)
+    return opened
 
 
 def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightField) -> None:
@@ -168,6 +163,7 @@ def _warn_of_other_versions(paths: Iterable[Path]) -> None:
 
 
 def _render_views(
+    opened: "OpenScene",
     views: Sequence[View],
     lightfield: LightField,
     folder: Path,
@@ -191,7 +187,7 @@ def _render_views(
             # Use a timer of the system, because a process that hangs may run no Python.
             signal.alarm(stall)
             rendered = _render_view(
-                view, lightfield, visible, catches=catches, has_holdouts=has_holdouts
+                opened, view, lightfield, visible, catches=catches, has_holdouts=has_holdouts
             )
             # Hold at most two views in memory. An error in writing ends the shard here.
             if written:
@@ -237,6 +233,7 @@ def _visible_places(lightfield: LightField) -> Array | None:
 
 
 def _render_view(
+    opened: "OpenScene",
     view: View,
     lightfield: LightField,
     visible: Array | None,
@@ -263,10 +260,11 @@ def _render_view(
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
     geometry = None
     if lightfield.depth or names:
-        geometry = render_geometry(view.world_from_camera, names, alpha=catches)
+        geometry = render_geometry(opened, view.world_from_camera, names, alpha=catches)
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render.seed, view.name)
-    colour = render_colour(view.world_from_camera, seed, view_passes, lightfield.transparent)
+    pose = view.world_from_camera
+    colour = render_colour(opened, pose, seed, view_passes, lightfield.transparent)
     unshown_pixels = None
     if catches:
         colour, geometry, unshown_pixels = unshown.left_out(colour, geometry, view_passes)
@@ -281,7 +279,7 @@ def _render_view(
 class _ViewFiles:
     """Writes the files of rendered views into ``folder`` and beside it, and notes them.
 
-    The seconds of a view count from the view before, so that those of all views add up.
+    The seconds of a view count from the view before, so that the seconds of all views add up.
     """
 
     def __init__(self, lightfield: LightField, folder: Path, progress: Progress) -> None:

@@ -15,6 +15,7 @@ from lightfield.core.errors import LESS_GPU_MEMORY, LESS_MEMORY, OutsideError, U
 from lightfield.core.leftovers import temporary_folder
 from lightfield.imaging import images
 from lightfield.planning.cost import temporary_bytes
+from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.scenes.quiet import quiet
 from lightfield.rendering.setup.cycles import view_layer
 from lightfield.rendering.setup.moving_camera import place_camera
@@ -39,13 +40,15 @@ class Rendered:
     synchronization_seconds: float
 
 
-def render_view(world_from_camera: Array, seed: int, passes: Mapping[str, str]) -> Rendered:
+def render_view(
+    opened: OpenScene, world_from_camera: Array, seed: int, passes: Mapping[str, str]
+) -> Rendered:
     """Render the view of a camera at ``world_from_camera``, (4, 4) camera-to-world.
 
     ``passes`` are names and channels, as in {"Combined": "RGB"}.
     """
     scene = bpy.context.scene
-    place_camera(world_from_camera)
+    place_camera(world_from_camera, opened.motion)
     scene.cycles.seed = seed
     groups = len(view_layer(scene).lightgroups)
     layer = view_layer(scene).name

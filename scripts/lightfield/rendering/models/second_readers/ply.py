@@ -63,7 +63,7 @@ class _Property(NamedTuple):
 
 
 class _Column(NamedTuple):
-    """The values of a property, and the type in its file. ``lengths`` are those of lists."""
+    """The values of a property, and the type in its file. ``lengths`` are the lengths of lists."""
 
     values: NDArray[Any]
     type: str

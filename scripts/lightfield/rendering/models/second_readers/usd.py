@@ -1,7 +1,6 @@
 """Says what a USD holds, with OpenUSD itself, without Blender."""
 
 from collections.abc import Iterator, Mapping
-from functools import cache
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -46,7 +45,7 @@ def read(path: Path, frame: float) -> ModelFacts:
     try:
         stage = usd.Usd.Stage.Open(str(path.absolute()))
         unjudged = _bake_skins(stage, frame)
-        reader = _Reader(stage, frame)
+        reader = _StageReader(stage, frame)
         reader.visit(stage.GetPseudoRoot(), _world_from_stage(stage))
     except (RuntimeError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is broken: {error}; export it again") from None
@@ -97,13 +96,15 @@ def is_rendered(prim: Any) -> bool:
     return openusd().UsdGeom.Imageable(prim).ComputePurpose() in ("default", "render")
 
 
-class _Reader:
+class _StageReader:
     """Collects the surfaces of a stage at a frame."""
 
     def __init__(self, stage: Any, frame: float) -> None:
         self._stage = stage
         self._time = openusd().Usd.TimeCode(frame)
-        self._geometry = cache(self._read_geometry)
+        # By prim. A cache of a method would keep the stage open, and OpenUSD would not read its
+        # layers again.
+        self._geometries: dict[Any, Geometry | None] = {}
         self.meshes: list[MeshFacts] = []
         self.unused: set[str] = set()
 
@@ -157,6 +158,12 @@ class _Reader:
                 self.unused.add(f"the subdivision of the mesh {printable(name)}: its cage is shown")
         elif kind in {*_CURVED, "Cube", "Plane"}:
             self.meshes.append(self._shape(prim, matrix))
+
+    def _geometry(self, prim: Any) -> Geometry | None:
+        """Return the faces of a mesh, which many instances may share."""
+        if prim not in self._geometries:
+            self._geometries[prim] = self._read_geometry(prim)
+        return self._geometries[prim]
 
     def _read_geometry(self, prim: Any) -> Geometry | None:
         """Return the faces of a mesh. None if it has none, or some without corners."""

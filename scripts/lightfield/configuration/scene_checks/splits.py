@@ -1,0 +1,42 @@
+"""Checks the rigs of a split: trainers see them as one dataset."""
+
+from collections.abc import Set
+
+from lightfield.configuration.scene_blocks import SceneBlocks
+from lightfield.core.names import PARTS
+
+
+def check(blocks: SceneBlocks) -> None:
+    """Check that a split has both parts, equal cameras, and blocks that choose all of it."""
+    split_rigs = {name: rig for name, rig in blocks.rigs.items() if rig.split in PARTS}
+    if not split_rigs:
+        return
+    training = next((name for name, rig in split_rigs.items() if rig.split == "train"), None)
+    if training is None:
+        name = next(iter(split_rigs))
+        raise ValueError(f"rigs.{name}.split: is {split_rigs[name].split}, but no rig trains")
+    if not any(rig.split == "test" for rig in split_rigs.values()):
+        raise ValueError(f"rigs.{training}.split: is train, but no rig tests")
+    for name, rig in split_rigs.items():
+        for key in ("camera", "frames"):
+            if getattr(rig, key) != getattr(split_rigs[training], key):
+                raise ValueError(f"rigs.{name}.{key}: must be as in {training}, which trains")
+    for name, reprojection in blocks.developments.items():
+        key = f"reprojections.{name}" if name in blocks.reprojections else "sensor"
+        _check_whole_split(blocks, f"{key}.rigs", split_rigs.keys(), reprojection.rigs)
+    for name, export in blocks.exports.selected.items():
+        if export.joins_split:
+            _check_whole_split(blocks, f"exports.{name}.rigs", split_rigs.keys(), export.rigs)
+
+
+def _check_whole_split(
+    blocks: SceneBlocks, key: str, split_rigs: Set[str], chosen_rigs: list[str] | None
+) -> None:
+    """Check that the chosen rigs, or all without a choice, have a whole split or none of it."""
+    missing_rigs = split_rigs - set(chosen_rigs or blocks.rigs)
+    if missing_rigs and missing_rigs != split_rigs:
+        rigs = ", ".join(sorted(missing_rigs))
+        raise ValueError(
+            f"{key}: lacks {rigs}; must have all rigs of the split, the one that trains and "
+            "the ones that test, or none"
+        )
