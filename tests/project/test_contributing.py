@@ -20,7 +20,7 @@ def test_a_lens_a_setting_and_an_exporter_have_an_example():
 @pytest.mark.parametrize(
     ("number", "tests"),
     [
-        (0, ["tests/geometry/test_lenses.py", "-k", "thoby"]),
+        (0, ["tests/geometry/test_lenses.py", "tests/publishing/test_reader.py", "-k", "thoby"]),
         (1, ["tests/export/test_exports.py", "-k", "decimals"]),
         (2, ["tests/export/test_exports.py", "-k", "tum"]),
     ],

@@ -80,6 +80,7 @@ class Package(Stage[PackSettings]):
     """Packs a finished dataset as tar archives with a card."""
 
     name = "package"
+    version = 2
     function = "lightfield.publishing.package:write"
     by_hand = PackageByHand
 
@@ -91,6 +92,7 @@ class Publish(Stage[PackSettings]):
     """Writes a finished dataset as WebDataset shards, with descriptions of them."""
 
     name = "publish"
+    version = 2
     function = "lightfield.publishing.publish:write"
     by_hand = PublishByHand
 
