@@ -26,11 +26,12 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.export import disparity, hci
 from lightfield.export.points import evenly, one_a_voxel
-from lightfield.export.source import SeenSurface, SourceDataset
+from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
+from lightfield.reading.surface import SeenSurface
 from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
@@ -790,6 +791,7 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
         path = dataset / "normal" / f"{view.name}.exr"
         path.parent.mkdir(exist_ok=True)
         images.write_exr(path, dict(zip("RGB", planes, strict=True)))
+    lightfield.changed(passes=["normal"]).write(lightfield.path)
     folder = exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
     content = json.loads((folder / "transforms.json").read_text())
     for path, matrix in lichtfeld_cameras(content).items():

@@ -47,7 +47,7 @@ def read(path: Path) -> ModelFacts:
 
     Raises `UserError` for what is not a number, and for faces whose vertices do not exist.
     """
-    reader = _Reader(path)
+    reader = _ObjReader(path)
     for lines in read_lines(path):
         reader.read(lines)
     return reader.facts(Materials(obj_files.libraries(path)))
@@ -62,7 +62,7 @@ class _Part:
     sizes: list[NDArray[np.int64]] = field(default_factory=list)
 
 
-class _Reader:
+class _ObjReader:
     """Collects the vertices and faces of an OBJ."""
 
     def __init__(self, path: Path) -> None:

@@ -46,7 +46,7 @@ def read(path: Path, frame: float) -> ModelFacts:
     try:
         stage = usd.Usd.Stage.Open(str(path.absolute()))
         unjudged = _bake_skins(stage, frame)
-        reader = _Reader(stage, frame)
+        reader = _UsdReader(stage, frame)
         reader.visit(stage.GetPseudoRoot(), _world_from_stage(stage))
     except (RuntimeError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is broken: {error}; export it again") from None
@@ -97,7 +97,7 @@ def is_rendered(prim: Any) -> bool:
     return openusd().UsdGeom.Imageable(prim).ComputePurpose() in ("default", "render")
 
 
-class _Reader:
+class _UsdReader:
     """Collects the surfaces of a stage at a frame."""
 
     def __init__(self, stage: Any, frame: float) -> None:
