@@ -14,7 +14,6 @@ from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.imaging.alpha import divisor
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.reading.dataset import OpenDataset, OpenView
@@ -110,14 +109,11 @@ class SourceDataset:
         image = self.view(view).image()
         if self.suffix == ".png":
             return image.srgb
-        colour = image.colour
-        alpha = None
-        if self.lightfield.transparent:
-            alpha = image.channels["A"][..., None].astype(np.float32)
-            alpha = divisor(alpha)
-            colour /= alpha
+        transparent = self.lightfield.transparent
+        colour = image.straight if transparent else image.colour
         if self.look:
-            return np.asarray(self.look.to_pixels(colour, 8, alpha), np.uint8)
+            covered = image.covered if transparent else None
+            return np.asarray(self.look.to_pixels(colour, 8, covered), np.uint8)
         # Only here, because its kernels take long to load, and most exports link developed views.
         from lightfield.imaging.tonemap import to_8_bit, tone_map
 

@@ -31,7 +31,9 @@ def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "
     for file in Path(folder).glob(f"{frame}/{reprojection or '.'}/lightfield.json"):
         content = json.loads(file.read_text("utf-8"))
         for number, view in enumerate(content["frames"]):
-            views[file, number] = PlainView(content | view, reprojection, file.parent)
+            views[len(str(file)), file, number] = PlainView(
+                content | view, reprojection, file.parent
+            )
     for shard in [] if views else Path(folder).glob("*-[0-9]*.tar"):
         with tarfile.open(shard) as tar:
             members: Any = {member.name: tar.extractfile(member) for member in tar}
