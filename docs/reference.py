@@ -259,9 +259,9 @@ class Part:
 API = [
     Part("reading/opening.py", "open_dataset"),
     Part("reading/opening.py", "open_corpus"),
-    Part("reading/dataset.py", "Dataset"),
-    Part("reading/dataset.py", "Views"),
-    Part("reading/dataset.py", "View"),
+    Part("reading/dataset.py", "OpenDataset"),
+    Part("reading/dataset.py", "OpenViews"),
+    Part("reading/dataset.py", "OpenView"),
     Part(
         "formats/lightfield.py",
         "LightField",
@@ -551,7 +551,7 @@ TYPES = {
     "npt.DTypeLike": "dtype",
     "str | os.PathLike[str]": "path",
     "Path | str": "path",
-    "Camera": "view of lightfield.json",
+    "View": "view of lightfield.json",
     "Pair": "two floats",
     "Pair | None": "two floats or None",
 }

@@ -25,13 +25,14 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.export import disparity
 from lightfield.export.points import evenly, one_a_voxel
-from lightfield.export.source import SeenSurface, SourceDataset
+from lightfield.export.source import SourceDataset
 from lightfield.exporters import BESIDE_VIEWS, EXPORTERS, SEQUENCE_EXPORTS, Exports, hci
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.products import exports
+from lightfield.reading.surface import SeenSurface
 from lightfield.stages.exports import ExportViews
 from lightfield.validation import files as validation_files
 
@@ -795,6 +796,7 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
         path = dataset / "normal" / f"{view.name}.exr"
         path.parent.mkdir(exist_ok=True)
         images.write_exr(path, dict(zip("RGB", planes, strict=True)))
+    lightfield.changed(passes=["normal"]).write(lightfield.path)
     folder = exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
     content = json.loads((folder / "transforms.json").read_text())
     for path, matrix in lichtfeld_cameras(content).items():

@@ -16,6 +16,7 @@ LEFT_OUT = shutil.ignore_patterns(
 )
 TESTS = [
     ["tests/geometry/test_lenses.py", "-k", "thoby or registry"],
+    ["tests/publishing/test_reader.py", "-k", "thoby"],
     ["tests/geometry/test_rigs.py"],
     ["tests/export/test_exports.py", "-k", "tum or decimals or exporter"],
     ["tests/configuration/test_mistakes.py", "-k", "arc or decimals or tum"],

@@ -19,7 +19,7 @@ from lightfield.configuration.scene_yaml import Scene
 from lightfield.geometry import frames
 from lightfield.geometry.rigs.poses import LARGEST_FILE
 from lightfield.imaging.images import HALF_MAX
-from lightfield.reading.dataset import Dataset, View
+from lightfield.reading.dataset import OpenDataset, OpenView
 from lightfield.settings.base import checked
 from lightfield.stages.registry import VERSIONS as STAGE_VERSIONS
 
@@ -170,7 +170,7 @@ def rows_of(page, heading):
     return [cell.strip("`") for cell in re.findall(r"^\| (`[^|]+`) \|", section, re.M)]
 
 
-@pytest.mark.parametrize("model", [Dataset, View])
+@pytest.mark.parametrize("model", [OpenDataset, OpenView])
 def test_the_page_of_the_library_has_each_public_member_of_what_a_reader_gets(model):
     fields = [field.name for field in dataclasses.fields(model)]
     members = {*fields, *vars(model)}

@@ -510,6 +510,8 @@ def results(folder, sequence, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", stand_in_for_torch())
     garden = write_dataset(tmp_path / GARDEN / "dataset", RIG | {"cameras": [5, 4]})
     shutil.copytree(garden, tmp_path / GARDEN, dirs_exist_ok=True)
+    shutil.copy(package.READER_SOURCE, tmp_path / GARDEN)
+    monkeypatch.syspath_prepend(tmp_path / GARDEN)
     shutil.copytree(sequence, tmp_path / "results/still_life/LFMoving")
     for number in range(4):
         families.add_member(tmp_path / "results/chairs", f"{number:04d}", shade=number)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from sphere import write_views
 
-from lightfield.formats.lightfield import LightField
 from lightfield.geometry import rigs
+from lightfield.reading.dataset import OpenDataset
 from lightfield.report import views
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [128, 128]}
@@ -29,8 +29,7 @@ def noisy(tmp_path_factory):
 
 
 def collected(folder):
-    field = LightField.read(folder / "lightfield.json")
-    return views.collect(folder / "exr", field, rigs.from_settings(RIG)).data
+    return views.collect(OpenDataset.in_folder(folder), rigs.from_settings(RIG)).data
 
 
 def test_views_keep_their_size_if_the_page_stays_small(noisy):

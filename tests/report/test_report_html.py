@@ -23,6 +23,7 @@ from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
 from lightfield.imaging.tonemap import decode_srgb
 from lightfield.products import exports
+from lightfield.reading.dataset import OpenDataset
 from lightfield.report import (
     contact_sheet,
     dataset_page,
@@ -469,10 +470,11 @@ def test_a_scene_at_rest_has_a_white_picture_of_motion(tmp_path):
     lightfield = write_dataset(tmp_path, LINE)
     render = lightfield.render.changed(passes=["motion"])
     lightfield = lightfield.changed(render=render.to_json())
-    view, motion = lightfield.views[0], PASSES["motion"]
+    lightfield.write(tmp_path / "lightfield.json")
+    view, motion = OpenDataset.in_folder(tmp_path).views[0], PASSES["motion"]
     noise = np.full((lightfield.lens.height, lightfield.lens.width), 1e-5, np.float32)
     images.write_exr(motion.path(tmp_path, view.name), dict.fromkeys(motion.channels, noise))
-    ((_, _, picture),) = pass_pictures.collect(tmp_path, lightfield, view, 0)
+    ((_, _, picture),) = pass_pictures.collect(view, 0)
     assert (decoded(picture) >= 252).all()
 
 

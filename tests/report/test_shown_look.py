@@ -18,7 +18,6 @@ from lightfield.configuration.publication import Credits
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.files import sha256, write_json
-from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -26,6 +25,7 @@ from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.publishing import package
 from lightfield.publishing.publish import publish
+from lightfield.reading.dataset import OpenDataset
 from lightfield.report import dataset_page
 from lightfield.stages.report import FiguresSettings, PageSettings, ReportFigures, ReportHtml
 from lightfield.synthesis.view import Sources, reader
@@ -82,7 +82,7 @@ def canvas_of(opened, name):
 def test_the_walk_and_the_open_view_have_the_look(folder, show):
     opened = show(make_page(folder, RIG), walk_scale=SMALL_WALK)
     wait(opened)
-    source, lens = SourceDataset(folder, "", ".exr"), lenses.from_camera(EYE)
+    source, lens = OpenDataset.in_folder(folder), lenses.from_camera(EYE)
     field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
     place, yaw, pitch = np.array([0.1, 0.05, -0.1]), 0.2, -0.1
     shown = look_from(opened, place.tolist(), yaw, pitch)

@@ -14,11 +14,11 @@ from conftest import SMALL_WALK, error_listeners
 from PIL import Image
 from sphere import BALL, BALL_RADIUS, RADIUS, RED, look, look_at_ball, write_views
 
-from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import pictures
+from lightfield.reading.dataset import OpenDataset
 from lightfield.stages.report import PageSettings, ReportHtml
 from lightfield.synthesis.view import Sources, reader
 
@@ -200,7 +200,7 @@ def test_the_canvas_equals_the_synthesis_and_the_truth(tmp_path, show):
     opened = show(written_page(folder, RIG["camera"], RIG, look_at_ball))
     wait(opened)
     exposure = opened.evaluate("viewer.exposure")
-    source, lens = SourceDataset(folder, "", ".exr"), lenses.from_camera(EYE)
+    source, lens = OpenDataset.in_folder(folder), lenses.from_camera(EYE)
     field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
     random = np.random.default_rng(3)
     for _ in range(10):
@@ -223,7 +223,7 @@ def test_the_canvas_shows_what_is_in_a_mirror(tmp_path, show):
     folder = tmp_path / "dataset"
     opened = show(written_page(folder, mirrors.CAMERA, rig, mirrors.see_framed_mirror))
     wait(opened)
-    source, lens = SourceDataset(folder, "", ".exr"), lenses.from_camera(EYE)
+    source, lens = OpenDataset.in_folder(folder), lenses.from_camera(EYE)
     field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
     place = [0.14, 0, -0.16]
     shown = look_from(opened, place, 0, 0, is_zoomed_out=True)

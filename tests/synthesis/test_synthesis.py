@@ -14,7 +14,6 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
-from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
@@ -22,6 +21,7 @@ from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.imaging.video import video
 from lightfield.measurement import summaries, synthesis_quality
+from lightfield.reading.dataset import OpenDataset
 from lightfield.report import tables
 from lightfield.synthesis.view import Sources, Synthesised
 
@@ -463,7 +463,7 @@ def test_smaller_views_have_the_depth_of_their_pixels(tmp_path, width):
     camera = {"lens": "rectilinear", "fov": 70, "resolution": [width, width]}
     rig = {"type": "plane", "cameras": [2, 1], "size": 2.0}
     write_views(tmp_path / "dataset", camera, rig)
-    source = SourceDataset(tmp_path / "dataset", "", ".exr")
+    source = OpenDataset.in_folder(tmp_path / "dataset")
     views = source.lightfield.views
     (small,) = (
         variant.sources
@@ -479,12 +479,12 @@ def test_smaller_views_have_the_depth_of_their_pixels(tmp_path, width):
 def test_errors_at_the_poles_of_a_panorama_count_by_their_solid_angle(tmp_path):
     rig = {"type": "plane", "cameras": [2, 2], "size": 0.2}
     write_views(tmp_path / "dataset", EYES["panorama"], rig)
-    truth = SourceDataset(tmp_path / "dataset", "", ".exr")
+    truth = OpenDataset.in_folder(tmp_path / "dataset")
     views = truth.lightfield.views
     variant = next(synthesis_quality.variants(truth, views))
 
     def row_of(rows_with_error):
-        colour = images.read_image(truth.path(views[0])).colour.copy()
+        colour = truth.views[0].rgb.copy()
         colour[rows_with_error] *= 1.5
         height, width = colour.shape[:2]
         holes = np.zeros((height, width), bool)

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from lightfield.exporters import Exports
 from lightfield.configuration.family import Family
 from lightfield.configuration.publication import Credits
 from lightfield.configuration.render_settings import Render
@@ -20,6 +19,7 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.names import FILE
+from lightfield.exporters import Exports
 from lightfield.formats.sensors import Sensor
 from lightfield.geometry.rigs import AnyRig
 from lightfield.imaging import blender_looks

@@ -13,10 +13,11 @@ import numpy as np
 
 from lightfield.core.files import write_bytes
 from lightfield.export import cameras
-from lightfield.export.source import Floats, SeenSurface
+from lightfield.export.source import Floats
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.visibility import pixel_indices
+from lightfield.reading.surface import SeenSurface
 
 # The bounds leave out this percentage of the nearest and of the farthest points.
 _OUTLIERS = 0.1

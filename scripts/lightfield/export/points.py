@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
-from lightfield.export.source import Floats, SeenSurface, SourceDataset
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.formats.lightfield import View
 from lightfield.geometry.visibility import pixel_indices
+from lightfield.reading.surface import SeenSurface
 
 # Lift this many candidates for each point, and keep an even selection of them.
 _CANDIDATES = 8

@@ -19,8 +19,7 @@ from lightfield.core.progress import Progress
 from lightfield.export.source import SourceDataset
 from lightfield.exporters.base import Export
 from lightfield.formats.lightfield import View
-from lightfield.formats.passes import NAMES, PASSES
-from lightfield.imaging import images
+from lightfield.formats.passes import NAMES
 
 Numbers = NDArray[np.uint32]
 
@@ -96,9 +95,7 @@ def _names(source: SourceDataset, kind: str) -> dict[str, int]:
 
 def _pixels(source: SourceDataset, view: View, kind: str) -> Numbers:
     """Return a view's numbers (height, width) of a pass."""
-    path = PASSES[kind].path(source.dataset / source.name, view.name)
-    pixels: Numbers = images.read_image(path, ["Y"]).channels["Y"]
-    return pixels
+    return source.view(view).read(kind)
 
 
 def _boxes(objects: Numbers, instances: Numbers) -> Iterator[tuple[int, int, list[int], int]]:

@@ -37,7 +37,6 @@ from lightfield.exporters.base import (
     PointCount,
     angle,
 )
-from lightfield.formats.depth import check_size
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -171,13 +170,11 @@ def _depth(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uin
 
 def _normals(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Return a view's normals (h, w, 3) as colours. Raises `UserError` if it has none."""
-    path = source.pass_path(view, "normal")
+    path = source.view(view).pass_path("normal")
     if not path.is_file():
         raise UserError(
             f"{path}: is missing; normals need passes: [normal] in render and in the reprojection"
         )
-    channels = images.read_image(path).channels
-    world: Floats = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float64)
-    check_size(path, source.lightfield, world)
+    world: Floats = source.view(view).normal.astype(np.float64)
     local = world @ view.world_from_camera[:3, :3] * _FLIP
     return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)

@@ -83,8 +83,5 @@ def _motion(frame: SourceDataset, view: View, direction: str) -> Floats:
     """Return a view's motion (h, w, 2) to the "next" or to the "previous" frame, in pixels."""
     if MOTION.name not in {each.name for each in frame.lightfield.passes}:
         raise UserError(f"{frame.lightfield.path}: passes: lack motion; add it to render.passes")
-    channels = [f"{direction}.{axis}" for axis in "XY"]
-    path = MOTION.path(frame.dataset / frame.name, view.name)
-    image = images.read_image(path, channels)
-    planes = [image.channels[name] for name in channels]
-    return np.stack(planes, axis=-1, dtype=np.float64)
+    part = [MOTION.channels.index(f"{direction}.{axis}") for axis in "XY"]
+    return frame.view(view).read(MOTION.name)[..., part].astype(np.float64)

@@ -18,6 +18,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, check_readable, open_file
+from lightfield.imaging.alpha import divisor
 from lightfield.imaging.primaries import Chromaticities, to_rec_709
 
 Attribute = str | int | float
@@ -82,6 +83,16 @@ class Image:
         planes = [self.channels[name] for name in "RGB"]
         colour = np.stack(planes, axis=-1, dtype=np.float32)
         return to_rec_709(colour, self.chromaticities)
+
+    @property
+    def covered(self) -> np.ndarray[Any, Any]:
+        """Channel A as (height, width, 1) float32, by which an EXR's colour can be divided."""
+        return divisor(self.channels["A"][..., np.newaxis].astype(np.float32))
+
+    @property
+    def straight(self) -> np.ndarray[Any, Any]:
+        """An EXR's `colour` (height, width, 3) float32, divided by `covered`."""
+        return np.asarray(self.colour / self.covered)
 
     @property
     def alpha(self) -> np.ndarray[Any, Any]:

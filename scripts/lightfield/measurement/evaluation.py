@@ -117,8 +117,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
         colour, alpha = _rounded(source, view, largest)
         colour = _on_background(colour, alpha, background, largest)
     else:
-        image = images.read_image(source.path(view))
-        check_size(source.path(view), source.lightfield, image.channels["R"])
+        image = source.view(view).image()
         # In views that are not transparent, alpha marks where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
         if alpha is not None and source.suffix == ".png":
@@ -131,7 +130,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
         colour,
         alpha,
         source.depth(view, source.lightfield.depth or "") if has_depth else None,
-        _normals(source.dataset / source.name / _NORMALS / f"{view.name}.exr", source),
+        _normals(source.view(view).pass_path(_NORMALS), source),
     )
 
 
@@ -160,16 +159,14 @@ def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, F
     transparent = source.lightfield.transparent
     if largest == 255:
         return source.colour(view) / 255, source.alpha(view) / 255 if transparent else None
-    image = images.read_image(source.path(view))
-    check_size(source.path(view), source.lightfield, image.channels["R"])
+    image = source.view(view).image()
     alpha = _alpha(image) if transparent else None
     if image.channels["R"].dtype.kind == "u":
         return image.encoded, alpha
     light = image.colour
     if alpha is not None:
         alpha = np.rint(alpha * largest) / largest
-        covered = image.channels["A"][..., np.newaxis].astype(np.float32)
-        light = light / divisor(covered)
+        light = image.straight
     if source.look:
         return source.look.to_pixels(light, 16, _covered(alpha)) / largest, alpha
     return to_16_bit(tone_map(light, source.exposure, source.reinhard)) / largest, alpha

@@ -15,16 +15,15 @@ import numpy as np
 
 from lightfield.core.files import absolute_path, write_csv
 from lightfield.core.progress import Progress
-from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import LightField, View
-from lightfield.formats.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.formats.passes import PARTS_OF_LIGHT
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.rigs.sphere import nested
-from lightfield.imaging import images, pictures, plots
+from lightfield.imaging import pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import summaries
 from lightfield.measurement.picture_difference import (
@@ -35,12 +34,13 @@ from lightfield.measurement.picture_difference import (
     ws_psnr,
 )
 from lightfield.measurement.summaries import ALL_PIXELS, PLACES
+from lightfield.reading.dataset import OpenDataset
 from lightfield.stages.measurement import SynthesisQuality, SynthesisSettings
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis.view import Sources, reader
 
 # True views, and the dataset that has them.
-_Truth = tuple[SourceDataset, Sequence[View]]
+_Truth = tuple[OpenDataset, Sequence[View]]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _Variant:
 
 def measure(job: SynthesisQuality) -> None:
     """Write and print the quality of a dataset's synthesised views."""
-    source = SourceDataset(job.dataset, "", ".exr")
+    source = _opened(job.dataset)
     views, truths = _views_and_truths(source, job.settings)
     exposure = _exposure(truths)
     all_variants = list(variants(source, views))
@@ -78,14 +78,20 @@ def measure(job: SynthesisQuality) -> None:
         print(_line(row))
 
 
+def _opened(folder: Path) -> OpenDataset:
+    dataset = OpenDataset.in_folder(folder)
+    dataset.lightfield.require_centre()
+    return dataset
+
+
 def _views_and_truths(
-    source: SourceDataset, settings: SynthesisSettings
+    source: OpenDataset, settings: SynthesisSettings
 ) -> tuple[Sequence[View], list[_Truth]]:
     """Return the views to synthesise from, and those to compare with."""
     views: Sequence[View] = source.lightfield.views
     truths: list[_Truth]
     if settings.truth:
-        datasets = [SourceDataset(Path(folder), "", ".exr") for folder in settings.truth]
+        datasets = [_opened(Path(folder)) for folder in settings.truth]
         truths = [(truth, truth.lightfield.views) for truth in datasets]
     else:
         views, _, tests = splits(source.lightfield)
@@ -98,11 +104,7 @@ def _views_and_truths(
 
 def _exposure(truths: Sequence[_Truth]) -> float:
     """Return the exposure that shows all true views well."""
-    colours = [
-        images.read_image(truth.path(view), "RGB").colour
-        for truth, true_views in truths
-        for view in true_views
-    ]
+    colours = [truth.views[view.name].rgb for truth, true_views in truths for view in true_views]
     return pictures.exposure_for(np.concatenate([colour.reshape(-1, 3) for colour in colours]))
 
 
@@ -116,11 +118,11 @@ def _line(row: Mapping[str, Any]) -> str:
     )
 
 
-def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[_Variant]:
+def variants(source: OpenDataset, views: Sequence[View]) -> Iterator[_Variant]:
     """Yield the variants and controls of a dataset's ``views``, the unchanged one first."""
     lens = source.lens
     read = reader(source)
-    sizes = {view.name: source.path(view).stat().st_size for view in views}
+    sizes = {view.name: source.views[view.name].path.stat().st_size for view in views}
     size = sum(sizes.values())
     fills_holes = not source.lightfield.transparent
     make = partial(Sources, lens, fills_holes=fills_holes)
@@ -182,7 +184,7 @@ def _subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence
     yield from spheres or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
 
 
-def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]:
+def regions(truth: OpenDataset, view: View, inside: Array) -> dict[str, Array]:
     """Return the pixels (h, w) of each region of a true view, out of those ``inside`` the lens.
 
     If the view has the passes of all kinds of light, each kind has a region. Black pixels show
@@ -190,9 +192,8 @@ def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]
     """
     by_region = {ALL_PIXELS: inside}
     if {*PARTS_OF_LIGHT} <= {render_pass.name for render_pass in truth.lightfield.passes}:
-        folder = truth.lightfield.folder
-        paths = [PASSES[name].path(folder, view.name) for name in PARTS_OF_LIGHT]
-        light = np.array([images.read_image(path, "RGB").colour.mean(axis=-1) for path in paths])
+        opened = truth.views[view.name]
+        light = np.array([opened.read(name).mean(axis=-1) for name in PARTS_OF_LIGHT])
         most = light.argmax(axis=0)
         for number, name in enumerate(PARTS_OF_LIGHT):
             is_most = (most == number) & (light[number] > 0)
@@ -204,7 +205,7 @@ def compare(
     variant: _Variant,
     around: Sequence[View],
     views: Sequence[View],
-    truth: SourceDataset,
+    truth: OpenDataset,
     exposure: float,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
@@ -222,7 +223,7 @@ def compare(
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
     for view, to_edge in zip(views, parts.tolist(), strict=True):
         synthesised = variant.sources.synthesise(view.world_from_camera, truth.lens, variant.best)
-        true = images.read_image(truth.path(view), "RGB").colour
+        true = truth.views[view.name].rgb
         true_picture = _developed(true, exposure, inside)
         picture = _developed(synthesised.colour, exposure, inside)
         black = np.where(synthesised.holes[..., None], 0, picture)
@@ -233,7 +234,7 @@ def compare(
             yield {
                 "variant": variant.name,
                 "value": variant.value,
-                "truth": absolute_path(truth.dataset).name,
+                "truth": absolute_path(truth.files.path).name,
                 "view": view.name,
                 "to_edge": to_edge,
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),

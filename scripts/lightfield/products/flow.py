@@ -9,11 +9,11 @@ from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.export.source import SourceDataset
-from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField
 from lightfield.formats.passes import FLOW
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
+from lightfield.reading.dataset import OpenDataset, OpenView
 from lightfield.stages.views import ComputeFlow
 from lightfield.workflow import shard_log
 
@@ -21,7 +21,7 @@ from lightfield.workflow import shard_log
 def write_flow(job: ComputeFlow) -> None:
     """Write the flow of the chosen views. Raises `UserError` for a view without a neighbour."""
     lightfield = LightField.read(job.lightfield)
-    source = SourceDataset(lightfield.folder, "", ".exr")
+    opened = OpenDataset.in_folder(lightfield.folder).views
     views = lightfield.views[view_slice(job.views, len(lightfield.views))]
     view_of_name = {view.name: view for view in lightfield.views}
     progress = Progress(len(views), f"flow {lightfield.folder} {job.views}".rstrip(": "))
@@ -30,23 +30,24 @@ def write_flow(job: ComputeFlow) -> None:
         if neighbour is None:
             raise UserError(f"{job.lightfield}: frames: {view.name}: flow: must name a view")
         path = job.output / f"{view.flow}.exr"
-        sums = [sha256(source.path(view)), sha256(source.path(neighbour))]
+        pair = opened[view.name], opened[neighbour.name]
+        sums = [sha256(each.path) for each in pair]
         key = keys.flow_key(lightfield, view, neighbour, sums)
         if not shard_log.is_finished(path, key):
-            _write(path, source, view, neighbour, key)
+            _write(path, *pair, key)
             shard_log.add(path, key)
         progress.done()
 
 
-def _write(path: Path, source: SourceDataset, view: View, neighbour: View, key: str) -> None:
+def _write(path: Path, view: OpenView, neighbour: OpenView, key: str) -> None:
     """Write the flow from a view to its neighbour."""
-    neighbour_distance = source.depth(neighbour, "distance")
-    neighbour_distance[images.may_hide(source.path(neighbour))] = np.nan
+    neighbour_distance = neighbour.depth_as("distance")
+    neighbour_distance[images.may_hide(neighbour.path)] = np.nan
     motion, visible = flow(
-        source.lens,
+        view.lens,
         view.world_from_camera,
         neighbour.world_from_camera,
-        source.depth(view, "distance"),
+        view.depth_as("distance"),
         neighbour_distance,
     )
     planes = [*np.moveaxis(np.nan_to_num(motion), -1, 0), visible]

@@ -14,7 +14,15 @@ from typing import Any
 from lightfield.configuration.publication import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, open_file, read_json, read_keys, sha256, write_json
+from lightfield.core.files import (
+    atomic_path,
+    open_file,
+    read_json,
+    read_keys,
+    read_text,
+    sha256,
+    write_json,
+)
 from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
@@ -25,7 +33,6 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import title
-from lightfield.publishing import reader
 from lightfield.publishing.markdown import markdown
 from lightfield.report import snippet
 from lightfield.stages.publishing import Package
@@ -34,6 +41,9 @@ SILVR = (
     "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "
     "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
 )
+
+# The file that reads any dataset without Plenoforge. Every package has it.
+READER_SOURCE = Path(__file__).with_name(READER)
 
 # How to load each export, and the mesh. {} stands for the folder that holds it.
 LOADERS = {name: exporter.loader for name, exporter in EXPORTERS.items()} | {
@@ -166,7 +176,7 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     texts = {
         CARD: json.dumps(content, indent=1) + "\n",
         README: readme,
-        READER: source_of_reader(folder),
+        READER: read_text(READER_SOURCE),
     }
     paths = [
         path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
@@ -187,16 +197,6 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
                 progress.done()
         written.append(name)
     return written
-
-
-def source_of_reader(folder: Path, shards: bool = False) -> str:
-    """Return the content of read.py for a rig's folder, or for shards of it."""
-    frames = _frames(folder)
-    first = frames[0] if frames else folder
-    lightfields = {"": LightField.read(first / NAME)}
-    for path in sorted(first.glob(f"*/{NAME}")):
-        lightfields[path.parent.name] = LightField.read(path)
-    return reader.source(lightfields, is_sequence=bool(frames), shards=shards)
 
 
 def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from lightfield.configuration.publication import CARD, CROISSANT, Credits
 from lightfield.configuration.shown_look import ShownLook
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json, write_text
+from lightfield.core.files import read_text, write_json, write_text
 from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.formats.layout import SUMS
@@ -89,7 +89,7 @@ def publish(
     )
     write_text(output / CARD, hugging_face.describe(published))
     write_json(output / CROISSANT, croissant.describe(published))
-    write_text(output / READER, package.source_of_reader(folder, shards=True))
+    write_text(output / READER, read_text(package.READER_SOURCE))
     documents = [output / name for name in (CARD, CROISSANT, READER)]
     entries = [*published.files, *package.listed(documents)]
     sums = sorted(f"{entry['sha256']}  {entry['file']}\n" for entry in entries)

@@ -18,12 +18,12 @@ from lightfield.core.names import PARTS
 from lightfield.formats import passes
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import ImageSet
-from lightfield.formats.lightfield import NAME, LightField
-from lightfield.formats.lightfield import View as Camera
-from lightfield.formats.passes import FLOW, NAMES
+from lightfield.formats.lightfield import NAME, LightField, View
+from lightfield.formats.passes import FLOW, NAMES, Pass
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.reading.files import Files
+from lightfield.reading.files import Files, Folder
+from lightfield.reading.surface import SeenSurface
 
 Array = NDArray[Any]
 Floats = NDArray[np.float32]
@@ -32,15 +32,15 @@ Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class View:
+class OpenView:
     """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
 
     ``dataset`` is the dataset of its frame. ``camera`` is its entry in lightfield.json. A property
     reads its file each time, so keep the arrays that you need again.
     """
 
-    dataset: "Dataset"
-    camera: Camera
+    dataset: "OpenDataset"
+    camera: View
 
     def __repr__(self) -> str:
         return f"<view {self.name} of {self.dataset.lightfield.path}>"
@@ -83,32 +83,32 @@ class View:
     @property
     def rgb(self) -> Floats:
         """The colour (height, width, 3): linear light from an EXR, or 0 to 1 in sRGB from a PNG."""
-        image = self._image([*"RGB"])
+        image = self.image([*"RGB"])
         is_light = image.channels["R"].dtype.kind == "f"
         return (image.colour if is_light else image.encoded).astype(np.float32, copy=False)
 
     @property
     def alpha(self) -> Floats:
         """The part of each pixel (height, width) that the scene covers, from 0 to 1."""
-        return self._image(["A"]).alpha.astype(np.float32)
+        return self.image(["A"]).alpha.astype(np.float32)
 
     @property
     def depth(self) -> Floats:
-        """The depth (height, width) in metres, of the kind that `Dataset.depth` names.
+        """The depth (height, width) in metres, of the kind that `OpenDataset.depth` names.
 
         inf for a miss, and NaN for a pixel without depth.
         """
-        return self._depth(self.dataset.depth)
+        return self.depth_as(self.dataset.depth).astype(np.float32)
 
     @property
     def distance(self) -> Floats:
         """The depth (height, width) in metres, measured from the camera along the ray."""
-        return self._depth("distance")
+        return self.depth_as("distance").astype(np.float32)
 
     @property
     def z(self) -> Floats:
         """The depth (height, width) in metres, measured along the optical axis."""
-        return self._depth("z")
+        return self.depth_as("z").astype(np.float32)
 
     @property
     def normal(self) -> Floats:
@@ -127,16 +127,22 @@ class View:
                 f"{', '.join(names) or 'none'}"
             )
         view_pass = FLOW if name == FLOW.name else passes.by_name(name)
-        view = (self.camera.flow or "") if view_pass == FLOW else self.name
-        image = self._read(
-            view_pass.path(Path(self.dataset.folder), view).as_posix(), view_pass.channels
-        )
+        image = self._read(self._file_of_pass(view_pass), view_pass.channels)
         pixels: Array = np.stack(
             [image.channels[channel] for channel in view_pass.channels], axis=-1
         )
         if pixels.dtype.kind == "f":
             pixels = pixels.astype(np.float32, copy=False)
         return pixels if len(view_pass.channels) > 1 else pixels.squeeze(axis=-1)
+
+    def pass_path(self, name: str) -> Path:
+        """Return the file of a pass. It may be missing."""
+        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
+        return self.dataset.files.place(self._file_of_pass(view_pass))
+
+    def _file_of_pass(self, view_pass: Pass) -> str:
+        view = (self.camera.flow or "") if view_pass == FLOW else self.name
+        return view_pass.path(Path(self.dataset.folder), view).as_posix()
 
     def rays(self) -> tuple[Doubles, Doubles]:
         """Return the rays of all pixels' centres in the world: origins and unit directions.
@@ -161,13 +167,30 @@ class View:
         pixels = self.lens.pixels(self.camera.to_camera(np.asarray(points, np.float64)))
         return pixels, self.lens.in_frame(pixels)
 
-    def _depth(self, meaning: str | None) -> Floats:
+    def depth_as(self, meaning: str | None) -> Doubles:
+        """Return the depth (height, width) in metres, as "z" or "distance", with all its digits.
+
+        inf for a miss, NaN for a pixel without depth. Raises `UserError` if ``meaning`` is None.
+        """
         lightfield = self.dataset.lightfield
         if meaning is None:
             raise UserError(f"{lightfield.path}: depth: is null; these views have no depth")
         with self.dataset.files.on_disk(self._picture) as file:
-            depth = depth_of(file, lightfield, _unit_rays(self.lens), meaning)
-        return depth.astype(np.float32)
+            return depth_of(file, lightfield, _unit_rays(self.lens), meaning)
+
+    def surface(self) -> SeenSurface:
+        """Return the surface that the view sees, from its depth."""
+        return SeenSurface(self.lens, self.camera, _unit_rays(self.lens), self.depth_as("distance"))
+
+    @property
+    def has_ray(self) -> Bools:
+        """Which pixels (height, width) have a ray."""
+        return np.isfinite(_unit_rays(self.lens)[..., 0])
+
+    @property
+    def path(self) -> Path:
+        """The file of the view. In a tar, it is the tar's path and the file's name in it."""
+        return self.dataset.files.place(self._picture)
 
     @property
     def _picture(self) -> str:
@@ -175,20 +198,24 @@ class View:
         names = self.dataset.pictures_of(self.name)
         return next(filter(self.dataset.files.has, names), names[0])
 
-    def _image(self, channels: Sequence[str]) -> images.Image:
+    def image(self, channels: Sequence[str] | None = None) -> images.Image:
+        """Return the view's picture with all channels, or with the ``channels`` named.
+
+        Raises `UserError` if its size is not the lens's.
+        """
         return self._read(self._picture, channels)
 
-    def _read(self, name: str, channels: Sequence[str]) -> images.Image:
+    def _read(self, name: str, channels: Sequence[str] | None) -> images.Image:
         with self.dataset.files.on_disk(name) as file:
             image = images.read_image(file, channels)
-            check_size(file, self.dataset.lightfield, image.channels[channels[0]])
+            check_size(file, self.dataset.lightfield, next(iter(image.channels.values())))
         return image
 
 
-class Views(Sequence[View]):
+class OpenViews(Sequence[OpenView]):
     """Views in the order of lightfield.json: by number, by name, or a part of them."""
 
-    def __init__(self, views: Iterable[View]) -> None:
+    def __init__(self, views: Iterable[OpenView]) -> None:
         self._views = list(views)
 
     def __repr__(self) -> str:
@@ -198,22 +225,22 @@ class Views(Sequence[View]):
         return len(self._views)
 
     @overload
-    def __getitem__(self, key: int | str) -> View: ...
+    def __getitem__(self, key: int | str) -> OpenView: ...
     @overload
-    def __getitem__(self, key: slice) -> "Views": ...
-    def __getitem__(self, key: int | str | slice) -> "View | Views":
+    def __getitem__(self, key: slice) -> "OpenViews": ...
+    def __getitem__(self, key: int | str | slice) -> "OpenView | OpenViews":
         if isinstance(key, slice):
-            return Views(self._views[key])
+            return OpenViews(self._views[key])
         return self._named(key) if isinstance(key, str) else self._views[key]
 
     @cached_property
-    def _by_name(self) -> dict[str, list[View]]:
-        views: dict[str, list[View]] = {}
+    def _by_name(self) -> dict[str, list[OpenView]]:
+        views: dict[str, list[OpenView]] = {}
         for view in self._views:
             views.setdefault(view.name, []).append(view)
         return views
 
-    def _named(self, name: str) -> View:
+    def _named(self, name: str) -> OpenView:
         views = self._by_name.get(name, [])
         if len(views) == 1:
             return views[0]
@@ -225,13 +252,14 @@ class Views(Sequence[View]):
 
 
 @dataclass(frozen=True, eq=False)
-class Dataset:
+class OpenDataset:
     """The views of one rig, or of one of its ``reprojection``s: each has a lens and poses.
 
     - ``files``: the files of the dataset, in a folder, a package or shards.
     - ``folders``: the folder of each frame of a sequence. Without a sequence, the dataset's own.
     - ``times``: the time of each frame: 0 for the first, 1 for the last.
     - ``member``: in a corpus, what corpus.json says of the scene, such as ``name`` and ``split``.
+    - ``suffix``: of the views' files, such as .png. Without it, each view has its best file.
     """
 
     files: Files
@@ -239,6 +267,14 @@ class Dataset:
     times: tuple[float, ...] = (0.0,)
     reprojection: str = ""
     member: Mapping[str, Any] = field(default_factory=dict)
+    suffix: str | None = None
+
+    @classmethod
+    def in_folder(
+        cls, folder: Path, reprojection: str = "", suffix: str | None = None
+    ) -> "OpenDataset":
+        """Return the dataset of a folder's lightfield.json, or one of its reprojections."""
+        return cls(Folder(folder), reprojection=reprojection, suffix=suffix)
 
     @cached_property
     def lightfield(self) -> LightField:
@@ -271,7 +307,7 @@ class Dataset:
         return names
 
     @cached_property
-    def frames(self) -> "list[Dataset]":
+    def frames(self) -> "list[OpenDataset]":
         """The dataset of each frame of a sequence. Without a sequence, only this one."""
         if len(self.folders) == 1:
             return [self]
@@ -281,20 +317,20 @@ class Dataset:
         ]
 
     @cached_property
-    def views(self) -> Views:
+    def views(self) -> OpenViews:
         """All views. In a sequence, frame follows frame."""
-        return Views(
-            View(frame, camera) for frame in self.frames for camera in frame.lightfield.views
+        return OpenViews(
+            OpenView(frame, camera) for frame in self.frames for camera in frame.lightfield.views
         )
 
-    def split(self, part: str) -> Views:
+    def split(self, part: str) -> OpenViews:
         """Return the views of a part: train, validation or test. Without a split, all train."""
         if part not in PARTS:
             raise UserError(f"split: is {part!r}; must be {', '.join(PARTS)}")
-        return Views(view for view in self.views if (view.split or "train") == part)
+        return OpenViews(view for view in self.views if (view.split or "train") == part)
 
     @cached_property
-    def reprojections(self) -> "dict[str, Dataset]":
+    def reprojections(self) -> "dict[str, OpenDataset]":
         """The same views through other lenses, by the reprojections' names."""
         if self.reprojection:
             return {}
@@ -310,7 +346,8 @@ class Dataset:
         """Return the names that a view's file may have, the best first."""
         images = ImageSet(self.reprojection, self.lightfield)
         folder = PurePosixPath(self.folders[0], images.folder)
-        return [f"{folder / view}{suffix}" for suffix in images.suffixes]
+        suffixes = (self.suffix,) if self.suffix else images.suffixes
+        return [f"{folder / view}{suffix}" for suffix in suffixes]
 
 
 # Every view of a dataset has the same lens, and its rays take as much memory as six pictures.

@@ -17,7 +17,7 @@ from lightfield.formats.layout import (
     further_parts,
 )
 from lightfield.formats.lightfield import NAME
-from lightfield.reading.dataset import Dataset
+from lightfield.reading.dataset import OpenDataset
 from lightfield.reading.files import Files, Folder, Packed, PackedFile, members_of
 from lightfield.reading.shards import read_shards
 
@@ -25,7 +25,7 @@ from lightfield.reading.shards import read_shards
 _RUN = re.compile(r"\{(\d+)\.\.(\d+)\}")
 
 
-def open_dataset(path: str | os.PathLike[str]) -> Dataset:
+def open_dataset(path: str | os.PathLike[str]) -> OpenDataset:
     """Open the dataset at ``path``. It is one of:
 
     - the folder of a rig, of a sequence, or of a dataset that SILVR's tools wrote;
@@ -42,7 +42,7 @@ def open_dataset(path: str | os.PathLike[str]) -> Dataset:
     return datasets[0]
 
 
-def open_corpus(path: str | os.PathLike[str]) -> list[Dataset]:
+def open_corpus(path: str | os.PathLike[str]) -> list[OpenDataset]:
     """Open all datasets at ``path``: of a family, of a scene's rigs, or of a folder of packages.
 
     ``member`` of a family's dataset has what its corpus.json says of the scene. Takes all that
@@ -70,7 +70,7 @@ def open_corpus(path: str | os.PathLike[str]) -> list[Dataset]:
     return datasets
 
 
-def _in_folder(folder: Path) -> list[Dataset]:
+def _in_folder(folder: Path) -> list[OpenDataset]:
     if own := _dataset(Folder(folder)):
         return [own]
     if (folder / CORPUS).is_file():
@@ -82,7 +82,7 @@ def _in_folder(folder: Path) -> list[Dataset]:
     return _in_tars(folder, [tar for tar in tars if tar.name != OTHER_FILES]) if tars else []
 
 
-def _members(family: Path) -> list[Dataset]:
+def _members(family: Path) -> list[OpenDataset]:
     """Return the datasets of a family's valid members."""
     datasets = []
     content = read_keys(family / CORPUS, "corpus.py", "members")
@@ -91,22 +91,22 @@ def _members(family: Path) -> list[Dataset]:
             for rig in entry["datasets"] if entry["state"] == "valid" else ():
                 name = f"{entry['name']}/{rig}"
                 files = Folder(inside(family, name, f"{family / CORPUS}: {name}"))
-                datasets.append(_dataset(files, entry) or Dataset(files, member=entry))
+                datasets.append(_dataset(files, entry) or OpenDataset(files, member=entry))
     return datasets
 
 
-def _dataset(files: Files, member: dict[str, object] | None = None) -> Dataset | None:
+def _dataset(files: Files, member: dict[str, object] | None = None) -> OpenDataset | None:
     """Return the dataset of these files, or the sequence. None if they have no lightfield.json."""
     if files.has(NAME):
-        return Dataset(files, member=member or {})
+        return OpenDataset(files, member=member or {})
     folders = sorted(files.datasets_in("", FRAME_FOLDERS), key=frame_number)
     if not folders:
         return None
     times = frame_times([frame_number(folder) for folder in folders])
-    return Dataset(files, tuple(folders), tuple(times), member=member or {})
+    return OpenDataset(files, tuple(folders), tuple(times), member=member or {})
 
 
-def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
+def _in_tars(path: Path, archives: Sequence[Path]) -> list[OpenDataset]:
     """Return the datasets in packages or in shards. ``path`` is what the user opened."""
     parts_of_package = {archive: further_parts(archive) for archive in archives}
     further = [part for parts in parts_of_package.values() for part in parts]

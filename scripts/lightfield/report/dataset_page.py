@@ -23,6 +23,7 @@ from lightfield.geometry import rigs
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import FILE_LOOK, title
+from lightfield.reading.dataset import OpenDataset
 from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
 from lightfield.stages.report import ReportHtml
@@ -43,21 +44,21 @@ def write(job: ReportHtml) -> None:
     """
     folder = job.dataset
     name = job.dataset_name
-    lightfield = LightField.read(folder / NAME)
+    dataset = OpenDataset.in_folder(folder)
+    lightfield = dataset.lightfield
     rig = job.settings.rig
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     look = job.settings.look.resolved(lightfield) if job.settings.look else None
     packed = views.collect(
-        folder / IMAGES,
-        lightfield,
+        dataset,
         rig,
         _unreadable(validation),
         _sensor_folder(folder, lightfield),
         look,
     )
-    middle = lightfield.views[middle_view(rig)]
-    lights = pass_pictures.light_groups(folder, lightfield, middle, packed.data["exposure"])
+    middle = dataset.views[middle_view(rig)]
+    lights = pass_pictures.light_groups(middle, packed.data["exposure"])
     if lights:
         packed.data["lights"] = lights
     report = folder / REPORT
@@ -77,9 +78,7 @@ def write(job: ReportHtml) -> None:
         lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
-        passes=list(
-            pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"], look)
-        ),
+        passes=list(pass_pictures.collect(middle, packed.data["exposure"], look)),
         reprojected=list(_reprojected(folder, lightfield)),
         render=lightfield.render,
         python=snippet.reading(name, lightfield),

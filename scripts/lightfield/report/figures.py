@@ -18,13 +18,12 @@ from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.errors import UserError
 from lightfield.export.trainer_splits import splits
-from lightfield.formats.layout import IMAGES
-from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, noise, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
+from lightfield.reading.dataset import OpenDataset, OpenView
 from lightfield.report import contact_sheet
 from lightfield.stages.report import ReportFigures
 
@@ -53,9 +52,10 @@ def draw(job: ReportFigures) -> None:
     dataset = job.dataset
     rig = job.settings.rig
     output = job.output
-    lightfield = LightField.read(dataset / NAME)
+    opened = OpenDataset.in_folder(dataset)
+    lightfield = opened.lightfield
     lightfield.require_rig(rig)
-    views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
+    views = [view.path for view in opened.views]
     lens = lightfield.lens
     thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]
     look = job.settings.look.resolved(lightfield) if job.settings.look else None
@@ -69,7 +69,7 @@ def draw(job: ReportFigures) -> None:
     if job.panorama:
         overview = _read_panorama(job.panorama)
     else:
-        overview = read_view(views[middle_view(rig)], lightfield)
+        overview = read_view(opened.views[middle_view(rig)])
     exposure = pictures.exposure_for(overview.colour, look)
     images.write_png(output / "overview.png", pictures.develop(overview.colour, exposure, look))
     _draw_depth(output / "depth", overview)
@@ -83,20 +83,19 @@ def _read_panorama(path: Path) -> Overview:
     return Overview(image.colour, depth, True, "distance from the rig's centre")
 
 
-def read_view(path: Path, lightfield: LightField) -> Overview:
+def read_view(view: OpenView) -> Overview:
     """Read a view. Return a black overview if it cannot be read: validation reports that."""
-    lens = lightfield.lens
-    label = DEPTHS[lightfield.depth]
+    lens = view.lens
+    label = DEPTHS[view.dataset.depth]
     unknown = np.full((lens.height, lens.width), np.nan, np.float32)
     try:
-        image = images.read_image(path)
+        image = view.image()
         colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
         depth = image.channels.get("Z", unknown)
     except UserError as error:
         print(f"warning: {error}", file=sys.stderr)
         return Overview(np.stack([np.zeros_like(unknown)] * 3, axis=-1), unknown, False, label)
-    outside = np.isnan(lens.pixel_rays()[..., 0])
-    return Overview(colour, np.where(outside, np.nan, depth).astype(np.float32), False, label)
+    return Overview(colour, np.where(view.has_ray, depth, np.nan).astype(np.float32), False, label)
 
 
 def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) -> None:

@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.colors import hsv_to_rgb
 
 from lightfield.core.errors import UserError
-from lightfield.formats.lightfield import LightField, View
-from lightfield.formats.passes import FLOW, Pass, is_group, of_group
-from lightfield.imaging import images, pictures
+from lightfield.formats.passes import FLOW, Pass, group_pass, is_group
+from lightfield.imaging import pictures
 from lightfield.imaging.look import Look
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.tonemap import to_8_bit
+from lightfield.reading.dataset import OpenView
 from lightfield.report.packing import light_scale, pack_light, webp
 
 # The longer side of a picture in pixels, at most.
@@ -30,40 +29,37 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def collect(
-    folder: Path, lightfield: LightField, view: View, exposure: float, look: Look | None = None
+    view: OpenView, exposure: float, look: Look | None = None
 ) -> Iterator[tuple[str, str, str]]:
     """Yield name, meaning and picture of each readable pass of a view. Leaves out light groups.
 
     ``exposure`` in stops and ``look`` apply to passes of light.
     """
-    step = math.ceil(max(lightfield.lens.width, lightfield.lens.height) / SIDE)
-    passes = [(each, view.name) for each in lightfield.passes if not is_group(each)]
-    if view.flow:
-        passes.append((FLOW, view.flow))
-    for view_pass, name in passes:
+    step = math.ceil(max(view.lens.width, view.lens.height) / SIDE)
+    passes = [each for each in view.dataset.lightfield.passes if not is_group(each)]
+    if view.camera.flow:
+        passes.append(FLOW)
+    for view_pass in passes:
         try:
-            channels = images.read_image(view_pass.path(folder, name), view_pass.channels).channels
+            pixels = np.atleast_3d(view.read(view_pass.name))
         except UserError:
             continue  # Validation reports it.
-        planes = [channels[channel][::step, ::step] for channel in view_pass.channels]
-        picture = _picture(view_pass, np.stack(planes, axis=-1), exposure, look)
+        picture = _picture(view_pass, pixels[::step, ::step], exposure, look)
         yield view_pass.name, view_pass.meaning, webp(picture)
 
 
-def light_groups(
-    folder: Path, lightfield: LightField, view: View, exposure: float
-) -> dict[str, Any] | None:
+def light_groups(view: OpenView, exposure: float) -> dict[str, Any] | None:
     """Pack a view's light groups, so that a page can relight it. Return None if none can be read.
 
     ``exposure`` is the page's exposure in stops.
     """
-    names = lightfield.light_groups
+    names = view.dataset.lightfield.light_groups
     side = _GROUP_SIDE if len(names) <= _MANY_GROUPS else _SMALLER_GROUP_SIDE
-    small = lightfield.lens.fitted(side)
+    small = view.lens.fitted(side)
     groups = []
     for name in names:
         try:
-            colour = images.read_image(of_group(name).path(folder, view.name), "RGB").colour
+            colour = view.read(group_pass(name))
         except UserError:
             continue  # Validation reports it.
         colour = np.nan_to_num(colour, posinf=0, neginf=0)

@@ -21,6 +21,7 @@ from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.imaging.look import Look
 from lightfield.imaging.noise import relative_noise
+from lightfield.reading.dataset import OpenDataset, OpenView
 from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,
@@ -94,8 +95,7 @@ class _PackedViews:
 
 
 def collect(
-    folder: Path,
-    lightfield: LightField,
+    dataset: OpenDataset,
     rig: Rig,
     unreadable: Collection[str] = (),
     sensor: Path | None = None,
@@ -103,19 +103,20 @@ def collect(
 ) -> _PackedViews:
     """Read the views that the page shows, and pack them.
 
-    ``folder`` holds the views of ``lightfield``. ``rig`` has placed their cameras. The
-    ``unreadable`` views are black. ``sensor`` holds the views as a sensor sees them, if there are
-    any. The page develops them with the ``look``, if there is one. Raises `UserError` for any other
-    view that cannot be read.
+    ``rig`` has placed the cameras of the ``dataset``'s views. The ``unreadable`` views are black.
+    ``sensor`` holds the views as a sensor sees them, if there are any. The page develops them with
+    the ``look``, if there is one. Raises `UserError` for any other view that cannot be read.
     """
+    lightfield = dataset.lightfield
     names = [view.name for view in lightfield.views]
-    lens = lightfield.lens
-    meaning = lightfield.depth
+    lens = dataset.lens
 
     def load(number: int, small: Lens) -> PageView:
-        if names[number] in unreadable:
-            return _black(small, meaning)
-        return read(folder / f"{names[number]}.exr", small, meaning)
+        view = dataset.views[number]
+        has_depth = dataset.depth is not None
+        if view.name in unreadable:
+            return _black(small, has_depth)
+        return read(view, small, has_depth)
 
     embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
     middle = lightfield.world_from_cameras[middle_view(rig)]
@@ -264,9 +265,9 @@ def _missed(depths: Array) -> float | None:
     return float(np.isposinf(defined).mean()) if defined.size else None
 
 
-def read(path: Path, small: Lens, meaning: str | None) -> PageView:
+def read(view: OpenView, small: Lens, has_depth: bool) -> PageView:
     """Read a view at the resolution of ``small``. Averages colour, takes depth from one pixel."""
-    image = images.read_image(path, "RGBZ" if meaning else "RGB")
+    image = view.image("RGBZ" if has_depth else "RGB")
     colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
     height, width = colour.shape[:2]
     middle = colour[_middle(height), _middle(width)]
@@ -275,15 +276,15 @@ def read(path: Path, small: Lens, meaning: str | None) -> PageView:
     if (width, height) != (small.width, small.height):
         colour = pictures.shrunk(colour, small.width, small.height)
     depth = None
-    if meaning:
+    if has_depth:
         depth = image.channels["Z"][_picked(height, width, small)].astype(np.float32)
     return PageView(colour, depth, float(np.median(noise)) if noise.size else math.nan)
 
 
-def _black(lens: Lens, meaning: str | None) -> PageView:
+def _black(lens: Lens, has_depth: bool) -> PageView:
     """Return a black view in place of one that cannot be read."""
     shape = (lens.height, lens.width)
-    depth = np.full(shape, np.nan, np.float32) if meaning else None
+    depth = np.full(shape, np.nan, np.float32) if has_depth else None
     return PageView(np.zeros((*shape, 3), np.float32), depth, math.nan)
 
 

@@ -85,6 +85,7 @@ class Package(Stage[PackSettings]):
     """Packs a finished dataset as tar archives with a card."""
 
     name = "package"
+    version = 2
     function = "lightfield.publishing.package:write"
     by_hand = PackageByHand
 
@@ -96,8 +97,8 @@ class Publish(Stage[PackSettings]):
     """Writes a finished dataset as WebDataset shards, with descriptions of them."""
 
     name = "publish"
+    version = 2
     function = "lightfield.publishing.publish:write"
-    version = 1
     by_hand = PublishByHand
 
     folder: Path = reads(FOLDER)

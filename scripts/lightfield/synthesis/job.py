@@ -10,7 +10,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
 from lightfield.core.units import count
-from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry import lenses, rigs
@@ -18,6 +17,7 @@ from lightfield.imaging import images, pictures
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.imaging.video import video
+from lightfield.reading.dataset import OpenDataset
 from lightfield.settings.base import checked_yaml
 from lightfield.settings.yaml_files import located, parse_yaml, read_settings_text
 from lightfield.stages.synthesis import Synthesize
@@ -27,7 +27,8 @@ from lightfield.synthesis.view import Sources, reader
 def run(job: Synthesize) -> None:
     """Synthesise the views, and print how much of them are holes."""
     keep_apart("--output", job.output / NAME, job.dataset / NAME, job.poses)
-    source = SourceDataset(job.dataset, job.reprojection, ".exr")
+    source = OpenDataset.in_folder(job.dataset, job.reprojection, ".exr")
+    source.lightfield.require_centre()
     views = source.lightfield.views
     targets = _poses(job.poses)
     if targets is None:

@@ -15,13 +15,13 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt
 
 from lightfield.core.errors import UserError
-from lightfield.export.source import SourceDataset
 from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.visibility import pixel_indices
 from lightfield.imaging import images
+from lightfield.reading.dataset import OpenDataset
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels
 
@@ -102,17 +102,17 @@ class ViewSurface:
 Reader = Callable[[View], tuple[Array, Array]]
 
 
-def reader(source: SourceDataset) -> Reader:
+def reader(source: OpenDataset) -> Reader:
     """Return the function that reads a dataset's views for `Sources`.
 
     Raises `UserError` if the dataset has no depth.
     """
-    if source.lightfield.depth is None:
+    if source.depth is None:
         raise UserError(f"{source.lightfield.path}: depth: is null; a synthesis needs it")
 
     def read(view: View) -> tuple[Array, Array]:
-        colour = images.read_image(source.path(view), "RGB").colour
-        return colour, source.depth(view, "distance")
+        opened = source.views[view.name]
+        return opened.rgb, opened.depth_as("distance")
 
     return read
 

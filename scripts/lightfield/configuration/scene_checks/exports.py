@@ -1,9 +1,9 @@
 """Checks exports with the views that they read."""
 
-from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.configuration.scene_blocks import SceneBlocks, look_of
 from lightfield.configuration.scene_checks.names import check_rigs
 from lightfield.core.names import VIEWS
+from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.formats import light_groups, published
 from lightfield.geometry.rigs import Poses, Rig
 

@@ -1,0 +1,199 @@
+"""Reads a light field of Plenoforge with numpy and OpenEXR alone. Copy this file freely.
+
+    from read import open_views
+
+    view = open_views()[0]  # of the folder of this file; open_views("perspective") if it has that
+    view.rgb, view.alpha, view.depth, view.normal  # arrays, as float32, if the dataset has them
+    origins, directions = view.rays()  # of every pixel, in the world
+    pixels, visible = view.project([[0, 0, 0]])  # points (n, 3) in metres to pixels (n, 2)
+
+The world is in metres, with Z up. A camera looks along -Z, with +Y up. Row 0 is at the top. Pixel
+coordinates run right and down; the first pixel's centre is (0.5, 0.5). Shards need OpenEXR 3.5.
+"""
+
+import json
+import tarfile
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+
+REC_709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)  # x and y of R, G, B and white
+BRADFORD = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+
+
+def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "list[PlainView]":
+    """Return the views in a folder: of its lightfield.json, of its frames, or of its shards."""
+    views: Any = {}
+    frame = "." if Path(folder, "lightfield.json").is_file() else "f[0-9]*"
+    for file in Path(folder).glob(f"{frame}/{reprojection or '.'}/lightfield.json"):
+        content = json.loads(file.read_text("utf-8"))
+        for number, view in enumerate(content["frames"]):
+            views[len(str(file)), file, number] = PlainView(
+                content | view, reprojection, file.parent
+            )
+    for shard in [] if views else Path(folder).glob("*-[0-9]*.tar"):
+        with tarfile.open(shard) as tar:
+            members: Any = {member.name: tar.extractfile(member) for member in tar}
+            samples = {n[:-5]: json.load(members[n]) for n in members if n.endswith(".json")}
+        for key, sample in samples.items():
+            files = {Path(p["path"]): f"{key}.{field}" for field, p in sample["pictures"].items()}
+            for path, picture in zip(files, sample["pictures"].values(), strict=True):
+                if path.parent == Path(reprojection or "exr"):
+                    content = picture | {"name": path.stem, "split": sample["split"]}
+                    views[key, path.stem] = PlainView(content, reprojection, shard, files)
+    return [views[place] for place in sorted(views)]
+
+
+class PlainView:
+    """A view. ``content`` has its keys in lightfield.json. Only views in EXR files have pixels."""
+
+    def __init__(self, content: Any, reprojection: str, home: Path, members: Any = None) -> None:
+        self.content, self.lens = content, PlainLens(content)
+        self.reprojection, self.home, self.members = reprojection, home, members
+        self.name, self.split = content["name"], content.get("split")
+        self.world_from_camera = np.array(content["world_matrix"])
+        # NaN for omnidirectional stereo, whose rays have no common origin.
+        has_centre = "omnidirectional_stereo" not in content
+        self.position = self.world_from_camera[:3, 3] if has_centre else np.full(3, np.nan)
+
+    # Light in Rec. 709, coverage, normals in the world, and metres: as content["depth"] says, along
+    # the optical axis, and from the camera along the ray.
+    rgb = property(lambda self: to_rec_709(*self.read()))
+    alpha = property(lambda self: self.read()[0]["A"].astype(np.float32))
+    normal = property(lambda self: np.stack([*map(self.read("normal")[0].get, "RGB")], axis=-1))
+    depth = property(lambda self: self.depth_as(self.content["depth"]))
+    z = property(lambda self: self.depth_as("z"))
+    distance = property(lambda self: self.depth_as("distance"))
+
+    def depth_as(self, meaning: str) -> Any:
+        """Return the depth as "z" or "distance". inf for a miss, and NaN without a ray."""
+        channels, header = self.read()
+        depth, cosine = channels["Z"].astype(float), -self.lens.pixel_rays()[..., 2]
+        if header.get("plenoforge:depth", self.content["depth"]) != meaning:
+            scale = cosine if meaning == "z" else 1 / np.where(cosine > 0, cosine, np.nan)
+            depth = np.where(np.isinf(depth), depth, depth * scale)
+        return np.where(np.isnan(cosine), np.nan, depth).astype(np.float32)
+
+    def read(self, folder: str = "") -> Any:
+        """Return all channels of the view, or of its pass in a folder, and the file's header."""
+        path = Path(folder or ("" if self.reprojection else "exr"), f"{self.name}.exr")
+        with tarfile.open(self.home) if self.members else nullcontext() as tar:
+            inside = tar and tar.extractfile(self.members[Path(self.reprojection, path)])
+            part = OpenEXR.File(inside or str(self.home / path), separate_channels=True).parts[0]
+        # A file may store only a part of the picture. What is beside it is black, or a miss.
+        first = part.header["displayWindow"][0] - part.header["dataWindow"][0] + 1
+        columns, rows = [np.arange(self.lens.size[axis]) + first[axis] for axis in (0, 1)]
+        channels = {}
+        for name, channel in part.channels.items():
+            plane = np.pad(channel.pixels, 1, constant_values=np.inf if name == "Z" else 0)
+            channels[name] = plane.take(rows, 0, mode="clip").take(columns, 1, mode="clip")
+        return channels, part.header
+
+    def rays(self) -> Any:
+        """Return origins and unit directions (height, width, 3). NaN where the lens has no ray."""
+        directions = self.lens.pixel_rays() @ self.world_from_camera[:3, :3].T
+        return np.broadcast_to(self.position, directions.shape), directions
+
+    def project(self, points: Any) -> Any:
+        """Return the pixels (n, 2) of points (n, 3), and which are in the frame, maybe hidden."""
+        pixels = self.lens.pixels((points - self.position) @ self.world_from_camera[:3, :3])
+        return pixels, ((pixels >= 0) & (pixels < self.lens.size)).all(axis=-1)
+
+
+class PlainLens:
+    """A lens. u is right and v up in its image: in a panorama, longitude and latitude."""
+
+    def __init__(self, content: Any) -> None:
+        camera, self.size = content["camera"], np.array(content["resolution"])
+        self.kind = camera.get("panorama_type", "PERSP").removeprefix("FISHEYE_")
+        self.center = camera.get("principal_point", self.size / 2)
+        pixel = content["sensor_size"] / self.size  # mm
+        length = camera.get("focal_length", camera.get("fisheye_lens"))
+        self.unit = pixel / length if length else 2 / self.size  # The image circle has radius 1.
+        # The largest angle θ from the axis. Then θ of r = |(u, v)|, and r of θ, for each lens.
+        self.end = end = min(camera.get("fisheye_fov", np.pi) / 2, np.pi)
+        sin, tan = np.sin(end), np.tan(end / 2)
+        curves: Any = {
+            "EQUIRECTANGULAR": (None, None),
+            "PERSP": (np.arctan, np.tan),
+            "EQUIDISTANT": (lambda r: r * end, lambda t: t / end),
+            "EQUISOLID": (lambda r: 2 * np.arcsin(r / 2), lambda t: 2 * np.sin(t / 2)),
+            "ORTHOGRAPHIC": (lambda r: np.arcsin(r * sin), lambda t: np.sin(t) / sin),
+            "STEREOGRAPHIC": (lambda r: 2 * np.arctan(r * tan), lambda t: np.tan(t / 2) / tan),
+        }
+        if self.kind == "EQUIRECTANGULAR":
+            west, north = camera["longitude_min"], camera["latitude_max"]
+            self.unit = (camera["longitude_max"] - west, north - camera["latitude_min"]) / self.size
+            self.center = (-west, north) / self.unit
+        elif self.kind == "KANNALA_BRANDT":
+            p = np.polynomial.Polynomial(np.insert([1, *camera["kannala_brandt"]], range(5), 0))
+            self.end = end = min(end, first_root(p.deriv()))
+            curves[self.kind] = lambda r: inverse(p, end, 0, r), p
+        elif self.kind == "LENS_POLYNOMIAL":
+            k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
+            sign = -np.sign(k[1:][k[1:] != 0][0])
+            p = np.polynomial.Polynomial(-sign * k)
+            last = min(first_root(p.deriv()), first_root(p - end))
+            hole = 0 if 2 * p(0.0) < p(max(pixel)) else p(0.0)
+            self.unit, self.end = pixel, p(last)
+            curves[self.kind] = lambda r: sign * p(r), lambda t: sign * inverse(p, last, hole, t)
+        self.theta, self.radius = curves[self.kind]
+
+    def pixel_rays(self) -> Any:
+        """Return the unit rays (height, width, 3) of all pixels' centres."""
+        return self.rays(*np.meshgrid(*(np.arange(side) + 0.5 for side in self.size)))
+
+    def rays(self, x: Any, y: Any) -> Any:
+        """Return the unit rays (..., 3) of pixel coordinates. NaN where the lens has none."""
+        u, v = (x - self.center[0]) * self.unit[0], (self.center[1] - y) * self.unit[1]
+        if self.kind == "EQUIRECTANGULAR":
+            v = np.where(np.abs(v) <= np.pi / 2 + 1e-6, v, np.nan)
+            return np.stack([np.cos(v) * np.sin(u), np.sin(v), -np.cos(v) * np.cos(u)], axis=-1)
+        r, azimuth, last = np.hypot(u, v), np.arctan2(u, v), np.abs(self.radius(self.end))
+        theta = np.where(r <= last * (1 + 1e-14), self.theta(np.minimum(r, last)), np.nan)
+        right, up = np.sin(theta) * [np.sin(azimuth), np.cos(azimuth)]
+        return np.stack([right, up, -np.cos(theta)], axis=-1)
+
+    def pixels(self, rays: Any) -> Any:
+        """Return the pixel coordinates (..., 2) of rays (..., 3). NaN if the lens sees none."""
+        x, y, z = np.moveaxis(rays, -1, 0)
+        if self.kind == "EQUIRECTANGULAR":
+            u, v = np.arctan2(x, 0 - z), np.arctan2(y, np.hypot(x, z))
+            middle = (self.size[0] / 2 - self.center[0]) * self.unit[0]
+            u -= 2 * np.pi * np.round((u - middle) / (2 * np.pi))
+        else:
+            theta = np.arctan2(np.hypot(x, y), -z)
+            r = np.where(theta <= self.end * (1 + 1e-14), self.radius(theta), np.nan)
+            u, v = r * [np.sin(np.arctan2(x, y)), np.cos(np.arctan2(x, y))]
+        return self.center + np.stack([u, -v], axis=-1) / self.unit
+
+
+def first_root(polynomial: Any) -> Any:
+    """Return the smallest positive root, or inf."""
+    roots = np.roots(polynomial.coef[::-1])
+    is_real = (np.abs(roots.imag) <= 1e-12 * np.abs(roots)) & (roots.real > 0)
+    return np.min(roots.real[is_real], initial=np.inf)
+
+
+def inverse(polynomial: Any, last: float, least: float, values: Any) -> Any:
+    """Return t from 0 to ``last`` with the values of a polynomial that grows, by bisection."""
+    t = np.zeros(np.shape(values))
+    for step in last / 2.0 ** np.arange(1, 60):
+        t += np.where(polynomial(t + step) < values, step, 0)
+    return np.where(values >= least, t, np.nan)
+
+
+def to_rec_709(channels: Any, header: Any) -> Any:
+    """Return linear colour (height, width, 3). White stays white, by Bradford."""
+    colour = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float32)
+    chromaticities, spaces = header.get("chromaticities", REC_709), []
+    for space in (chromaticities, REC_709):
+        x, y = np.reshape(space, (4, 2)).T
+        cones = BRADFORD @ np.stack([x / y, np.ones(4), (1 - x - y) / y])
+        spaces.append(cones[:, :3] * np.linalg.solve(cones[:, :3], cones[:, 3]) / cones[:, 3:])
+    if np.allclose(chromaticities, REC_709, rtol=0, atol=1e-4):
+        return colour
+    return (colour @ np.linalg.solve(spaces[1], spaces[0]).T).astype(np.float32)
