@@ -27,7 +27,7 @@ class RenderedView:
     first: bool
 
 
-def renderings(run: history.Run) -> Iterator[RenderedView]:
+def renderings(run: history.ProcessHistory) -> Iterator[RenderedView]:
     """Split the time of each view that a process rendered.
 
     While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
@@ -43,12 +43,12 @@ def renderings(run: history.Run) -> Iterator[RenderedView]:
         yield RenderedView(view["view"], view["finished"], traced, rest, first=index == 0)
 
 
-def on_processor(run: history.Run) -> bool:
+def on_processor(run: history.ProcessHistory) -> bool:
     """Return whether a process rendered on the processor's cores."""
     return bool(run.start["device"] == CPU)
 
 
-def latest_device(runs: Sequence[history.Run]) -> str | None:
+def latest_device(runs: Sequence[history.ProcessHistory]) -> str | None:
     """Return the device that rendered the latest view. None without a rendered view."""
     rendered = [run for run in runs if run.views]
     if not rendered:
@@ -57,7 +57,7 @@ def latest_device(runs: Sequence[history.Run]) -> str | None:
     return str(latest.start["device"])
 
 
-def of_latest_device(runs: Sequence[history.Run]) -> list[history.Run]:
+def of_latest_device(runs: Sequence[history.ProcessHistory]) -> list[history.ProcessHistory]:
     """Return the runs without views, and of the others the runs on the latest view's device.
 
     Times of a core and of a whole machine have no mean.
@@ -66,7 +66,9 @@ def of_latest_device(runs: Sequence[history.Run]) -> list[history.Run]:
     return [run for run in runs if not run.views or on_processor(run) == by_processor]
 
 
-def counted_renderings(runs: Sequence[history.Run], lightfield: LightField) -> list[RenderedView]:
+def counted_renderings(
+    runs: Sequence[history.ProcessHistory], lightfield: LightField
+) -> list[RenderedView]:
     """Return the renderings of a dataset's views on the latest view's device.
 
     Receipts may have views that the dataset had under earlier settings. They do not count.
@@ -80,7 +82,9 @@ def counted_renderings(runs: Sequence[history.Run], lightfield: LightField) -> l
     ]
 
 
-def finished_views(runs: Sequence[history.Run], lightfield: LightField) -> FinishedViews | None:
+def finished_views(
+    runs: Sequence[history.ProcessHistory], lightfield: LightField
+) -> FinishedViews | None:
     """Return the times of a dataset's views, by its latest device. None without views.
 
     The first views of processes do not represent the others. They count only if there are no

@@ -8,7 +8,7 @@ from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import Paths
 from lightfield.core.errors import UserError
-from lightfield.core.names import scene_folder
+from lightfield.core.names import RENDERED, scene_folder
 from lightfield.engine.receipts import FOLDER
 from lightfield.planning.cost import probe_path
 from lightfield.planning.estimate import Known, read_gpu_check, read_probe
@@ -44,7 +44,7 @@ def _finished(dataset: Dataset, config: Configuration) -> Iterator[tuple[Path, P
     # A member of a family has no presets of its own.
     for folder in [dataset.scene_folder] if dataset.member else folders:
         paths = Paths(dataset.results_root, dataset.work_root, folder, dataset.rig_folder)
-        receipts = Path(dataset.work_root, FOLDER, folder, dataset.rig_folder, "render")
+        receipts = Path(dataset.work_root, FOLDER, folder, dataset.rig_folder, RENDERED)
         yield Path(paths.lightfield), receipts
 
 
