@@ -8,8 +8,9 @@ import numpy as np
 import pycolmap
 import pytest
 from checkouts import checkout, planned
+from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
-from test_exports import RADIUS, VIEWS, ply, write_views
+from test_exports import RADIUS, VIEWS, write_views
 
 from lightfield import export
 from lightfield.configuration import scene_yaml
@@ -243,7 +244,7 @@ def test_points_come_only_from_the_training_views(scene, tmp_path):
     for rig in ("near", "along"):
         shutil.rmtree(tmp_path / "scene" / rig / "exr")
     folder = exported(tmp_path / "scene", "point_cloud", tmp_path / "export", voxel=0.1)
-    vertices, _ = ply(folder / "points.ply")
+    vertices = read_vertices(folder / "points.ply")
     distance = np.linalg.norm(np.stack([vertices[axis] for axis in "xyz"], axis=-1), axis=-1)
     np.testing.assert_allclose(distance, RADIUS, atol=1e-5)
 
@@ -251,7 +252,7 @@ def test_points_come_only_from_the_training_views(scene, tmp_path):
 def test_points_of_a_rig_that_only_tests_come_from_all_its_views(scene, tmp_path):
     settings = settings_of("point_cloud")(sources=["small"], voxel=0.1)
     export.run("point_cloud", SourceDataset(scene / "along", "small", ".exr"), settings, tmp_path)
-    assert len(ply(tmp_path / "points.ply")[0])
+    assert len(read_vertices(tmp_path / "points.ply"))
 
 
 def test_a_split_without_a_part_is_an_error():

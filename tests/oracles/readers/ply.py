@@ -4,9 +4,11 @@ Source: Turk, "The PLY Polygon File Format".
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from lightfield.core.files import reading
 from oracles.readers.contents import Cloud, Floats
@@ -15,13 +17,18 @@ from oracles.readers.contents import Cloud, Floats
 _NOT_UNIT = 1e-5
 
 
+def read_vertices(path: Path) -> NDArray[Any]:
+    """Return a file's vertices, with a field for each property."""
+    raw = trimesh.load(path).metadata["_ply_raw"]
+    if [*raw] != ["vertex"]:
+        raise ValueError("it must have vertices and nothing else")
+    return np.asarray(raw["vertex"]["data"])
+
+
 def read_ply(path: Path, transform: Floats | None = None) -> tuple[Cloud, list[str]]:
     """Return a file's points, mapped by ``transform`` (4, 4), and what is wrong with the file."""
     with reading(path, "binary PLY of points"):
-        raw = trimesh.load(path).metadata["_ply_raw"]
-        if [*raw] != ["vertex"]:
-            raise ValueError("it must have vertices and nothing else")
-        vertices = raw["vertex"]["data"]
+        vertices = read_vertices(path)
         positions = np.stack([vertices[axis] for axis in "xyz"], axis=-1)
         normals = np.stack([vertices[f"n{axis}"] for axis in "xyz"], axis=-1)
     # A damaged number may be anything.
