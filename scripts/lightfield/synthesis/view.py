@@ -30,8 +30,8 @@ from lightfield.synthesis import apparent, kernels
 # about as far as neighbours among 642 views on a sphere.
 DIRECTIONS = 12
 # Neighbours count as different surfaces beyond the angle of incidence with this tangent, 80.5°. So
-# steep a surface shows a sixth of the pixels that it would show from the front. Half brings 0.001 dB
-# and takes 0.001 of SSIM, and double takes 0.007 dB: see `kernels` for the scene.
+# steep a surface shows a sixth of the pixels that it would show from the front. Half brings
+# 0.001 dB and takes 0.001 of SSIM, and double takes 0.007 dB: see `kernels` for the scene.
 _STEEPEST = 6.0
 # Vertices beside a tear may mix the colours of two surfaces, so they have this certainty. A quarter
 # with splats was better than a sixth without, by 0.1, 0 and 0.2 dB: PSNR of held-out views of the
