@@ -1,5 +1,5 @@
 # Measurements that anybody can repeat. They are not part of a dataset: name the target.
-from lightfield.workflow.arguments import optional
+from lightfield.workflow.arguments import optional, time_arguments_of_scene
 from lightfield.workflow.jobs import GPU_CHECK
 
 MEASURED = f"{RUN.results}/benchmarks"
@@ -94,6 +94,7 @@ rule check_gpu:
         device=RUN.settings.device,
         cache=RUN.of_first("paths.trials"),
         calibration=optional("calibration"),
+        times=time_arguments_of_scene(RUN),
         stem=subpath(output[0], strip_suffix=".json"),
     message:
         "Comparing what the RUN.gpu and the processor make of {wildcards.scene}"
@@ -101,7 +102,7 @@ rule check_gpu:
         f"python {RUN.scripts}/gpu_check.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device}"
-        " --threads {threads} --settings {input.settings}"
+        " --threads {threads} --settings {input.settings} {params.times}"
         " --cache {params.cache} --output {params.stem} --receipt {output.receipt}"
         " > {log} 2>&1"
 

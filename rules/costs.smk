@@ -1,6 +1,10 @@
 # The costs of a dataset, and the progress of a build.
 from lightfield.core.names import RENDERED
-from lightfield.workflow.arguments import optional, status_arguments
+from lightfield.workflow.arguments import (
+    optional,
+    status_arguments,
+    time_arguments_of_rig,
+)
 from lightfield.workflow.jobs import COSTS
 
 
@@ -30,13 +34,14 @@ rule costs:
         scene_benchmarks=RUN.of_dataset("scene_benchmarks"),
         blend=optional("blend"),
         inventory=optional("inventory"),
+        times=time_arguments_of_rig(RUN),
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
         f"python {RUN.scripts}/costs.py"
         " --dataset {params.dataset} --receipts {params.receipts}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
-        " {params.blend} --settings {input.settings} {params.inventory}"
+        " {params.blend} --settings {input.settings} {params.inventory} {params.times}"
         " --output {output.costs} --receipt {output.receipt} > {log} 2>&1"
 
 

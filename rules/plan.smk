@@ -1,7 +1,7 @@
 # A table before rendering: the estimated time and size of the views.
 import shlex
 
-from lightfield.workflow.arguments import equal_error_arguments
+from lightfield.workflow.arguments import equal_error_arguments, time_arguments
 from lightfield.workflow.jobs import PROBE
 
 
@@ -48,6 +48,7 @@ rule plan:
         ),
         families=shlex.join(f"--family={folder}" for folder in RUN.build.family_names),
         equal_error=equal_error_arguments(RUN),
+        times=time_arguments(RUN),
         watts=RUN.settings.energy.watts,
         cores=RUN.settings.energy.core_count,
         table=f"{RUN.results}/tables/plan.md",
@@ -55,5 +56,5 @@ rule plan:
         "Adding up the time and size of the chosen datasets"
     shell:
         f"python {RUN.scripts}/plan.py"
-        " {params.datasets} {params.families} {params.equal_error}"
+        " {params.datasets} {params.families} {params.equal_error} {params.times}"
         " --watts {params.watts} --cores {params.cores} --output {params.table} 2>&1 | tee {log}"

@@ -18,24 +18,25 @@ before the first measurement counts as busy throughout.
                   "repeated_seconds"}],     spent again: views rendered again, later start-ups
       "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
       "device", "cores", "watts", "energy_kwh", "attribution",
-      "extrapolation": {"views", "resolution", "samples", "core_hours", "core_hours_uncertainty",
-                        "energy_kwh", "energy_kwh_uncertainty", "gigabytes", "basis"}
+      "extrapolation": {"views", "resolution", "samples", "core_hours", "rendering_hours",
+                        "core_hours_uncertainty", "energy_kwh", "energy_kwh_uncertainty",
+                        "gigabytes", "rendering", "basis"}
     }
 
 Energy is the machine's wattage, times the wall time, times the busy part of its cores. The busy
 part is processor time over wall time and number of cores. While a graphics card renders, the whole
 machine counts. Waiting and idle time do not count.
 
-The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
-samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
-samples (see `lightfield.planning.cost`). The uncertainty is the standard error of that mean
-over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
-a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
-views and pixels. Everything else stays as it was. The first view of each process prepares the scene
-for Cycles, so it counts for neither. Gigabytes are the size of the rendered views, in proportion to
-their pixels. They are an upper estimate, because larger views compress better. "device" and
-"extrapolation" are null if no receipt has a rendered view. That happens if the working folder was
-deleted and the views were kept.
+The hours of rendering come from the sharpest measurement that is known: finished views of the full
+dataset, its probe, a GPU check, or the views of this dataset (see `lightfield.planning.estimate`).
+"rendering" says which. Views of another size count in proportion to pixels and samples. Denoising
+counts as samples. The uncertainty is the standard error of the mean over the views. It has the
+correction for a finite number of views, sqrt(1 - n / N). It is null for a single view. The rest of
+each view's time (reprojection, validation) is proportional to views and pixels. Everything else
+stays as it was. The first view of each process prepares the scene for Cycles, so it counts for
+neither. Gigabytes are the size of the rendered views, in proportion to their pixels. They are an
+upper estimate, because larger views compress better. "device" and "extrapolation" are null if no
+receipt has a rendered view. That happens if the working folder was deleted and the views were kept.
 """
 
 from lightfield.engine.flags import program

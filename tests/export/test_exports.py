@@ -6,7 +6,6 @@ import json
 import math
 import shutil
 import subprocess
-import zlib
 from pathlib import Path
 
 import cv2
@@ -16,6 +15,9 @@ import OpenEXR
 import pycolmap
 import pytest
 from conftest import SCRIPTS
+from oracles.readers import ncore
+from oracles.readers.contents import Exported
+from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
 from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
@@ -122,7 +124,7 @@ def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
         rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
         np.testing.assert_allclose(rgb[has_depth], colour_of(world[has_depth]), atol=1)
     assert ("mask_path" in content["frames"][0]) == (source in ("fisheye", "wide"))
-    vertices, _ = ply(folder / content["ply_file_path"])
+    vertices = read_vertices(folder / content["ply_file_path"])
     on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
     assert np.array_equal(content["applied_transform"], np.eye(4)[:3])
 
@@ -153,7 +155,7 @@ def test_brush_reads_the_cameras_of_a_nerfstudio_export(dataset, tmp_path, sourc
     content = json.loads((folder / "transforms.json").read_text())
     # Brush takes the last .ply for its first splats.
     assert [path.name for path in folder.rglob("*.ply")] == [content["ply_file_path"]]
-    vertices, _ = ply(folder / content["ply_file_path"])
+    vertices = read_vertices(folder / content["ply_file_path"])
     points = np.stack([vertices[name] for name in "xyz"], axis=-1)
     colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
     for frame in content["frames"]:
@@ -370,13 +372,6 @@ def test_opendibr_takes_lossless_h265_if_ffmpeg_is_installed(dataset, tmp_path, 
         exported(dataset, "opendibr", "perspective", tmp_path, format="h265")
 
 
-def pfm(path):
-    kind, size, scale, body = path.read_bytes().split(b"\n", 3)
-    assert (kind, scale) == (b"Pf", b"-1.0")
-    width, height = map(int, size.split())
-    return np.flipud(np.frombuffer(body, "<f4").reshape(height, width))
-
-
 def test_hci_disparity_leads_from_view_to_view(tmp_path):
     rig = {"type": "plane", "cameras": [3, 4], "size": [0.4, 1, 0.6], "rotation": [10, 20, 30]}
     folder = tmp_path / "dataset"
@@ -395,8 +390,8 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     disparities = []
     for number in range(12):
         name = f"Cam{number:03}.pfm"
-        z = pfm(disparity_folder / f"gt_depth_lowres_{name}")
-        disparity = pfm(disparity_folder / f"gt_disp_lowres_{name}")
+        z = cv2.imread(disparity_folder / f"gt_depth_lowres_{name}", cv2.IMREAD_UNCHANGED)
+        disparity = cv2.imread(disparity_folder / f"gt_disp_lowres_{name}", cv2.IMREAD_UNCHANGED)
         np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
         disparities.append(disparity)
         # Each camera is the middle one, moved right and down by whole baselines.
@@ -440,7 +435,8 @@ def test_hci_disparity_as_exr_has_the_values_of_the_benchmarks_maps(tmp_path):
         with OpenEXR.File(str(path), separate_channels=True) as file:
             ((name, channel),) = file.channels().items()
         assert (name, channel.pixels.dtype) == ("Y", np.float32)
-        np.testing.assert_array_equal(channel.pixels, pfm(path.with_suffix(".pfm")))
+        as_pfm = cv2.imread(path.with_suffix(".pfm"), cv2.IMREAD_UNCHANGED)
+        np.testing.assert_array_equal(channel.pixels, as_pfm)
 
 
 def test_a_plane_with_a_baseline_suits_hci_at_every_number_of_views():
@@ -480,26 +476,6 @@ def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path)
         assert not images.read_image(path).channels["R"][mask == 0].any()
 
 
-class ZarrFolder:
-    """A Zarr store of version 2 in a folder, read without its compressed metadata."""
-
-    def __init__(self, folder):
-        self.folder = folder
-
-    def attributes(self, path):
-        return json.loads((self.folder / path / ".zattrs").read_text())
-
-    def array(self, path):
-        about = json.loads((self.folder / path / ".zarray").read_text())
-        name = ".".join("0" * len(about["shape"])) or "0"
-        content = (self.folder / path / name).read_bytes()
-        if about["compressor"]:
-            assert about["compressor"]["id"] == "zlib"
-            content = zlib.decompress(content)
-        assert about["chunks"] == about["shape"]
-        return np.frombuffer(content, about["dtype"]).reshape(about["shape"])
-
-
 def ncore_pixels(attributes, local):
     """Project directions (n, 3), x right, y down and z forward, as NCore's documentation does."""
     lens = attributes["camera_model_parameters"]
@@ -521,7 +497,7 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
     folder = exported(dataset, "ncore", source, tmp_path, points=400)
     sequence = json.loads((folder / "views.json").read_text())
     (entry,) = sequence["component_stores"]
-    store = ZarrFolder(folder / entry["path"])
+    store = ncore.Store(folder / entry["path"], Exported())
     frame = "lidars/points/frames/0"
     directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
@@ -570,7 +546,7 @@ def moving(folder, camera="wide", **motion):
 
 def ncore_poses(folder):
     """Return each frame's start and end, its exposure, and the poses by their times."""
-    store = ZarrFolder(folder / "views.ncore4.zarr")
+    store = ncore.Store(folder / "views.ncore4.zarr", Exported())
     poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]
     frames = store.attributes("cameras/camera/frames")["frames_timestamps_us"]
     data = [
@@ -621,7 +597,7 @@ def test_an_ncore_frame_of_a_rolling_shutter_lasts_from_the_first_row_to_the_las
     frames, exposures, poses = ncore_poses(folder)
     content = LightField.read(tmp_path / "dataset/lightfield.json")
     height = content.lens.height
-    store = ZarrFolder(folder / "views.ncore4.zarr")
+    store = ncore.Store(folder / "views.ncore4.zarr", Exported())
     lens = store.attributes("intrinsics/default/cameras/camera")["camera_model_parameters"]
     assert lens["shutter_type"] == "ROLLING_TOP_TO_BOTTOM"
     for view, (start, end), (begin, finish) in zip(content.views, frames, exposures, strict=True):
@@ -713,7 +689,7 @@ def test_lichtfeld_shows_its_points_and_depth_where_they_are(dataset, tmp_path, 
     options = {"points": 400, "format": form, "depth": source != "panorama"}
     folder = exported(dataset, "lichtfeld", source, tmp_path, **options)
     content = json.loads((folder / "transforms.json").read_text())
-    vertices, _ = ply(folder / content["ply_file_path"])
+    vertices = read_vertices(folder / content["ply_file_path"])
     points = np.stack([vertices[name] for name in "xyz"], axis=-1) * np.array([1, -1, -1])
     on_sphere(points, 1e-5)
     world_to_camera = lichtfeld_cameras(content)
@@ -835,18 +811,9 @@ def test_an_ncore_sequence_needs_two_views(tmp_path):
     assert not (tmp_path / "ncore").exists()
 
 
-def ply(path):
-    head, _, body = path.read_bytes().partition(b"end_header\n")
-    kinds = {"float": "<f4", "uchar": "u1"}
-    properties = [line.split()[1:] for line in head.decode().splitlines() if "property" in line]
-    vertices = np.frombuffer(body, [(name, kinds[kind]) for kind, name in properties])
-    assert f"element vertex {len(vertices)}\n" in head.decode()
-    return vertices, head
-
-
 def test_a_point_cloud_has_a_coloured_point_per_voxel_and_normals_to_the_cameras(dataset, tmp_path):
     folder = exported(dataset, "point_cloud", "views", tmp_path, voxel=0.1)
-    vertices, _ = ply(folder / "points.ply")
+    vertices = read_vertices(folder / "points.ply")
     places = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(float)
     on_sphere(places, 1e-5)
     assert len(np.unique(np.floor(places / 0.1), axis=0)) == len(places) > 2000
@@ -1258,7 +1225,7 @@ def test_a_point_cloud_may_have_views_that_see_no_surface(dataset, tmp_path):
     miss = np.full_like(image.channels["Z"], np.inf)
     images.write_exr(path, image.channels | {"Z": miss}, image.attributes)
     folder = exported(tmp_path / "sky", "point_cloud", "views", tmp_path / "export", voxel=0.1)
-    assert len(ply(folder / "points.ply")[0]) > 2000
+    assert len(read_vertices(folder / "points.ply")) > 2000
 
 
 def test_views_of_another_lens_do_not_test(dataset):

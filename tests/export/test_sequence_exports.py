@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pycolmap
 import pytest
+from oracles.readers.ply import read_vertices
 from sphere import (
     BALL,
     BALL_RADIUS,
@@ -127,10 +128,7 @@ def test_dnerf_has_a_time_for_each_picture_and_begins_each_list_at_0(sequence, t
 
 def test_dnerf_starts_from_points_of_the_first_frame(sequence, tmp_path):
     folder = exported(sequence / "plain", "dnerf", tmp_path, points=300)
-    _, _, body = (folder / "fused.ply").read_bytes().partition(b"end_header\n")
-    kinds = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
-    kinds += [(name, "u1") for name in ("red", "green", "blue")]
-    vertices = np.frombuffer(body, kinds)
+    vertices = read_vertices(folder / "fused.ply")
     points = np.stack([vertices[axis] for axis in "xyz"], axis=-1)
     assert 100 < len(points) <= 300
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), RADIUS, atol=1e-4)

@@ -185,6 +185,23 @@ def test_validation_finds_groups_that_are_missing_or_do_not_add_up(spoil, tmp_pa
     assert failed[name].problems[0].startswith(problem)
 
 
+def test_light_beyond_half_floats_needs_not_add_up(tmp_path):
+    """A lamp of negative light may leave a colour of 100 of a group beyond half floats."""
+    folder = tmp_path / "scene" / "rig"
+    dataset(folder)
+    view = "view_0001f"
+    for name in ("exr", "Combined_sky"):
+        pixels = colour(folder, name, view=view)
+        pixels[3, 4] = images.HALF_MAX if name == "Combined_sky" else 100
+        write(folder, name, view, pixels)
+    checks = {check.name: check for check in validate(folder).checks}
+    assert checks["light_groups"].passed
+    pixels[3, 4] = 60_000
+    write(folder, "Combined_sky", view, pixels)
+    checks = {check.name: check for check in validate(folder).checks}
+    assert checks["light_groups"].passed is False
+
+
 def scene(**more):
     content = {
         "scene": {"builder": "room"},

@@ -19,7 +19,7 @@ from lightfield.exporters.opendibr import OpenDibr
 from lightfield.formats import blend
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.imaging import blender_looks, images
+from lightfield.imaging import blender_looks, images, pictures
 from lightfield.imaging.blender_looks import FILE_LOOK
 from lightfield.imaging.look import Look
 from lightfield.imaging.sensor import SensorParameters, light_of
@@ -101,6 +101,13 @@ def test_each_look_gives_blenders_own_pixels(view, bits, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_stop_more_shows_twice_the_light_with_a_look_too():
+    look = Look("AgX", "None", 0.3, 1.0)
+    brighter = pictures.develop(light(), 1.0, look)
+    np.testing.assert_array_equal(brighter, pictures.develop(2 * light(), 0.0, look))
+    assert brighter.mean() > pictures.develop(light(), 0.0, look).mean() + 1
+
+
 def test_the_names_of_looks_are_blenders():
     import bpy
 

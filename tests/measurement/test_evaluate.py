@@ -190,6 +190,23 @@ def test_errors_are_those_of_the_changed_renders(dataset, tmp_path):
     assert row["normal"] == pytest.approx(45)
 
 
+def test_what_a_mask_leaves_out_changes_no_error(dataset, tmp_path):
+    """SSIM, FLIP and IV-PSNR look at the pixels around, too."""
+    shown = tmp_path / "shown.exr"
+    shutil.copy(dataset / f"perspective/{TESTS[0]}.exr", shown)
+    mask = np.ones((48, 64), bool)
+    mask[:, 40:] = False
+    without = rows_of(dataset, "perspective", shown, mask)["all"]
+    channels = dict(images.read_image(shown).channels)
+    for name in "RGB":
+        channels[name] = channels[name].copy()
+        channels[name][:, 40:] = 3.0
+    images.write_exr(shown, channels, {images.DEPTH_ATTRIBUTE: "z"})
+    spoilt = rows_of(dataset, "perspective", shown, mask)["all"]
+    assert spoilt == without
+    assert (spoilt["psnr"], spoilt["ssim"], spoilt["flip"]) == (math.inf, 1, 0)
+
+
 @pytest.mark.parametrize("missing", [0, np.nan, np.inf])
 def test_missing_normals_count_as_perpendicular(dataset, tmp_path, missing):
     render = tmp_path / "view_0001f.exr"

@@ -3,28 +3,21 @@
 import os
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import simulated_gpus
-from checkouts import ROOT
 from conftest import BLENDER
 
-from lightfield.configuration.config_file import Energy, load_config, read_config
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
-from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.lightfield import LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import lenses
-from lightfield.measurement import costs, gpu_check, plan
-from lightfield.measurement.equal_error import EqualError
+from lightfield.measurement import gpu_check
 from lightfield.measurement.trials import Trial
 from lightfield.planning import cost as planning
-from lightfield.planning.cost import read_probe
-from lightfield.planning.loading import scene_datasets
+from lightfield.planning.estimate import Known
 from lightfield.stages.measurement import FullSize
-from lightfield.workflow import history
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 RIG = {"type": "plane", "cameras": [2, 1], "size": 0.3}
@@ -38,7 +31,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 lightfield = LightField.read("lightfield.json")
 renderer = trials.Trials(*sys.argv[1:], lightfield, "cpu", 1, Path("cache"))
-print(json.dumps(gpu_check.check(renderer, "cpu", 4, {})))
+print(json.dumps(gpu_check.check(renderer, "cpu", 4)))
 """
 
 
@@ -113,10 +106,11 @@ def test_pictures_without_noise_are_compared_exactly(trials):
 def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": FullSize(views=10, resolution=[2000, 1000])}
     renderer = Simulated(lenses.from_camera(CAMERA))
-    content = gpu_check.check(renderer, "gpu", 256, full)
+    content = gpu_check.check(renderer, "gpu", 256)
     assert content["devices"] == ["CPU", "GPU"]
     assert content["core_seconds"] == pytest.approx(1)
     assert content["gpu_seconds"] == pytest.approx(0.1)
+    content |= gpu_check.full_hours(content, 256, full, {"big": Known()})
     assert content["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
     assert "times as fast as on one core" in gpu_check.table("garden", content)
 
@@ -158,65 +152,6 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room, monkeypat
         told.append("compiling Cycles' kernels for NVIDIA H200" in checked.stderr)
         shutil.rmtree(tmp_path / "cache")
     assert told == [True, False]
-
-
-@pytest.fixture
-def garden(tmp_path, monkeypatch):
-    """The garden's first dataset at full size, and the time of a sample of the simulated GPU."""
-    monkeypatch.setattr(planning, "SAMPLE_SECONDS", SAMPLE_SECONDS)
-    content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path), "preset": "full"}
-    dataset, *_ = scene_datasets("garden", settings=load_config(content))
-    return dataset
-
-
-@pytest.mark.parametrize("denoise", [False, True])
-def test_each_estimate_of_one_dataset_gives_the_same_hours(garden, denoise):
-    """A sample of a pixel takes `SAMPLE_SECONDS`. Four programs estimate a dataset's hours."""
-    dataset = replace(garden, render=garden.render.changed(denoise=denoise))
-    width, height = dataset.rig.camera.resolution
-    samples = dataset.render.samples
-    # A denoised pixel takes three samples longer.
-    seconds = dataset.view_count * width * height * (samples + 3 * denoise) * SAMPLE_SECONDS
-    hours = {"by hand": seconds / 3600}
-    # `snakemake -n`, which adds the start of Blender.
-    hours["forecast"] = (planning.rendering(dataset).seconds - planning.START_UP_SECONDS) / 3600
-    # `snakemake gpu_check`.
-    full = FullSize(views=dataset.view_count, resolution=[width, height])
-    renderer = Simulated(lenses.from_camera(CAMERA))
-    cost_samples = planning.pixel_cost(RenderBlock(samples=samples, denoise=denoise), None)
-    checked = gpu_check.check(renderer, "gpu", cost_samples, {"LFSphere": full})
-    hours["GPU check"] = checked["hours"]["LFSphere"]
-    # The page of a preview of 8 × 4 pixels with 2 samples.
-    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [8, 4]})
-    render = {"samples": 2, "denoise": denoise}
-    lightfield = LightField(
-        {**lens.to_lightfield(), "render": render}, [View.placed("a", np.eye(4))]
-    )
-    took = 8 * 4 * (2 + 3 * denoise) * SAMPLE_SECONDS
-    rendered = {"view": "a", "finished": 9.0, "wall_seconds": took, "cpu_seconds": took}
-    run = history.ProcessHistory(
-        {"started": 0.0, "device": "CPU", "threads": 1}, [rendered | {"render_seconds": took}]
-    )
-    size = full.model_copy(update={"samples": samples, "denoise": denoise})
-    page = costs.extrapolation([run], {}, 0, lightfield, Energy(watts=1, cores=1), size, [])
-    hours["page"] = page["core_hours"]
-    # `snakemake plan`, whose probe rendered a view. Then the forecast takes the probe's seconds.
-    probe = {
-        "views": dataset.view_count,
-        "resolution": [width, height],
-        "samples": samples,
-        "device": "CPU",
-        "denoise": denoise,
-        "view_seconds": [seconds / dataset.view_count],
-        "view_bytes": [1e6],
-    }
-    path = Path(dataset.work_root, dataset.scene_folder, dataset.rig_name, "probe.json")
-    write_json(path, probe)
-    expected = plan.Expected("garden", 1, read_probe(path), EqualError())
-    hours["plan"] = expected.cost.seconds / 3600
-    probed = planning.rendering(dataset).seconds - planning.START_UP_SECONDS
-    hours["forecast with a probe"] = probed / 3600
-    assert hours == pytest.approx(dict.fromkeys(hours, hours["by hand"]))
 
 
 def test_adaptive_sampling_costs_what_its_calibration_measured(tmp_path):

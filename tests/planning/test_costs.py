@@ -13,8 +13,8 @@ import pytest
 from lightfield.engine import receipts
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
-from lightfield.measurement import costs
 from lightfield.workflow import history
+from lightfield.workflow.finished_views import renderings
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 POWER = {"watts": 100, "cores": 4}
@@ -207,7 +207,7 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
         extrapolation["core_hours_uncertainty"] / extrapolation["core_hours"]
     )
     assert extrapolation["gigabytes"] == pytest.approx(300 / 5 * 40 * 4 / 1e9)
-    assert "4 views: 8 × 4 pixels, 2 samples" in extrapolation["basis"]
+    assert "4 finished views of 8 × 4 pixels with 2 samples" in extrapolation["basis"]
     # The description follows from this build alone.
     assert "40 times the path tracing" in extrapolation["basis"]
     same = dataset(*lines)["extrapolation"]["basis"]
@@ -221,7 +221,7 @@ def test_views_of_earlier_settings_do_not_tell_the_cost_of_the_full_dataset(data
     expected = dataset(*of_dataset)["extrapolation"]
     earlier = [view(n, 1010.0, 1.5, traced=0.5, cpu=1.5) for n in "abcdefghij"]
     both = dataset(*start(1000.0, start_up=0.0), *earlier, *of_dataset)["extrapolation"]
-    assert "path tracing of 2 views:" in both["basis"]
+    assert "by 2 finished views of" in both["basis"]
     # Only the first view of the earlier process adds what it took beside path tracing.
     assert both["core_hours"] == pytest.approx(expected["core_hours"] + 1.0 / 3600)
 
@@ -244,7 +244,7 @@ def test_times_of_a_core_and_of_a_graphics_card_are_not_averaged(dataset):
     extrapolation = content["extrapolation"]
     # Three views of 2 s, and the scene's and the reprojection's jobs on one of four cores.
     assert extrapolation["core_hours"] == pytest.approx((3 * 2 + (3.0 + 1.4) / 4) / 3600)
-    assert "path tracing of 1 view:" in extrapolation["basis"]
+    assert "by 1 finished view of" in extrapolation["basis"]
     # In all, 200 s of a core, and 5 s of the machine.
     machine = 5 + (200 + 3.0 + 1.4) / 4
     assert content["energy_kwh"] == pytest.approx(100 * machine / 3.6e6)
@@ -280,7 +280,7 @@ def test_other_programs_do_not_count_as_path_tracing():
     # Other programs used the machine too: of 20 s of wall time the process had 10, on one thread.
     lines = [*start(0.0), view("a", 20.0, wall=20.0, traced=16.0, cpu=10.0)]
     part = history.ProcessHistory(lines[0] | lines[1], [lines[2]])
-    (rendering,) = costs.renderings(part)
+    (rendering,) = renderings(part)
     assert rendering.path_tracing == pytest.approx(8.0)
     assert rendering.rest == pytest.approx(2.0)
 

@@ -17,7 +17,8 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.measurement.equal_error import of_measurement
-from lightfield.planning.cost import ProbedViews, read_probe, rendering
+from lightfield.planning.cost import rendering
+from lightfield.planning.estimate import ProbedViews, read_probe
 from lightfield.planning.forecast import Request, requests_table
 from lightfield.planning.loading import scene_datasets
 from lightfield.rendering.views import shard
@@ -205,7 +206,7 @@ def test_the_table_adds_up_the_probes_measurements():
     fisheye = ProbedViews(100, (2048, 2048), 256, "CPU", (30.0, 36.0, 42.0), (1e7, 1.2e7), False)
     panoramas = ProbedViews(8, (4096, 2048), 256, "CPU", (90.0,), (1e7, 1.2e7))
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
-    text = plan.table(datasets, {}, ENERGY)
+    text = plan.table(datasets, {}, ENERGY, {})
     # 300 views of 36 ± 12/√12 s take 3 h, and of 11 MB 3.3 GB.
     assert (
         "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h 00 min | 3 h 00 min "
@@ -222,14 +223,14 @@ def test_the_table_adds_up_the_probes_measurements():
     assert "and 0.08 kWh." in text
     on_card = replace(fisheye, device="GPU")
     # The whole machine takes 100 W for 100 × 36 s.
-    text = plan.table([("a/b", 1, on_card)], {}, ENERGY)
+    text = plan.table([("a/b", 1, on_card)], {}, ENERGY, {})
     assert "Times of the graphics card, with 0.1 kWh together." in text
 
 
 def test_times_of_a_core_and_of_a_graphics_card_have_no_sum():
     on_core = ProbedViews(10, (64, 64), 4, "CPU", (60.0,), (1e6,))
     on_card = replace(on_core, device="GPU", seconds=(0.5,))
-    text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {}, ENERGY)
+    text = plan.table([("a/b", 1, on_core), ("a/c", 1, on_card)], {}, ENERGY, {})
     assert "| 60 ± 0 | 10 min |" in text and "| 0.5 ± 0 | 5 s |" in text
     assert "| all | 20 | | | | — | — | — | | | 20 MB |" in text
     assert "graphics card for a/c, and of one processor core for the others" in text
@@ -275,7 +276,7 @@ def test_the_time_at_equal_error_is_beside_the_plain_one():
     assert choices.cheapest == pytest.approx((128 + 3) / 256)
     # The nearest point of those that were measured has 128 samples.
     assert (choices.bias, choices.correlation) == (pytest.approx(0.6), 0.75)
-    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY)
+    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY, {})
     assert "| 100 h | 100 h | 51 h | 60% | 0.75 | 100 GB |" in text
     assert "target_error: {of_samples: 256}" in text and "error_vs_time" not in text
 
@@ -294,7 +295,7 @@ def test_the_time_at_equal_error_is_beside_the_plain_one():
 )
 def test_a_plan_says_how_to_learn_the_time_at_equal_error(content):
     choices = of_measurement(HUNDRED_HOURS, content)
-    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY)
+    text = plan.table([("a/b", 1, HUNDRED_HOURS)], {"a/b": choices}, ENERGY, {})
     assert "| 100 h | 100 h | — | — | — | 100 GB |" in text
     assert "`snakemake --cores 2 error_vs_time`" in text
     assert "target_error: {of_samples: 256}" in text
@@ -379,5 +380,5 @@ def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
     ).run()
     expected = read_probe(output)
     assert (expected.seconds, expected.sizes) == ((8.0,), (16.0,))
-    text = plan.table([("a/b", 1, expected)], {}, ENERGY)
+    text = plan.table([("a/b", 1, expected)], {}, ENERGY, {})
     assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in text

@@ -1,10 +1,10 @@
 """The surface as meshes: what cameras see, with names, boxes and numbers, and nothing else."""
 
 import json
-import struct
 
 import numpy as np
 import pytest
+import trimesh
 from conftest import BLENDER
 from oracles import readers
 from scipy import ndimage
@@ -52,55 +52,21 @@ def write_mesh(run_program, folder, output, **settings):
 
 def read_ply(path):
     """Return the corners (n, 3, 3) of all triangles, and the object (n,) of each."""
-    head, _, body = path.read_bytes().partition(b"end_header\n")
-    vertex_count, face_count = (
-        int(line.split()[2]) for line in head.decode().splitlines() if line.startswith("element")
-    )
-    vertices = np.frombuffer(body, "<f4", 3 * vertex_count).reshape(-1, 3)
-    kind = [("count", "u1"), ("corners", "<i4", 3), ("object", "<i4")]
-    faces = np.frombuffer(body, kind, offset=vertices.nbytes)
-    assert len(faces) == face_count
-    assert (faces["count"] == 3).all()
-    return vertices[faces["corners"]].astype(np.float64), faces["object"]
+    mesh = trimesh.load_mesh(path, process=False)
+    owners = mesh.metadata["_ply_raw"]["face"]["data"]["object"]
+    assert len(owners) == len(mesh.faces)
+    return mesh.triangles.astype(np.float64), owners
 
 
 def read_glb(path):
     """Return the triangles (n, 3, 3) of each node in the GLB's world, by the node's name."""
-    content = path.read_bytes()
-    magic, version, size, text_size = struct.unpack("<4sIII", content[:16])
-    assert (magic, version, size) == (b"glTF", 2, len(content))
-    gltf = json.loads(content[20 : 20 + text_size])
-    binary = content[28 + text_size :]
-
-    def values(accessor, kind, columns):
-        entry = gltf["accessors"][accessor]
-        view = gltf["bufferViews"][entry["bufferView"]]
-        array = np.frombuffer(binary, kind, view["byteLength"] // 4, view["byteOffset"])
-        assert array.size == entry["count"] * (3 if entry["type"] == "VEC3" else 1)
-        return array.reshape(-1, columns)
-
-    (root,) = gltf["scenes"][0]["nodes"]
-    x, y, z, w = gltf["nodes"][root]["rotation"]
-    turn = np.eye(3) + 2 * np.array(
-        [
-            [-y * y - z * z, x * y - z * w, x * z + y * w],
-            [x * y + z * w, -x * x - z * z, y * z - x * w],
-            [x * z - y * w, y * z + x * w, -x * x - y * y],
-        ]
-    )
+    scene = trimesh.load_scene(path, process=False)
     triangles = {}
-    for child in gltf["nodes"][root]["children"]:
-        node = gltf["nodes"][child]
-        (primitive,) = gltf["meshes"][node["mesh"]]["primitives"]
-        vertices = values(primitive["attributes"]["POSITION"], "<f4", 3).astype(np.float64)
-        corners = values(primitive["indices"], "<u4", 3)
-        matrix = np.reshape(node["matrix"], (4, 4)).T
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            # glTF 2.0, 3.7.4: a matrix that mirrors also turns the faces.
-            corners = corners[:, ::-1]
-        world = (vertices @ matrix[:3, :3].T + matrix[:3, 3]) @ turn.T
-        assert node["name"] not in triangles
-        triangles[node["name"]] = world[corners]
+    for name in scene.graph.nodes_geometry:
+        matrix, geometry = scene.graph[name]
+        # It turns the faces where a matrix mirrors, as glTF 2.0, 3.7.4 demands.
+        mesh = scene.geometry[geometry].copy().apply_transform(matrix)
+        triangles[name] = mesh.triangles
     return triangles
 
 

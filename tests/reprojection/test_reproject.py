@@ -617,6 +617,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         (("--rectilinear", "18,36", "--png", "--scale", "1e9"), "makes a side of over"),
         ((*PERSPECTIVE, "--png", "--output-resolution", "1e9,4"), "must be two whole numbers"),
         ((*PERSPECTIVE, "--png", "--no-reproject"), "--no-reproject: excludes"),
+        (("--cubemap", "16", "--png", "--no-reproject"), "--no-reproject: excludes"),
         ((*PERSPECTIVE, "--png", "--i-equidistant", "3"), "the input lens comes from --input-cfg"),
         ((*PERSPECTIVE, "--png", "--filter-prefix", "zebra"), "no image passes the filters"),
         (

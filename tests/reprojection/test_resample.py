@@ -479,6 +479,26 @@ def test_the_filter_of_colour_does_not_change_depth_at_the_edge_of_the_image(fil
     assert np.abs(resampled / expected - 1).max() < 1e-5
 
 
+@pytest.mark.parametrize("filter_name", ["nearest", "bilinear", "bicubic", "lanczos"])
+def test_a_map_that_reads_a_part_of_the_source_gives_what_the_whole_gives(filter_name):
+    """A narrow target has the middle pixels of a wide one with the same focal length."""
+    source = narrow_lens(200)
+    # 61 pixels of 36 mm, and 305 of 180 mm.
+    targets = [
+        Rectilinear(width=size, height=size, focal_length=70, sensor_size=(width, width))
+        for size, width in ((61, 36), (305, 180))
+    ]
+    rotation = lens_map.rotation_matrix(11, 7, 3)
+    part, whole = (lens_map.compute(source, lens, rotation, filter_name) for lens in targets)
+    middle = np.s_[122:183, 122:183]
+    noise = np.random.default_rng(0).random((200, 200, 4), np.float32)
+    # Coordinates in float32 are off by up to 1.5e-5 of a pixel.
+    assert np.allclose(apply(noise, part), apply(noise, whole)[middle], rtol=0, atol=1e-4)
+    curved = (2 + 0.2 * Waves(60)(rays_of(source))).astype("f4")
+    depths = [apply_depth(curved, made, False, False) for made in (part, whole)]
+    assert np.allclose(depths[0], depths[1][middle], rtol=1e-5)
+
+
 @pytest.mark.parametrize("filter_name", sorted(FILTERS))
 def test_an_image_of_which_the_source_sees_nothing_is_empty(filter_name):
     behind = lens_map.rotation_matrix(180, 0, 0)

@@ -201,6 +201,30 @@ def test_a_single_leaf_is_a_soft_splat():
         assert outside.mean() < 0.1
 
 
+def test_a_panorama_has_no_seam_where_a_leaf_is_drawn():
+    """Leaves look alike in the middle of a panorama, and across its left and right edge."""
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [49, 49]})
+
+    def leaves(view):
+        """White leaves, a pixel wide, before a black wall."""
+        depth = np.full((49, 49), 4.0)
+        colour = np.zeros((49, 49, 3))
+        for row in (12, 24, 36):
+            depth[row, 24] = 2
+            colour[row, 24] = 1
+        return colour, depth / -lens.pixel_rays()[..., 2]
+
+    (view,) = views_along_y([0.0])
+    field = Sources(lens, [view], leaves)
+    panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [512, 256]})
+    in_front = view.world_from_camera
+    behind = in_front @ np.diag([-1, 1, -1, 1])
+    middle, seam = (field.blended(matrix, panorama, [0]) for matrix in (in_front, behind))
+    assert (middle.colour[..., 0] > 0.9).sum() > 10
+    np.testing.assert_allclose(seam.colour, np.roll(middle.colour, 256, axis=1), atol=1e-3)
+    np.testing.assert_array_equal(seam.holes, np.roll(middle.holes, 256, axis=1))
+
+
 def test_a_wall_does_not_shine_through_a_panel_close_in_front():
     lens = lenses.from_camera(FISHEYE | {"fov": 120})
     # The second camera stands between the panel and the wall, and sees the wall alone.

@@ -102,6 +102,18 @@ def test_a_touched_file_is_read_once_for_all_jobs_and_plans(folder, monkeypatch)
     assert reads == ["scene.blend"]
 
 
+def test_sums_are_kept_where_the_run_began(folder, monkeypatch):
+    """Snakemake leaves that folder before its process ends."""
+    Path("scene.blend").write_text("a scene")
+    sums = check.Sums(Path("work/sums.json"))
+    sums.of("scene.blend")
+    for name in ("work", "elsewhere"):
+        (folder / name).mkdir(exist_ok=True)
+    monkeypatch.chdir("elsewhere")
+    sums.save()
+    assert "scene.blend" in json.loads((folder / "work/sums.json").read_text())
+
+
 @pytest.mark.parametrize("content", ["5", "[]", "{", '{"a": 5}', '{"a": []}', '{"a": [1, 2]}'])
 def test_damaged_notes_of_sums_are_no_hindrance(folder, content):
     path = make("a", "[]")

@@ -174,6 +174,15 @@ def test_a_validation_counts_only_for_the_present_views(dataset):
     assert any(line.startswith("  validated: yes, and it is not valid") for line in dataset())
 
 
+def test_a_view_that_was_made_after_the_validation_is_not_validated(dataset):
+    dataset.render(*NAMES[:-1])
+    file = dataset.folder / "validation.json"
+    file.write_text('{"valid": true}')
+    time.sleep(0.02)
+    dataset.render(NAMES[-1])
+    assert "  validated: not since its views were made" in dataset()
+
+
 def test_a_clock_that_is_ahead_gives_no_rate(dataset):
     dataset.render("a")
     elsewhere = started(-5, pid=1) | {"host": "another-node"}

@@ -98,7 +98,11 @@ def observations(source: SourceDataset, points: Points) -> list[Observations]:
 
 
 def write_ply(path: Path, points: Points) -> None:
-    """Write a binary PLY with positions, normals (0 if unknown) and colours."""
+    """Write a binary PLY with positions, normals (0 if unknown) and colours.
+
+    Consumers expect these properties. trimesh writes a point cloud without its normals, and with
+    alpha.
+    """
     kinds = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
     kinds += [(name, "u1") for name in ("red", "green", "blue")]
     vertices = np.empty(len(points.positions), kinds)

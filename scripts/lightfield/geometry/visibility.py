@@ -5,7 +5,8 @@ metres. inf is a miss, and NaN is unknown. A tolerance is a part of the distance
 covers a part of it. Each caller has its own tolerance, with its reason.
 
 `lightfield.validation.consistency` measures differences that are far smaller. It fits planes, and
-its tolerances are standard deviations of a plane and footprints of a pixel.
+its tolerances are standard deviations of a plane and footprints of a pixel. `lightfield.synthesis`
+compares inverse distances in its loops: there a surface hides another one by a part, not wholly.
 """
 
 import numpy as np

@@ -20,9 +20,9 @@ from lightfield.measurement import bias, metrics, strata
 from lightfield.measurement.effort import effort_for, whole_samples
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.trials import Trials, ViewWindow, nearest_view
-from lightfield.planning.cost import DENOISING_SAMPLES, cost_in_samples
 from lightfield.planning.sampling import (
     BIAS_PART,
+    DENOISING_SAMPLES,
     FEWEST_BIAS_SEEDS,
     FEWEST_SEEDS,
     MOST_BIAS_SEEDS,
@@ -31,6 +31,7 @@ from lightfield.planning.sampling import (
     PLAIN_SAMPLES,
     REFERENCE_PART,
     REFERENCE_SAMPLES,
+    cost_in_samples,
     reference_of_samples,
     standard_error,
 )

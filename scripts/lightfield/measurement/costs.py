@@ -3,15 +3,13 @@
 import csv
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from pathlib import Path
-from statistics import mean
 from typing import Any
 
 from lightfield.configuration.config_file import Energy
-from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_text, write_json
 from lightfield.core.names import FILE, RENDERED
@@ -19,10 +17,19 @@ from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
-from lightfield.planning.cost import DENOISING_SAMPLES, Rate, cost_in_samples, kwh
-from lightfield.planning.sampling import standard_error
+from lightfield.planning.cost import kwh
+from lightfield.planning.estimate import Estimate, Known, ViewSize
+from lightfield.planning.sampling import DENOISING_SAMPLES, cost_in_samples
 from lightfield.stages import measurement
 from lightfield.workflow import history
+from lightfield.workflow.finished_views import (
+    counted_renderings,
+    finished_views,
+    latest_device,
+    of_latest_device,
+    on_processor,
+)
+from lightfield.workflow.known_times import read_known
 
 # The kinds of jobs that every dataset has, in the order of the work: the folders of their times.
 # Other kinds come between. Each reprojection is one.
@@ -153,54 +160,9 @@ def _files_of_kind(kind: str, dataset: Path, blend: Path | None) -> list[Path]:
     return [file for file in files if not any(file.is_relative_to(path) for path in exported)]
 
 
-@dataclass(frozen=True)
-class RenderedView:
-    """The time of one view: path tracing, the rest, and when it was finished.
-
-    Times are seconds of one core, or of the whole machine if a graphics card renders.
-    """
-
-    view: str
-    finished: float
-    path_tracing: float
-    rest: float
-    # Whether it is its process's first view, which pays for the scene's acceleration structures.
-    first: bool
-
-
-def renderings(run: history.ProcessHistory) -> Iterator[RenderedView]:
-    """Split the time of each view that a process rendered.
-
-    While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
-    time is divided in these proportions, because wall time includes the work of other programs.
-    """
-    for index, view in enumerate(run.views):
-        traced = view["render_seconds"]
-        rest = max(0.0, view["wall_seconds"] - traced)
-        if _on_processor(run):
-            busy = run.start["threads"] * traced
-            traced = view["cpu_seconds"] * busy / (busy + rest)
-            rest = view["cpu_seconds"] - traced
-        yield RenderedView(view["view"], view["finished"], traced, rest, first=index == 0)
-
-
-def _on_processor(run: history.ProcessHistory) -> bool:
-    """Return whether a process rendered on the processor's cores."""
-    return bool(run.start["device"] == "CPU")
-
-
 def on_card(run: history.ProcessHistory) -> bool:
     """Return whether a process rendered views on a graphics card."""
-    return bool(run.views) and not _on_processor(run)
-
-
-def _latest_device(runs: Sequence[history.ProcessHistory]) -> str | None:
-    """Return the device that rendered the latest view. None without a rendered view."""
-    rendered = [run for run in runs if run.views]
-    if not rendered:
-        return None
-    latest = max(rendered, key=lambda run: run.views[-1]["finished"])
-    return str(latest.start["device"])
+    return bool(run.views) and not on_processor(run)
 
 
 def write(job: measurement.Costs) -> None:
@@ -233,7 +195,7 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
         _costs_of_kinds(job.benchmarks, job.scene_benchmarks) | {RENDERED: _cost_of_views(shards)}
     )
     sizes = _bytes_of_kinds(kinds, job.dataset, job.blend)
-    device = _latest_device(runs)
+    device = latest_device(runs)
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
         # The file has another word for the kinds, so that those who read it need not change.
@@ -260,6 +222,7 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
             energy,
             full,
             job.settings.reprojections,
+            read_known(job.probe, job.gpu_check, job.finished),
         ),
     }
 
@@ -345,89 +308,91 @@ def extrapolation(
     energy: Energy,
     full: measurement.FullSize,
     reprojections: Iterable[str],
+    known: Known,
 ) -> dict[str, Any] | None:
-    """Return the cost of the full dataset, from the views of this one. None without views.
+    """Return the cost of the full dataset. None if no view of this one was rendered.
 
+    It is estimated from the views of this dataset, and by what else is ``known`` of the full one.
     If both processors and graphics cards rendered, only views of the latest device count: times of
     a core and of a whole machine have no mean.
     """
-    by_processor = _latest_device(runs) == "CPU"
-    runs = [run for run in runs if not run.views or _on_processor(run) == by_processor]
-    # Receipts may have views that the dataset had under earlier settings.
-    names = {view.name for view in lightfield.views}
-    all_renderings = [
-        rendering for run in runs for rendering in renderings(run) if rendering.view in names
-    ]
-    if not all_renderings:
+    own = finished_views(runs, lightfield)
+    if own is None:
         return None
-    latest = _latest_renderings(all_renderings)
     scale = Scale.of(full, lightfield)
-    times = [view.path_tracing for view in latest]
-    error = None
-    if len(times) > 1:
-        missing_part = max(0.0, 1 - len(times) / scale.views)
-        a_view = standard_error(times) * scale.pixels * scale.effort
-        error = scale.views * a_view * math.sqrt(missing_part)
+    size = _view_size(full, scale)
+    known = replace(known, finished=[own, *known.finished])
+    estimate = known.estimate(size, own.on_gpu)
+    assert estimate
+    rendering = scale.views * estimate.view_seconds
+    error = estimate.error(scale.views)
     # Beside a graphics card, a core's time is only a part of the machine's.
-    part = 1 if by_processor else 1 / energy.core_count
+    part = 1 / energy.core_count if own.on_gpu else 1
     growing_kinds = {"validate", FLOW.name, *reprojections}
-    each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
-        kind.cpu_seconds for name, kind in kinds.items() if name in growing_kinds
-    )
-    start_ups = sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
-    fixed_kinds = sum(
-        kind.cpu_seconds for name, kind in kinds.items() if name not in {RENDERED, *growing_kinds}
-    )
-    first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
-    once = first_views + part * (start_ups + fixed_kinds)
-    rate = Rate(
-        sample_seconds=mean(times) / (scale.pixels_here * scale.cost_here),
-        pixel_seconds=each_view / scale.pixels_here,
-    )
-    seconds = scale.views * rate.view_seconds(scale.full_pixels, scale.full_cost) + once
-    machine = seconds / energy.core_count if by_processor else seconds
+    growing = sum(kind.cpu_seconds for name, kind in kinds.items() if name in growing_kinds)
+    each_view = part / len(lightfield.views) * growing * scale.pixels
+    fixed = [kind for name, kind in kinds.items() if name not in {RENDERED, *growing_kinds}]
+    once = _seconds_once(runs, fixed, lightfield, part)
+    seconds = rendering + scale.views * each_view + once
+    machine = seconds if own.on_gpu else seconds / energy.core_count
     return {
         "views": scale.views,
         "resolution": full.resolution,
         "samples": scale.samples,
         "core_hours": seconds / 3600,
+        "rendering_hours": rendering / 3600,
         "core_hours_uncertainty": None if error is None else error / 3600,
         "energy_kwh": kwh(machine, energy.watts),
         "energy_kwh_uncertainty": (
             None if error is None else kwh(error * machine / seconds, energy.watts)
         ),
         "gigabytes": view_bytes / len(lightfield.views) * scale.views * scale.pixels / 1e9,
-        "basis": basis(len(times), lightfield, scale, by_processor),
+        "rendering": estimate.line("full size", scale.views),
+        "basis": basis(estimate, scale, estimate == own.estimate(size)),
     }
 
 
-def _latest_renderings(all_renderings: Sequence[RenderedView]) -> list[RenderedView]:
-    """Return the latest rendering of each view, without the first views of processes.
+def _seconds_once(
+    runs: Sequence[history.ProcessHistory],
+    jobs: Sequence[KindCost],
+    lightfield: LightField,
+    part: float,
+) -> float:
+    """Return the seconds of all work that does not grow with the views or their pixels.
 
-    First views do not represent the others. They count only if there are no others.
+    It is the start-up of processes, what their first views prepare, and the other ``jobs``. A
+    core's second counts as a ``part`` of one.
     """
-    by_finish = sorted(all_renderings, key=lambda rendering: rendering.finished)
-    by_view = {rendering.view: rendering for rendering in by_finish}
-    latest = list(by_view.values())
-    return [rendering for rendering in latest if not rendering.first] or latest
-
-
-def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) -> str:
-    """Describe the basis of an extrapolation from ``count`` views, and how far it reaches."""
-    lens = lightfield.lens
-    render = lightfield.render
-    denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render.denoise else ""
-    device = "the processor" if by_processor else "a graphics card: hours are the machine's"
-    text = (
-        f"path tracing of {units.count(count, 'view')}: {lens.width} × {lens.height} pixels, "
-        f"{render.samples} samples{denoising}; in proportion to pixels and samples; "
-        f"on {device}; all else as measured, the part that every view needs in proportion to "
-        "views and pixels"
+    first_views = sum(each.rest for each in counted_renderings(runs, lightfield) if each.first)
+    start_ups: float = sum(
+        run.start.get("start_up_cpu_seconds", 0.0) for run in of_latest_device(runs)
     )
+    return first_views + part * (start_ups + sum(job.cpu_seconds for job in jobs))
+
+
+def _view_size(full: measurement.FullSize, scale: Scale) -> ViewSize:
+    """Return the size of the views of a full dataset."""
+    width, height = full.resolution
+    samples = full.samples
+    assert samples is None or isinstance(samples, int)
+    return ViewSize((width, height), samples, None if samples is None else scale.full_cost)
+
+
+def basis(estimate: Estimate, scale: Scale, is_scaled: bool) -> str:
+    """Describe the basis of an extrapolation, and how far it reaches.
+
+    ``is_scaled`` says whether this dataset's views are the basis of the rendering's time.
+    """
+    device = "a graphics card: hours are the machine's" if estimate.on_gpu else "the processor"
     factor = scale.pixels * scale.effort
-    if factor != 1:
+    text = f"rendering by {estimate.source}"
+    if is_scaled and factor != 1:
         text += (
-            f"; a full view is {factor:.2g} times the path tracing of one here, "
-            "and the farther from 1, the less certain"
+            f", in proportion to pixels and samples (denoising counts as {DENOISING_SAMPLES}): a "
+            f"full view is {factor:.2g} times the path tracing of one here, and the farther from "
+            "1, the less certain"
         )
-    return text
+    return (
+        f"{text}; on {device}; all else as measured, the part that every view needs in proportion "
+        "to views and pixels"
+    )

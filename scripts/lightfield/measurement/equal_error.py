@@ -13,7 +13,7 @@ import numpy as np
 
 from lightfield.core.files import read_keys, reading
 from lightfield.measurement.effort import Line, fit, whole_samples
-from lightfield.planning.cost import ProbedViews
+from lightfield.planning.estimate import ProbedViews
 from lightfield.planning.sampling import DENOISED, TRACED
 
 # A method that takes this many times as long as plain path tracing does not reach its error.

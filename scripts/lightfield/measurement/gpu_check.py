@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from statistics import fmean, median
 from typing import Any
 
@@ -14,9 +14,11 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.measurement import metrics, trials
 from lightfield.measurement.trials import Trial, Trials
-from lightfield.planning.cost import Rate, pixel_cost
+from lightfield.planning.cost import pixel_cost
+from lightfield.planning.estimate import CheckedGpu, Known, ViewSize
 from lightfield.planning.sampling import standard_error
 from lightfield.stages.measurement import FullSize, GpuCheck
+from lightfield.workflow.known_times import finished_of, read_known
 
 # The longer side of the view that both devices render, in pixels.
 SIZE = 128
@@ -120,7 +122,15 @@ def make(job: GpuCheck) -> None:
     device = _gpu_of(job)
     lightfield, renderer = trials.of_calibrated(job)
     cost_samples = pixel_cost(lightfield.render, job.calibration)
-    content = check(renderer, device, cost_samples, job.settings.full)
+    known = {
+        dataset: read_known(dict(job.probe).get(dataset), None, finished_of(job.finished, dataset))
+        for dataset in job.settings.full
+    }
+    content = check(renderer, device, cost_samples)
+    # With a target error, each dataset's calibration chooses its samples.
+    samples = None if lightfield.render.target_error else lightfield.render.samples
+    assert samples is None or isinstance(samples, int)
+    content |= full_hours(content, samples, job.settings.full, known)
     name = job.output.name
     text = table(name, content)
     print(text)
@@ -151,14 +161,11 @@ def _gpu_of(job: GpuCheck) -> str:
     return device
 
 
-def check(
-    renderer: Trials, device: str, cost_samples: float, full: Mapping[str, FullSize]
-) -> dict[str, Any]:
+def check(renderer: Trials, device: str, cost_samples: float) -> dict[str, Any]:
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
-    ``cost_samples`` is the cost of a pixel of the scene in samples, with denoising. ``full`` has
-    the size of each of the scene's datasets. Returns the comparison, and the seconds of a sample of
-    a megapixel on a core and on the GPU. Also returns the GPU hours of each dataset.
+    ``cost_samples`` is the cost of a pixel of the scene in samples, with denoising. Returns the
+    comparison, and the seconds of a sample of a megapixel on a core and on the GPU.
     """
     lens = renderer.lens
     scale = min(1.0, SIZE / max(lens.width, lens.height))
@@ -175,7 +182,6 @@ def check(
     on_gpu = renderer.on(device, lens)
     timed = on_gpu.render(on_gpu.first_view, 1, settings)
     gpu = timed.seconds / (lens.width * lens.height * SAMPLES)
-    rate = Rate(gpu)
     return {
         "same": comparison.same,
         **asdict(comparison),
@@ -184,11 +190,30 @@ def check(
         "core_seconds": core * 1e6,
         "gpu_seconds": gpu * 1e6,
         "samples": cost_samples,
-        "hours": {
-            name: size.views * rate.view_seconds(math.prod(size.resolution), cost_samples) / 3600
-            for name, size in full.items()
-        },
     }
+
+
+def full_hours(
+    content: Mapping[str, Any],
+    samples: int | None,
+    full: Mapping[str, FullSize],
+    known: Mapping[str, Known],
+) -> dict[str, Any]:
+    """Return the GPU hours of each ``full`` dataset, and lines that say what estimates them.
+
+    ``content`` is the result of `check`. Of some datasets more is ``known``. ``samples`` is None if
+    a target error decides.
+    """
+    checked = CheckedGpu(content["gpu_seconds"] / 1e6, content["samples"])
+    hours, lines = {}, []
+    for name, size in full.items():
+        width, height = size.resolution
+        view_size = ViewSize((width, height), samples, content["samples"])
+        estimate = replace(known[name], gpu_check=checked).estimate(view_size, on_gpu=True)
+        assert estimate
+        hours[name] = size.views * estimate.view_seconds / 3600
+        lines.append(estimate.line(name, size.views))
+    return {"hours": hours, "rendering": lines}
 
 
 def table(name: str, content: Mapping[str, Any]) -> str:
@@ -211,6 +236,8 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             "| --- | ---: |",
             *rows,
             f"| together | {sum(content['hours'].values()):.3g} |",
+            "",
+            *(f"- {line}" for line in content["rendering"]),
             "",
         ]
     )

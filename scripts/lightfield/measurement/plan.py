@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lightfield.configuration.config_file import Energy
 from lightfield.core import processors, units
@@ -10,8 +10,10 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
 from lightfield.measurement.equal_error import EqualError, of_calibration, of_measurement
 from lightfield.planning import cost
-from lightfield.planning.cost import Cost, ProbedViews, kwh, read_probe
+from lightfield.planning.cost import Cost, kwh
+from lightfield.planning.estimate import Estimate, Known, ProbedViews, read_probe
 from lightfield.stages.measurement import Plan
+from lightfield.workflow.known_times import finished_of, read_known
 
 COLUMNS = (
     "dataset",
@@ -31,7 +33,7 @@ COLUMNS = (
 FORMULAS = """\
 - time = views × s a view
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
-probe, ± its standard error
+probe, ± its standard error, or the mean over finished views of the same size
 - plain = time of views without denoising
 - equal error = time of the cheapest setting with the same error, which is usually denoised
 - bias = bias² / error of all pixels, both at equal error
@@ -45,13 +47,23 @@ probe
 class Expected:
     """The estimate of one dataset of so many frames. Seconds count for one core or for the GPU.
 
-    ``choices`` compares plain path tracing with the cheapest setting of the same error.
+    ``choices`` compares plain path tracing with the cheapest setting of the same error. ``known``
+    says more of the views' time than the probe.
     """
 
     name: str
     frames: int
     probe: ProbedViews
     choices: EqualError
+    known: Known
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of a view on the probe's device."""
+        known = replace(self.known, probe=self.probe)
+        estimate = known.estimate(self.probe.size, self.probe.on_gpu)
+        assert estimate
+        return estimate
 
     @property
     def views(self) -> int:
@@ -61,7 +73,7 @@ class Expected:
     @property
     def cost(self) -> Cost:
         """The cost of all views."""
-        return self.views * self.probe.view_cost
+        return self.views * Cost(self.estimate.view_seconds, disk_bytes=self.probe.view_bytes)
 
     @property
     def seconds_of_choices(self) -> list[float | None]:
@@ -72,11 +84,11 @@ class Expected:
     @property
     def row(self) -> str:
         """The dataset's row of the table."""
-        probe = self.probe
+        probe, estimate = self.probe, self.estimate
         width, height = probe.resolution
         return (
             f"| {self.name} | {self.views} | {width} × {height} | {probe.samples} "
-            f"| {probe.view_cost.seconds:.3g} ± {probe.view_error:.1g} "
+            f"| {estimate.view_seconds:.3g} ± {estimate.view_error or 0:.1g} "
             f"| {units.duration(self.cost.seconds)} | {_times(self.seconds_of_choices)} "
             f"| {_figure(self.choices.bias, '.0%')} | {_figure(self.choices.correlation, '.2f')} "
             f"| {units.size(self.cost.disk_bytes)} |"
@@ -104,7 +116,8 @@ def write(job: Plan) -> None:
                 probe, read_keys(advice[name], "error_vs_time.py", *keys)
             )
     energy = Energy(watts=job.watts, cores=job.cores or "auto")
-    text = table(probes, choices, energy)
+    known = {name: read_known(None, None, finished_of(job.finished, name)) for name, _, _ in probes}
+    text = table(probes, choices, energy, known)
     write_text(job.output, text)
     print(text, end="")
 
@@ -113,13 +126,21 @@ def table(
     datasets: Sequence[tuple[str, int, ProbedViews]],
     choices: Mapping[str, EqualError],
     energy: Energy,
+    known: Mapping[str, Known],
 ) -> str:
     """Return the table of (name, frames, probe), with the sums and the formulas below.
 
-    ``choices`` has what was measured of a dataset's scene, by the datasets' names.
+    ``choices`` has what was measured of a dataset's scene, by the datasets' names. ``known`` has
+    what else says how long its views take.
     """
     expected = [
-        Expected(name, frames, probe, choices.get(name) or of_measurement(probe, None))
+        Expected(
+            name,
+            frames,
+            probe,
+            choices.get(name) or of_measurement(probe, None),
+            known.get(name, Known()),
+        )
         for name, frames, probe in datasets
     ]
     lines = [
@@ -131,6 +152,8 @@ def table(
         _sums_row(expected),
         "",
         _device_of(expected, energy),
+        "",
+        *(f"- {dataset.estimate.line(dataset.name, dataset.views)}" for dataset in expected),
         "",
         FORMULAS,
         "Probes are a few small views with all their samples. — is not known.",
@@ -170,7 +193,8 @@ def _sums_row(expected: Sequence[Expected]) -> str:
     size = units.size(total.disk_bytes)
     if 0 < len(on_card(expected)) < len(expected):
         return f"| all | {views} | | | | — | {_times([None, None])} | | | {size} |"
-    error = math.hypot(*(dataset.views * dataset.probe.view_error for dataset in expected))
+    errors = [dataset.views * (dataset.estimate.view_error or 0) for dataset in expected]
+    error = math.hypot(*errors)
     columns = zip(*(dataset.seconds_of_choices for dataset in expected), strict=True)
     of_choices = [None if None in column else sum(column) for column in columns]
     return (
@@ -181,7 +205,7 @@ def _sums_row(expected: Sequence[Expected]) -> str:
 
 def on_card(expected: Sequence[Expected]) -> list[str]:
     """Return the names of the datasets whose probes a graphics card rendered."""
-    return [dataset.name for dataset in expected if dataset.probe.device != "CPU"]
+    return [dataset.name for dataset in expected if dataset.probe.on_gpu]
 
 
 def _device_of(expected: Sequence[Expected], energy: Energy) -> str:

@@ -1,7 +1,8 @@
 """What a job costs before it runs: seconds of one core, memory and disk space.
 
 The functions answer for each job of a dataset, in the units that this module's table lists. A
-probe, a calibration and an inventory replace guesses as soon as they exist.
+probe, a calibration and an inventory replace guesses as soon as they exist. How long views take to
+render is asked of `lightfield.planning.estimate`.
 
 Every job reads this module with the rules, so it must import nothing that takes long.
 """
@@ -11,10 +12,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from lightfield.configuration.reprojections import LIGHT_GROUPS, Reprojection
@@ -23,15 +24,16 @@ from lightfield.core.files import DAMAGE, read_bytes, read_keys, reading
 from lightfield.formats import light_groups, passes
 from lightfield.formats.render_block import MeasuredTargetError, RenderBlock
 from lightfield.planning import sampling
+from lightfield.planning.estimate import Estimate, Known, ProbedViews, ViewSize, read_probe
+from lightfield.planning.sampling import cost_in_samples
 
 if TYPE_CHECKING:
     from lightfield.configuration.dataset import Dataset
 
 # Measured values. One core of a 2-core x86-64 machine took these seconds, most of them in the
 # garden. Bytes are bpy 5.0's. Reading and reprojection: benchmarks/reprojection.py with batches of
-# 16 views of 2048². Sensors: an image of 512², while the machine also did other work. Denoising:
-# views of the garden of 256² and more on an EPYC, 18 µs against 6. In small windows it costs up to
-# twice as much. A moving camera and compression: the three scenes. A calibration: the courtyard.
+# 16 views of 2048². Sensors: an image of 512², while the machine also did other work. A moving
+# camera and compression: the three scenes. A calibration: the courtyard.
 
 # Seconds for a pixel.
 SAMPLE_SECONDS = 6e-6  # one sample of path tracing
@@ -47,7 +49,6 @@ JOB_SECONDS = 1.0  # a job without Blender
 _MEMBER_SECONDS = 0.5  # a member of a family, beside its views and checks
 _WINDOW_SECONDS = 0.07  # a window's render of a calibration, beside its samples
 # Relative to other units.
-DENOISING_SAMPLES = 3  # samples of a pixel that take as long as denoising it
 _CAMERA_MOTION_PART = 0.2  # of a view's time: 0.09 to 0.26 with 4 and 16 samples of 64²
 _SEARCH_RENDERS = 9  # renders of each window in a calibration's search
 _SEARCH_PART = 2.5  # samples of these renders together, relative to the samples for the target
@@ -90,11 +91,15 @@ _MOST_SHARDS = 10_000
 
 @dataclass(frozen=True)
 class Cost:
-    """The cost of work: seconds of one core, the memory of its largest process, and disk space."""
+    """The cost of work: seconds, the memory of its largest process, and disk space.
+
+    ``seconds`` count for one core. ``gpu_seconds`` count for a GPU, and come beside them.
+    """
 
     seconds: float = 0.0
     memory_bytes: int = 0
     disk_bytes: float = 0.0
+    gpu_seconds: float = 0.0
 
     def __add__(self, other: Cost) -> Cost:
         """Return the cost of both, one after the other."""
@@ -102,11 +107,22 @@ class Cost:
             self.seconds + other.seconds,
             max(self.memory_bytes, other.memory_bytes),
             self.disk_bytes + other.disk_bytes,
+            self.gpu_seconds + other.gpu_seconds,
         )
 
     def __rmul__(self, count: int) -> Cost:
         """Return the cost of doing it ``count`` times, one after the other."""
-        return Cost(count * self.seconds, self.memory_bytes, count * self.disk_bytes)
+        return Cost(
+            count * self.seconds,
+            self.memory_bytes,
+            count * self.disk_bytes,
+            count * self.gpu_seconds,
+        )
+
+    @property
+    def all_seconds(self) -> float:
+        """The seconds of a core and of a GPU, one after the other."""
+        return self.seconds + self.gpu_seconds
 
     def megabytes(self, attempt: int = 1) -> int:
         """Return the memory that a job requests. Each further attempt requests more."""
@@ -131,28 +147,12 @@ BLENDER = Cost(START_UP_SECONDS)
 """The cost of a job that starts Blender, and does little more."""
 
 
-@dataclass(frozen=True)
-class Rate:
-    """How fast a device renders. Each estimate of views that nobody rendered follows from one.
+def rendering(dataset: Dataset, views: int | None = None, estimate: Estimate | None = None) -> Cost:
+    """Return the cost of a job that renders this many views, by default all of the dataset.
 
-    A dry run guesses the rate, a page takes it from the finished views, and a GPU check from the
-    view that it times.
-
-    - ``sample_seconds``: seconds for a sample of a pixel. `cost_in_samples` counts denoising, too.
-    - ``pixel_seconds``: seconds for a pixel beside its samples.
+    Without an ``estimate`` of the dataset's views, they take what a probe measured, or a guess.
     """
-
-    sample_seconds: float
-    pixel_seconds: float = 0.0
-
-    def view_seconds(self, pixels: float, cost_samples: float) -> float:
-        """Return the seconds for a view with this many ``pixels`` of so many samples."""
-        return pixels * cost_samples * self.sample_seconds + pixels * self.pixel_seconds
-
-
-def rendering(dataset: Dataset, views: int | None = None) -> Cost:
-    """Return the cost of a job that renders this many views, by default all of the dataset."""
-    return BLENDER + _count(dataset, views) * _rendered_view(dataset)
+    return BLENDER + _count(dataset, views) * _rendered_view(dataset, estimate)
 
 
 def importing(dataset: Dataset, views: int | None = None) -> Cost:
@@ -201,11 +201,6 @@ def members_cost(datasets: Iterable[Dataset], members: int) -> Cost:
     for dataset in datasets:
         member += dataset.view_count * view_cost(dataset) + _checks(dataset)
     return BLENDER + members * member
-
-
-def cost_in_samples(samples: float, denoise: bool) -> float:
-    """Return the cost of a pixel in samples: ``samples``, and denoising if ``denoise``."""
-    return samples + DENOISING_SAMPLES * denoise
 
 
 def pixel_cost(render: RenderBlock, calibration: Path | None) -> float:
@@ -268,8 +263,8 @@ def shard_count(dataset: Dataset) -> int:
     depend only on the configuration and the probe.
     """
     view_count = dataset.view_count
-    probe = _probe_of(dataset)
-    seconds = probe.view_cost.seconds if probe else _planned_view_seconds(dataset)
+    probe = _core_probe_of(dataset)
+    seconds = probe.estimate.view_seconds if probe else _planned_view_seconds(dataset)
     least_seconds = START_UP_SECONDS / _START_UP_PART
     most = _USUAL_SHARDS
     if dataset.cluster:
@@ -296,76 +291,63 @@ def _planned_view_seconds(dataset: Dataset) -> float:
     if dataset.imported:
         reprojected = [_reprojected_view(dataset, name) for name in dataset.reprojections]
         return _imported_view(dataset).seconds + sum(each.seconds for each in reprojected)
-    return _rate(dataset).view_seconds(dataset.pixels, _planned_samples(dataset))
+    return dataset.pixels * _planned_samples(dataset) * _sample_seconds(dataset)
 
 
-# Probes.
+# Measurements.
 
 
-@dataclass(frozen=True)
-class ProbedViews:
-    """The figures of scripts/probe.py: seconds of one core or of the GPU, and bytes, of some views.
+def view_size(dataset: Dataset) -> ViewSize:
+    """Return the size of a dataset's rendered views."""
+    samples = _known_samples(dataset)
+    effort = None if samples is None else cost_in_samples(samples, dataset.render.denoise)
+    if dataset.calibration:
+        with suppress(OSError, *DAMAGE):
+            effort = float(_content(dataset.calibration)["cost_samples"])
+    width, height = dataset.rig.camera.resolution
+    return ViewSize((width, height), samples, effort)
 
-    ``views``, ``resolution``, ``samples`` and ``denoise`` are the dataset's. Older probes do not
-    say whether views are denoised.
+
+def estimate_of(dataset: Dataset, known: Known | None = None, on_gpu: bool = False) -> Estimate:
+    """Return how long a view of a dataset takes to render, by all that is known, or as a guess.
+
+    By default, the probe is known. If nothing is known of a GPU, the estimate is a core's.
     """
-
-    views: int
-    resolution: tuple[int, int]
-    samples: int
-    device: str
-    seconds: tuple[float, ...]
-    sizes: tuple[float, ...]
-    denoise: bool | None = None
-
-    @property
-    def view_cost(self) -> Cost:
-        """The mean cost of a view."""
-        return Cost(fmean(self.seconds), disk_bytes=fmean(self.sizes))
-
-    @property
-    def view_error(self) -> float:
-        """The standard error of the mean seconds of a view."""
-        return sampling.standard_error(self.seconds)
+    known = known or Known(probe_of(dataset))
+    size = view_size(dataset)
+    devices = (True, False) if on_gpu else (False,)
+    estimates = (known.estimate(size, device) for device in devices)
+    return next((each for each in estimates if each), None) or _guess(dataset, size)
 
 
-def read_probe(path: Path | str) -> ProbedViews:
-    """Return the result of scripts/probe.py. Raises `UserError` if the file is damaged."""
-    keys = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
-    content = read_keys(path, "probe.py", *keys)
-    with reading(path, "probe"):
-        views, (width, height), samples, device, seconds, sizes = (content[key] for key in keys)
-        if not all(0 < number < 1e12 for number in [*seconds, *sizes]):
-            raise ValueError("a number is not above 0, or far too large")
-        if not all(isinstance(n, int) and 0 <= n < 2**31 for n in (views, samples, width, height)):
-            raise ValueError("a count is not a whole number")
-        if not (seconds and sizes):
-            raise ValueError("no view was measured")
-        return ProbedViews(
-            views,
-            (width, height),
-            samples,
-            device,
-            tuple(seconds),
-            tuple(sizes),
-            content.get("denoise"),
-        )
+def _guess(dataset: Dataset, size: ViewSize) -> Estimate:
+    """Return the guess for a view on one core, of which nothing was measured."""
+    effort = size.effort
+    if effort is None:
+        effort = cost_in_samples(_planned_samples(dataset), dataset.render.denoise)
+    seconds = size.pixels * effort * _sample_seconds(dataset)
+    return Estimate(seconds, "a guess: nothing was measured")
 
 
-def _probe_of(dataset: Dataset) -> ProbedViews | None:
-    """Return the probe of a dataset's settings on the processor. None without a valid one.
-
-    The probe of a sequence's first frame counts for all frames.
-    """
+def probe_path(dataset: Dataset) -> Path:
+    """Return the probe of a dataset. The probe of a sequence's first frame counts for all."""
     frames = [*dataset.rig.sequence.folders][:1] if dataset.rig.sequence else []
-    path = Path(dataset.work_root, dataset.scene_folder, dataset.rig_name, *frames, "probe.json")
+    return Path(dataset.work_root, dataset.scene_folder, dataset.rig_name, *frames, "probe.json")
+
+
+def probe_of(dataset: Dataset) -> ProbedViews | None:
+    """Return the probe of a dataset's rig. None without a sound one. It may be out of date."""
+    path = probe_path(dataset)
     try:
-        probe = _known_probe(path, path.stat().st_mtime_ns)
+        return _known_probe(path, path.stat().st_mtime_ns)
     except (OSError, UserError):
         return None
-    samples = dataset.render.samples or probe.samples
-    planned = (*dataset.rig.camera.resolution, samples, "CPU")
-    return probe if (*probe.resolution, probe.samples, probe.device) == planned else None
+
+
+def _core_probe_of(dataset: Dataset) -> ProbedViews | None:
+    """Return the probe of a dataset's views on one core. None without a valid one."""
+    probe = probe_of(dataset)
+    return probe if probe and probe.is_of(view_size(dataset), on_gpu=False) else None
 
 
 @lru_cache
@@ -376,18 +358,26 @@ def _known_probe(path: Path, _changed: int) -> ProbedViews:
 # The views of a dataset, one at a time.
 
 
-def _rendered_view(dataset: Dataset) -> Cost:
-    """Return the cost of a rendered view with its passes, by a probe or as a guess."""
-    memory = Cost(memory_bytes=_memory(dataset, dataset.pixels))
-    if probe := _probe_of(dataset):
-        return probe.view_cost + memory
-    seconds = _rate(dataset).view_seconds(dataset.pixels, _cost_samples(dataset))
+def _rendered_view(dataset: Dataset, estimate: Estimate | None = None) -> Cost:
+    """Return the cost of a rendered view with its passes. By default, the probe estimates it."""
+    estimate = estimate or estimate_of(dataset)
+    seconds, memory = estimate.view_seconds, _memory(dataset, dataset.pixels)
+    if estimate.on_gpu:
+        return Cost(0, memory, _view_bytes(dataset), seconds)
+    return Cost(seconds, memory, _view_bytes(dataset))
+
+
+def _view_bytes(dataset: Dataset) -> float:
+    """Return the size of a rendered view with its passes, by a probe or as a guess."""
+    probe = probe_of(dataset)
+    if probe and probe.is_of(view_size(dataset), probe.on_gpu):
+        return probe.view_bytes
     render = dataset.render
     pixel_bytes = 6 * (1 + light_group_count(dataset))
     pixel_bytes += sum(each.bytes for each in render.selected_passes if not passes.is_group(each))
     if dataset.depth:
         pixel_bytes += _DEPTH_BYTES[render.depth_precision]
-    return Cost(seconds, disk_bytes=dataset.pixels * pixel_bytes * COMPRESSED) + memory
+    return dataset.pixels * pixel_bytes * COMPRESSED
 
 
 def _imported_view(dataset: Dataset) -> Cost:
@@ -448,10 +438,22 @@ def _memory(dataset: Dataset, pixels: int) -> int:
     return rendering_memory(scene, pixels, denoise, light_group_count(dataset))
 
 
-def _rate(dataset: Dataset) -> Rate:
-    """Return the guessed rate of one core."""
+def _sample_seconds(dataset: Dataset) -> float:
+    """Return the guessed seconds of a sample of a pixel on one core."""
     is_moving = dataset.render.camera_motion is not None
-    return Rate(SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1))
+    return SAMPLE_SECONDS * (1 + _CAMERA_MOTION_PART if is_moving else 1)
+
+
+def _known_samples(dataset: Dataset) -> int | None:
+    """Return a pixel's samples. None if a target error decides, or an unknown .blend."""
+    samples = dataset.render.samples
+    if samples is None or isinstance(samples, int):
+        return samples
+    try:
+        in_file = int(_content(dataset.inventory)["blend"]["samples"])
+    except (OSError, *DAMAGE):
+        return None
+    return min(in_file, dataset.render.most_samples or in_file)
 
 
 def _planned_samples(dataset: Dataset) -> int:
@@ -460,15 +462,6 @@ def _planned_samples(dataset: Dataset) -> int:
     if isinstance(render.samples, int):
         return render.samples
     return min(render.most_samples or _GUESSED_SAMPLES, _GUESSED_SAMPLES)
-
-
-def _cost_samples(dataset: Dataset) -> float:
-    """Return a pixel's cost in samples, with denoising, by the calibration if it has run."""
-    try:
-        return float(_content(dataset.calibration)["cost_samples"])
-    except (OSError, *DAMAGE):
-        # There is no calibration, or it is broken, so that it will be made again.
-        return cost_in_samples(_planned_samples(dataset), dataset.render.denoise)
 
 
 def _reprojected_pixels(dataset: Dataset, name: str) -> int:

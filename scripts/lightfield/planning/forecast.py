@@ -7,7 +7,9 @@ from typing import Any
 from lightfield.core import units
 from lightfield.planning import cost
 from lightfield.planning.cost import Cost
+from lightfield.planning.estimate import Estimate
 from lightfield.planning.phases import SENSOR_PHASE
+from lightfield.planning.sampling import DENOISING_SAMPLES
 
 # The part of the formulas for the phase of sensors.
 _SENSOR_FORMULA = f"""\
@@ -16,26 +18,28 @@ a bracket with its mask and weights."""
 
 # The formulas of the columns, printed below the table.
 _FORMULAS = f"""\
-CPU time = rendered pixels × (samples + {cost.DENOISING_SAMPLES} if denoised) \
+CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
 × {1e6 * cost.SAMPLE_SECONDS:g} µs + reprojected pixels × {1e6 * cost.REPROJECTION_SECONDS:g} µs
 + pixels × {1e6 * cost.CHECK_SECONDS:g} µs for the validation and each export \
 + shown pixels × {2e6 * cost.REPORT_SECONDS:g} µs
 + jobs × {cost.JOB_SECONDS:g} s, with Blender {cost.START_UP_SECONDS:g} s.
 Size = views × pixels × bytes of a pixel × {cost.COMPRESSED:g}.
-After the target `plan`, the seconds and bytes of a view are those that its probes measured."""
+Measured views replace these guesses: the lines above say which. The target `plan` measures some."""
 
 
 @dataclass(frozen=True)
 class Work:
     """The work of a job: its phase, the views that it renders, and its cost.
 
-    ``dataset`` is the name of its dataset. It is None if the job belongs to none.
+    ``dataset`` is the name of its dataset. It is None if the job belongs to none. An ``estimate``
+    says how long its views take, if it renders any of a dataset.
     """
 
     phase: str
     dataset: str | None
     views: int
     cost: Cost
+    estimate: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def _range(amounts: set[Any]) -> str:
 
 
 def forecast(works: Sequence[Work]) -> str:
-    """Return the tables that end a dry run, and the formulas below.
+    """Return the tables that end a dry run, what estimates the views, and the formulas below.
 
     The first table has a row for each phase, in the order of ``works``, and their sum. Several
     datasets have a table of their own.
@@ -99,13 +103,30 @@ def forecast(works: Sequence[Work]) -> str:
     tables = [_table("phase", {**phases, "all": works})]
     if len(datasets) > 1:
         tables.append(_table("dataset", dict(sorted(datasets.items()))))
+    if lines := _estimate_lines(works):
+        tables.append("\n".join(lines))
     formulas = f"{_FORMULAS}\n{_SENSOR_FORMULA}" if SENSOR_PHASE in phases else _FORMULAS
     return "\n\n".join([*tables, formulas])
 
 
+def _estimate_lines(works: Sequence[Work]) -> list[str]:
+    """Return a line for each dataset, or sequence, whose views are rendered."""
+    views: dict[tuple[str, Estimate], int] = {}
+    for work in works:
+        if work.estimate and work.dataset:
+            key = (work.dataset, work.estimate)
+            views[key] = views.get(key, 0) + work.views
+    return [estimate.line(name, count) for (name, estimate), count in views.items()]
+
+
 def _table(title: str, groups: Mapping[str, Sequence[Work]]) -> str:
-    """Return a table with a row for the sum of each group, by its name."""
-    rows = [(title, "jobs", "views", "CPU time", "size")]
+    """Return a table with a row for the sum of each group, by its name.
+
+    It has a column for the time of a GPU if a group takes any.
+    """
+    has_gpu = any(work.cost.gpu_seconds for works in groups.values() for work in works)
+    gpu_title = "GPU time" if has_gpu else ""
+    rows = [(title, "jobs", "views", "CPU time", gpu_title, "size")]
     for name, works in groups.items():
         views = sum(work.views for work in works)
         total = sum((work.cost for work in works), Cost())
@@ -115,10 +136,11 @@ def _table(title: str, groups: Mapping[str, Sequence[Work]]) -> str:
                 f"{len(works):,}",
                 f"{views:,}" if views else "",
                 units.duration(total.seconds),
+                units.duration(total.gpu_seconds) if total.gpu_seconds else "",
                 units.size(total.disk_bytes) if total.disk_bytes else "",
             )
         )
     return "\n".join(
-        f"{name:<40} {jobs:>8} {views:>8} {seconds:>10} {size:>8}".rstrip()
-        for name, jobs, views, seconds, size in rows
+        f"{name:<40} {jobs:>8} {views:>8} {seconds:>10}{gpu:>{11 * has_gpu}} {size:>8}".rstrip()
+        for name, jobs, views, seconds, gpu, size in rows
     )

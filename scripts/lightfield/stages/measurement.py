@@ -59,6 +59,19 @@ class Costs(Stage[CostSettings]):
     )
     blend: Path | None = reads("the scene's .blend, if there is one", None)
     inventory: Path | None = reads(INVENTORY, None)
+    # These are no inputs: a later probe does not make the page again.
+    probe: Path | None = option(
+        "JSON that scripts/probe.py wrote for the dataset at full size, if there is one", None
+    )
+    gpu_check: Path | None = option(
+        "JSON that scripts/gpu_check.py wrote for the scene, if there is one", None
+    )
+    finished: list[tuple[Path, Path]] = option(
+        "views of the rig that may be finished, also under other presets: their lightfield.json, "
+        "and the folder of their shards' receipts",
+        [],
+        metavar=("LIGHTFIELD", "RECEIPTS"),
+    )
     output: Path = writes("JSON to write")
 
 
@@ -111,6 +124,12 @@ class Plan(PlainStage):
         "scripts/calibrate.py wrote for its scene",
         [],
         metavar=("NAME", "JSON", "SECONDS"),
+    )
+    finished: list[tuple[str, Path, Path]] = option(
+        "views of a dataset that may be finished, also under other presets: its name, their "
+        "lightfield.json, and the folder of their shards' receipts",
+        [],
+        metavar=("NAME", "LIGHTFIELD", "RECEIPTS"),
     )
     family: list[str] = option("name of a family of scenes", [], metavar="NAME")
     watts: float = option("power of the machine when all its cores work", 65.0)
@@ -237,6 +256,18 @@ class GpuCheck(CalibratedTrialStage[GpuCheckSettings]):
     function = "lightfield.measurement.gpu_check:make"
 
     settings: GpuCheckSettings = Field(default_factory=GpuCheckSettings)
+    # These are no inputs: a later probe does not repeat the check.
+    probe: list[tuple[str, Path]] = option(
+        "probe of a dataset: its name, and the JSON that scripts/probe.py wrote, if there is one",
+        [],
+        metavar=("NAME", "JSON"),
+    )
+    finished: list[tuple[str, Path, Path]] = option(
+        "views of a dataset that may be finished, also under other presets: its name, their "
+        "lightfield.json, and the folder of their shards' receipts",
+        [],
+        metavar=("NAME", "LIGHTFIELD", "RECEIPTS"),
+    )
     output: Path = writes("path without suffix of the .json and .md to write")
 
 

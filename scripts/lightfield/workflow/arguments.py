@@ -3,11 +3,15 @@
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lightfield.configuration.dataset import Dataset
 from lightfield.engine.bundles import VARIABLE
+from lightfield.planning.loading import scene_datasets
 from lightfield.workflow.job_plan import JobPlan
+from lightfield.workflow.known_times import time_files
 from lightfield.workflow.run import HasWildcards, Run
 
 
@@ -57,6 +61,53 @@ def equal_error_arguments(run: Run) -> str:
         elif Path(advice).exists():
             arguments += ["--advice", name, advice]
     return shlex.join(arguments)
+
+
+def time_arguments(run: Run) -> str:
+    """Return the arguments that tell scripts/plan.py about finished views of each chosen rig."""
+    first_frames = {d.sequence_name: d for d in reversed(run.chosen) if not d.imported}
+    return shlex.join(
+        word for name, dataset in first_frames.items() for word in _finished(dataset, run, name)
+    )
+
+
+def time_arguments_of_rig(run: Run) -> Callable[[HasWildcards], str]:
+    """Return a params function: what tells scripts/costs.py the time of a rig's full views."""
+
+    def arguments(wildcards: HasWildcards) -> str:
+        dataset = run.asked(run.build.dataset, wildcards)
+        if dataset.imported:
+            return ""
+        full = dataset if dataset.member else replace(dataset, preset="full")
+        files = time_files(full, run.settings)
+        words = ["--probe", files.probe, "--gpu-check", files.gpu_check]
+        return shlex.join([*map(str, words), *_finished(full, run)])
+
+    return arguments
+
+
+def time_arguments_of_scene(run: Run) -> Callable[[HasWildcards], str]:
+    """Return a params function: what tells scripts/gpu_check.py the time of a scene's views."""
+
+    def arguments(wildcards: HasWildcards) -> str:
+        first = run.asked(lambda names: run.build.first_of_scene(names["scene"]), wildcards)
+        words: list[str] = []
+        for dataset in scene_datasets(first.scene_name, settings=run.settings):
+            words += ["--probe", dataset.rig_folder, str(time_files(dataset, run.settings).probe)]
+            words += _finished(dataset, run, dataset.rig_folder)
+        return shlex.join(words)
+
+    return arguments
+
+
+def _finished(dataset: Dataset, run: Run, *name: str) -> list[str]:
+    """Return the flags for views of a dataset that exist, also under other presets."""
+    return [
+        str(word)
+        for lightfield, receipts in time_files(dataset, run.settings).finished
+        if lightfield.exists()
+        for word in ("--finished", *name, lightfield, receipts)
+    ]
 
 
 def shell_prefix(plan: JobPlan) -> str:

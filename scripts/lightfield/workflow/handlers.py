@@ -14,7 +14,8 @@ from typing import Any
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import duration
-from lightfield.planning.cost import Cost
+from lightfield.planning.cost import Cost, estimate_of, rendering
+from lightfield.planning.estimate import Estimate
 from lightfield.planning.forecast import Work, forecast, requests_table
 from lightfield.planning.phases import SENSOR_PHASE
 from lightfield.workflow import run_lock
@@ -29,6 +30,7 @@ from lightfield.workflow.jobs import (
     RENDER,
     Job,
 )
+from lightfield.workflow.known_times import time_files
 from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.run_display import RunDisplay, Task
 from lightfield.workflow.start import StartChecks, explain_full_disk
@@ -60,6 +62,8 @@ class Handlers:
         self._plan = plan
         self._run = plan.run
         self._checks = StartChecks(plan)
+        # By the names of datasets.
+        self._estimates: dict[str, Estimate] = {}
         self.display = RunDisplay(self._print_forecast, plan.find_log)
         if self._run.is_main:
             self._use_plugin()
@@ -111,7 +115,7 @@ class Handlers:
         for planned in self._plan.planned_jobs():
             if planned.job in (CALIBRATE, RENDER):
                 costs = seconds.setdefault(planned.names["scene"], {CALIBRATE: 0.0, RENDER: 0.0})
-                costs[planned.job] += (self._cost_of(planned) or Cost()).seconds
+                costs[planned.job] += (self._cost_of(planned) or Cost()).all_seconds
         for scene, costs in seconds.items():
             if costs[CALIBRATE]:
                 print(
@@ -130,7 +134,7 @@ class Handlers:
             self._phase_of(planned),
             Path(self._run.log_of(planned.name)),
             views=views,
-            seconds=expected.seconds if expected else None,
+            seconds=expected.all_seconds if expected else None,
         )
 
     def _phase_of(self, planned: PlannedJob) -> str:
@@ -153,7 +157,22 @@ class Handlers:
         job, names = planned
         if job.cost is None:
             return None
+        if estimate := self._estimate_of(planned):
+            dataset = self._run.asked(self._run.build.dataset, names)
+            return rendering(dataset, self._rendered_views(planned), estimate)
         return self._run.asked(partial(job.cost, self._run.build), names)
+
+    def _estimate_of(self, planned: PlannedJob) -> Estimate | None:
+        """Return how long a view of a job takes by all that is known. None if it renders none."""
+        if planned.job is not RENDER:
+            return None
+        dataset = self._run.asked(self._run.build.dataset, planned.names)
+        if dataset.imported:
+            return None
+        if dataset.name not in self._estimates:
+            known = time_files(dataset, self._run.settings).read()
+            self._estimates[dataset.name] = estimate_of(dataset, known, bool(self._run.gpus))
+        return self._estimates[dataset.name]
 
     # The ends.
 
@@ -240,6 +259,7 @@ class Handlers:
             self._dataset_name_of(planned),
             self._rendered_views(planned),
             self._cost_of(planned) or Cost(),
+            self._estimate_of(planned),
         )
 
     def _dataset_name_of(self, planned: PlannedJob) -> str | None:

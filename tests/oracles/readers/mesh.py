@@ -3,12 +3,11 @@
 Source: glTF 2.0 specification, 4.4; Turk, "The PLY Polygon File Format".
 """
 
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from lightfield.core.files import read_json, reading
 from oracles.readers.contents import Exported, Floats, numbers
@@ -48,15 +47,10 @@ def _corners(box: dict[str, Any]) -> Floats:
 def _expect_nodes(exported: Exported, path: Path, matrices: dict[str, Floats]) -> None:
     """Note a fault if a GLB's nodes are not the objects, each at its place."""
     with reading(path, "GLB"):
-        content = path.read_bytes()
-        magic, version, length, text_length = struct.unpack("<4sIII", content[:16])
-        if (magic, version, length) != (b"glTF", 2, len(content)):
-            raise ValueError("its header is not that of a GLB of its length")
-        gltf = json.loads(content[20 : 20 + text_length])
-        nodes = [node for node in gltf["nodes"] if "mesh" in node]
-        places = {node["name"]: numbers(node["matrix"], (16,)).reshape(4, 4).T for node in nodes}
-        if len(places) < len(nodes):
-            raise ValueError("two of its nodes have one name")
+        graph = trimesh.load_scene(path, process=False).graph
+        root = graph.transforms.children[graph.base_frame]
+        z_up = np.linalg.inv(graph.get(root[0])[0]) if len(root) == 1 else np.eye(4)
+        places = {name: z_up @ graph.get(name)[0] for name in graph.nodes_geometry}
     for name in sorted(matrices.keys() ^ places.keys()):
         is_there = "has a node" if name in places else "lacks the node"
         exported.faults.append(f"{path}: {is_there} {name}, which is not as objects.json has it")
@@ -68,15 +62,9 @@ def _expect_nodes(exported: Exported, path: Path, matrices: dict[str, Floats]) -
 
 def _expect_extent(exported: Exported, path: Path, corners: Floats) -> None:
     """Note a fault if a PLY's vertices are not within the objects' boxes."""
-    with reading(path, "PLY of triangles"), path.open("rb") as file:
-        count = 0
-        while (line := file.readline()) != b"end_header\n":
-            if not line:
-                raise ValueError("its header has no end")
-            if line.startswith(b"element vertex "):
-                count = int(line.split()[2])
-        vertices = np.fromfile(file, "<f4", 3 * count).reshape(count, 3)
-        if not count or not np.isfinite(vertices).all():
+    with reading(path, "PLY of triangles"):
+        vertices = trimesh.load_mesh(path, process=False).vertices
+        if not len(vertices) or not np.isfinite(vertices).all():
             raise ValueError("its vertices are not finite numbers")
     margin = _PRECISION * (1 + np.abs(corners).max())
     low = corners.min(axis=0) - margin

@@ -72,12 +72,14 @@ class Store:
     def array(self, name: str) -> NDArray[Any]:
         """Return an array of one chunk."""
         described = self.metadata[f"{name}/.zarray"]
-        if described["compressor"]["id"] != "zlib":
+        compressor = described["compressor"]
+        if compressor and compressor["id"] != "zlib":
             raise ValueError(f"{name}: is not compressed with zlib")
         shape = tuple(described["shape"])
-        chunk = self.folder / name / ".".join("0" * len(shape))
+        # An array without axes has the chunk 0, too.
+        chunk = self.folder / name / (".".join("0" * len(shape)) or "0")
         with reading(chunk, "chunk of a Zarr array"):
-            content = _decompressed(chunk, zlib.decompress)
+            content = _decompressed(chunk, zlib.decompress if compressor else bytes)
             return np.frombuffer(content, described["dtype"]).reshape(shape)
 
 
