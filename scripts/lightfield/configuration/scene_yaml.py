@@ -17,6 +17,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_
 
 from lightfield.configuration.exports import NO_DEPTH, NOT_EXR, Export, Exports
 from lightfield.configuration.family import Family, stand_in
+from lightfield.configuration.misplaced_keys import with_place
 from lightfield.configuration.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.configuration.render_settings import Render
 from lightfield.configuration.reprojections import (
@@ -36,7 +37,7 @@ from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
 from lightfield.geometry.lenses import LENSES, CameraSettings
-from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.rectilinear import Rectilinear, RectilinearSettings
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
 from lightfield.imaging import blender_looks
@@ -641,7 +642,7 @@ def _check_blender_limits(key: str, settings: CameraSettings) -> None:
         raise ValueError(f"{key}.resolution: {problem}")
     lens = settings.make()
     camera = lens.to_lightfield()["camera"]
-    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and getattr(settings, "fov", None):
+    if isinstance(settings, RectilinearSettings) and settings.fov and camera["focal_length"] < 1:
         widest = math.degrees(2 * math.atan(lens.sensor[0] / 2))
         raise ValueError(f"{key}.fov: is {settings.fov:g}; must be at most {widest:.4g} in Blender")
     for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
@@ -752,7 +753,11 @@ def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
             content = stand_in(content)
             is_family = True
     locate = _located_in_family if is_family else located
-    return checked_yaml(_SCENE, content, lambda problem: locate(problem, text, file))
+
+    def located_key(problem: str) -> str:
+        return locate(with_place(problem, Scene.model_fields), text, file)
+
+    return checked_yaml(_SCENE, content, located_key)
 
 
 def _located_in_family(problem: str, text: str, file: str) -> str:

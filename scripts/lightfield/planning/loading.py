@@ -178,9 +178,12 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
     except UserError as error:
         problem = f"rigs.{name}: {error}; let the preset have more views"
         raise scene_yaml.mistake(scene, problem) from None
-    if written.render and (problem := scene_yaml.small_image(rig.camera.resolution)):
-        problem = f"rigs.{name}.camera.resolution: under the preset {preset}, {problem}"
-        raise scene_yaml.mistake(scene, f"{problem}; let the preset have more pixels")
+    if written.render and (too_small := scene_yaml.small_image(rig.camera.resolution)):
+        raise scene_yaml.mistake(
+            scene,
+            f"rigs.{name}.camera.resolution: under the preset {preset}, {too_small}; let the "
+            "preset have more pixels",
+        )
     if written.flow and rig.is_at_one_place():
         raise scene_yaml.mistake(
             scene,
