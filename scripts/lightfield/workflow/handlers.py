@@ -30,6 +30,7 @@ from lightfield.workflow.jobs import (
 )
 from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.run_display import RunDisplay, Task
+from lightfield.workflow.slurm import Watch, interrupt
 from lightfield.workflow.start import StartChecks, explain_full_disk
 
 # For more datasets than this, only the page of all datasets is named.
@@ -81,11 +82,23 @@ class Handlers:
             plan.make_ways()
             run_lock.take(plan.scene_folders())
             self.display.at_close(explain_full_disk)
-            self._checks.check(self.display.uses_slurm)
+            self._checks.check(self.display.slurm_run is not None)
             plan.write_new_settings()
             self._checks.remove_leftovers()
             self._begin_display()
             announce_stop()
+            self._watch_slurm()
+
+    def _watch_slurm(self) -> None:
+        """End the run if it waits for jobs that Slurm does not have any more."""
+        display = self.display
+        if display.slurm_run:
+            Watch(display.slurm_run, display.on_cluster, display.say, self._end).start()
+
+    def _end(self, why: str) -> None:
+        """End the run from outside Snakemake, and print why."""
+        self.display.end = why
+        interrupt()
 
     def succeed(self) -> None:
         """Print the end of a run that made all that it should."""
@@ -171,7 +184,7 @@ class Handlers:
         """Print what the run took, and why it ended."""
         self._print_summary()
         failures = "" if was_interrupted() else self.display.failures()
-        print(failures or UNFINISHED, file=sys.stderr, flush=True)
+        print(self.display.end or failures or UNFINISHED, file=sys.stderr, flush=True)
 
     def _print_summary(self) -> None:
         """Print what the run took."""

@@ -22,6 +22,7 @@ from lightfield.workflow.job_requests import JobRequests
 from lightfield.workflow.jobs import BUILD_MEMBERS, CHECK_BLEND, GPU_CHECK, INVENTORY, RENDER
 from lightfield.workflow.run import Run
 from lightfield.workflow.run_config import NOTES
+from lightfield.workflow.slurm import check_slurm
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -176,21 +177,6 @@ class StartChecks:
                 f"removed {len(removed)} files and folders that killed runs have left",
                 file=sys.stderr,
             )
-
-
-def check_slurm() -> None:
-    """Raise `UserError` if no Slurm answers here."""
-    try:
-        asked_slurm = subprocess.run(
-            ["sinfo"], capture_output=True, encoding="utf-8", errors="replace"
-        )
-    except OSError:
-        problem = "there is no command sinfo"
-    else:
-        lines = asked_slurm.stderr.strip().splitlines()
-        problem = lines[-1] if asked_slurm.returncode and lines else ""
-    if problem:
-        raise UserError(f"--executor slurm: no Slurm answers: {problem}: run this on a login node")
 
 
 def explain_full_disk() -> None:
