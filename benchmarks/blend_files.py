@@ -179,7 +179,8 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
     inventory = folder / "inventory.json"
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(io.StringIO()):
-        inventory_file.write_of_datasets(path, scene, [dataset], inventory, False)
+        settings = job_settings.inventory(dataset)
+        inventory_file.write(path, settings, [dataset], inventory, False)
         views = lightfield_file.from_settings(job_settings.lightfield(dataset), inventory)
         lightfield = folder / "lightfield.json"
         views.write(lightfield)

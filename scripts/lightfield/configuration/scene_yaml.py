@@ -31,13 +31,13 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
-from lightfield.core.names import FILE, MESH, PARTS, ROOT, VIEWS
+from lightfield.core.names import FILE, MESH, PARTS, RENDERED, ROOT, VIEWS
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
 from lightfield.geometry.lenses import LENSES, CameraSettings
-from lightfield.geometry.lenses.rectilinear import Rectilinear, RectilinearSettings
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
 from lightfield.imaging import blender_looks
@@ -63,7 +63,7 @@ _REPROJECTION_NEIGHBOURS = {
     "exports",
     MESH,
     "panorama",
-    "render",
+    RENDERED,
     "report",
     "settings",
     FLOW.name,
@@ -642,9 +642,10 @@ def _check_blender_limits(key: str, settings: CameraSettings) -> None:
         raise ValueError(f"{key}.resolution: {problem}")
     lens = settings.make()
     camera = lens.to_lightfield()["camera"]
-    if isinstance(settings, RectilinearSettings) and settings.fov and camera["focal_length"] < 1:
+    fov = getattr(settings, "fov", None)
+    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and fov:
         widest = math.degrees(2 * math.atan(lens.sensor[0] / 2))
-        raise ValueError(f"{key}.fov: is {settings.fov:g}; must be at most {widest:.4g} in Blender")
+        raise ValueError(f"{key}.fov: is {fov:g}; must be at most {widest:.4g} in Blender")
     for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:

@@ -47,6 +47,8 @@ EXPOSURE = "exposure"
 # The properties of the machine that made the file, as far as they change bytes. Each view names its
 # own machine.
 MACHINE = "machine"
+# How a model came into the unit box: its shift in metres, and then its scale.
+MODEL_PLACEMENT = "model_placement"
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,9 +310,15 @@ class LightField:
         return "relight" in self.content.get("reprojection", {})
 
     @property
+    def look(self) -> dict[str, Any] | None:
+        """The look with which the views are developed, if they are."""
+        look: dict[str, Any] | None = self.content.get("reprojection", {}).get("look")
+        return look
+
+    @property
     def has_look(self) -> bool:
         """Whether the views are developed with one of Blender's looks."""
-        return "look" in self.content.get("reprojection", {})
+        return self.look is not None
 
     @property
     def follows_views(self) -> bool:

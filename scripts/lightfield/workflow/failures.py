@@ -46,7 +46,7 @@ CLOCKS_DIFFER = 5
 
 
 @dataclass
-class Job:
+class StartedJob:
     """A job that runs or ran: what it requested, its log and outputs.
 
     ``began`` is in seconds since 1970. ``message`` is the executor's message on its failure.
@@ -86,7 +86,7 @@ class Submission:
     """Jobs that run as one job: a single job, or a ``group`` of them by its name."""
 
     group: str | None = None
-    jobs: list[Job] = field(default_factory=list)
+    jobs: list[StartedJob] = field(default_factory=list)
 
     @property
     def batch_job(self) -> str | None:
@@ -113,7 +113,7 @@ class Submission:
         return [self._cause_without_logs(failed[0], why_refused)]
 
     def _cause_without_logs(
-        self, job: Job, why_refused: Callable[["Submission"], str | None]
+        self, job: StartedJob, why_refused: Callable[["Submission"], str | None]
     ) -> tuple[str, str, Path | None]:
         """Return the rule, cause and log of a job that wrote no log, as if it never began.
 
