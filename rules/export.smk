@@ -51,7 +51,7 @@ rule export:
         format=rf"(?!(?:{one_of([* SEQUENCE_EXPORTS, 'instant_ngp'])})[/.])[a-z0-9_]+",
     resources:
         mem_mb=4000,
-        runtime=120,
+        runtime=RUN.at_most(120),
     params:
         dataset=subpath(input.dataset, parent=True),
         folder=subpath(output[0], parent=True),
@@ -81,7 +81,7 @@ use rule export as export_sequence with:
         format=one_of(SEQUENCE_EXPORTS),
     resources:
         mem_mb=4000,
-        runtime=240,
+        runtime=RUN.at_most(240),
     params:
         dataset=RUN.paths.folder,
     message:

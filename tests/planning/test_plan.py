@@ -17,6 +17,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.measurement.equal_error import of_measurement
+from lightfield.planning import time_limits
 from lightfield.planning.cost import ProbedViews, read_probe, rendering
 from lightfield.planning.forecast import Request, requests_table
 from lightfield.planning.loading import scene_datasets
@@ -98,6 +99,35 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
     assert count(views_per_shard=5) == 129
     # Two cores render a hundred views in five minutes.
     assert count(cluster=Cluster(jobs=100, cores=2)) == 7
+
+
+@pytest.mark.parametrize("minutes", [60, 240, 480, 1440])
+def test_a_shard_keeps_the_limit_of_its_partition(sphere, minutes):
+    """A render and its reprojections are one job, one after the other."""
+    cluster = Cluster(jobs=100, cores=16, minutes=minutes)
+    limited = replace(sphere, cluster=cluster)
+    reprojections = len(limited.reprojections) * time_limits.minutes_of_reprojection(limited)
+    for first, end in limited.shards:
+        cost = rendering(limited, end - first)
+        render = cost.most_minutes(cluster.speed, time_limits.limit_of_render(limited))
+        assert render + reprojections <= minutes
+        expected = cost.seconds / 60 / 16
+        # Several times the expected time, unless the limit is too small for it.
+        assert render >= min(5 * expected, minutes - reprojections)
+        assert render >= 5 * expected or end - first == 1
+    assert len(limited.shards) >= len(replace(sphere, cluster=Cluster(jobs=100, cores=16)).shards)
+
+
+def test_shards_of_a_cluster_with_gpus_count_a_gpus_minutes(sphere):
+    """A view of 107 minutes of a core takes less than two minutes of a GPU."""
+    cluster = Cluster(jobs=10, cores=2, has_gpus=True)
+    on_gpus = replace(sphere, cluster=cluster)
+    assert len(on_gpus.shards) == 64
+    (first, end) = on_gpus.shards[0]
+    on_cores = replace(sphere, cluster=Cluster(jobs=10, cores=2))
+    assert len(on_cores.shards) == 288
+    cost = rendering(on_gpus, end - first)
+    assert cost.most_minutes(cluster.speed) < 150 < cost.most_minutes(2)
 
 
 def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):

@@ -154,6 +154,12 @@ class Configuration(Settings):
         "set it. Without this key, this machine renders.",
         json_schema_extra={"unit": "jobs"},
     )
+    partition_minutes: AtLeastOne | None = Field(
+        None,
+        description="Longest run time of a job that the cluster's partition allows. Shards get so "
+        "few views that no job requests more. Without this key, nothing limits it.",
+        json_schema_extra={"unit": "min"},
+    )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,
         description="Largest size of a package's parts. Without this key, a package is one file.",
