@@ -13,7 +13,7 @@ from typing import Any
 
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.terminal import was_interrupted
-from lightfield.core.units import duration
+from lightfield.core.units import count, duration
 from lightfield.planning.cost import Cost
 from lightfield.planning.forecast import Work, forecast, requests_table
 from lightfield.planning.phases import SENSOR_PHASE
@@ -23,6 +23,7 @@ from lightfield.workflow.jobs import (
     BUILD_MEMBERS,
     CALIBRATE,
     COUNT_MEMBERS,
+    INDEX,
     ORDER,
     PACK,
     PAGE,
@@ -211,8 +212,9 @@ class Handlers:
                 ends[self._validity(dataset)].append(plan.shown(dataset.paths.page))
         for state, paths in ends.items():
             if len(paths) > MOST_PAGES:
-                index = plan.shown(f"{self._run.results}/index.html")
-                paths = [f"{len(paths)} datasets: {index}"]
+                index = "" if is_left(plan.receipt_path(INDEX.name)) else "/index.html"
+                all_of_them = plan.shown(f"{self._run.results}{index}")
+                paths = [f"{count(len(paths), 'dataset')}: {all_of_them}"]
             for path in paths:
                 print(f"{state}: {path}", file=sys.stderr)
 
