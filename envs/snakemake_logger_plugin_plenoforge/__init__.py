@@ -126,10 +126,12 @@ class LogHandler(LogHandlerBase):
             print(text, file=sys.stderr, flush=True)
 
     def close(self):
-        """End the display: Snakemake has said everything."""
-        if display:
-            display.close()
-        super().close()
+        """End the display: Snakemake has said everything. A dry run may end with an error."""
+        try:
+            if display:
+                display.close()
+        finally:
+            super().close()
 
 
 def refusal_of(record):

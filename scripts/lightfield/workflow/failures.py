@@ -120,12 +120,13 @@ class Submission:
         The cause is in the batch system's log, or in the executor's message. A job that was not
         submitted has no log: a file in its place is an earlier run's.
         """
+        if not self.batch_job and (refusal := job.message or why_refused(self)):
+            return job.rule, refusal, None
         batch = batch_log(self.batch_job, job.began) if self.batch_job else None
-        why = (batch and cause(batch)) or job.message or why_refused(self)
+        why = (batch and cause(batch)) or job.message
         # A full disk takes no log at all.
         why = why or (job.log and obstacle(job.log)) or "it said nothing"
-        log = job.log if job.log and is_newer(job.log, job.began) else None
-        return job.rule, why, batch or log
+        return job.rule, why, batch or job.log
 
 
 def cause(log: Path) -> str | None:

@@ -240,13 +240,18 @@ class Handlers:
     # The forecast of a dry run.
 
     def _print_forecast(self) -> None:
-        """Print the jobs, views, CPU time and size of a dry run's phases and datasets."""
+        """Print the jobs, views, CPU time and size of a dry run's phases and datasets.
+
+        Exit with an error if the run would be refused.
+        """
         self._plan.announce_changes()
-        self._checks.announce_refusals()
+        is_refused = self._checks.announce_refusals()
         jobs = sorted(self._plan.planned_jobs(), key=lambda planned: ORDER[planned.job])
         print(forecast([self._work_of(planned) for planned in jobs]))
         if self._run.cluster:
             self._print_requests(jobs)
+        if is_refused:
+            sys.exit(1)
 
     def _work_of(self, planned: PlannedJob) -> Work:
         """Return a job's part of the forecast."""

@@ -54,8 +54,8 @@ class StartChecks:
         self._check_disk_space()
         self._check_times()
 
-    def announce_refusals(self) -> None:
-        """Print in a dry run what the real run would refuse."""
+    def announce_refusals(self) -> bool:
+        """Print in a dry run what the real run would refuse. Return whether there is anything."""
         checks: list[Callable[[], None]] = [
             self._plan.check_folders,
             self._check_device,
@@ -73,6 +73,7 @@ class StartChecks:
                 problems[str(error)] = None
         for problem in problems:
             print(f"would be refused: {problem}", file=sys.stderr)
+        return bool(problems)
 
     def _check_device(self) -> None:
         """Print on which GPU this machine renders. Raise `UserError` if the device is missing."""
