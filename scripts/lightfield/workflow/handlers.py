@@ -14,7 +14,7 @@ from typing import Any
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import count, duration
-from lightfield.planning.cost import Cost
+from lightfield.planning.cost import JOB, Cost
 from lightfield.planning.forecast import Work, forecast, requests_table
 from lightfield.planning.phases import SENSOR_PHASE
 from lightfield.workflow import run_lock
@@ -34,6 +34,7 @@ from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.run_display import RunDisplay, Task
 from lightfield.workflow.slurm import Watch, interrupt
 from lightfield.workflow.start import StartChecks, explain_full_disk
+from lightfield.workflow.unfinished_views import unfinished_views
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -254,13 +255,16 @@ class Handlers:
             sys.exit(1)
 
     def _work_of(self, planned: PlannedJob) -> Work:
-        """Return a job's part of the forecast."""
-        return Work(
-            self._phase_of(planned),
-            self._dataset_name_of(planned),
-            self._rendered_views(planned),
-            self._cost_of(planned) or Cost(),
-        )
+        """Return a job's part of the forecast. Views that earlier runs finished do not count."""
+        rest = planned
+        if planned.job is RENDER:
+            end = int(planned.names["first"]) + unfinished_views(self._plan, planned)
+            rest = PlannedJob(RENDER, {**planned.names, "end": str(end)})
+        views = self._rendered_views(rest)
+        # A job without a view to render does not start Blender.
+        is_finished = rest.job is RENDER and not views
+        cost = JOB if is_finished else self._cost_of(rest) or Cost()
+        return Work(self._phase_of(planned), self._dataset_name_of(planned), views, cost)
 
     def _dataset_name_of(self, planned: PlannedJob) -> str | None:
         """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
