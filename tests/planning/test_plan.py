@@ -209,11 +209,19 @@ def test_a_plan_for_a_cluster_lists_what_jobs_request(tmp_path):
     assert plan.returncode == 0, plan.stderr
     rows = dict(line.split(maxsplit=1) for line in plan.stdout.splitlines() if line)
     assert rows["rule"].split() == ["jobs", "CPUs", "mem_mb", "runtime", "slurm_partition", "gpu"]
+    # A GPU renders two of the eight panoramas in more than five minutes.
     jobs, cpus, memory, _, *others = rows["render"].split()
-    assert (jobs, cpus, memory, others) == ("8", "2", "9,000", ["long", "1"])
+    assert (jobs, cpus, memory, others) == ("4", "2", "9,000", ["long", "1"])
     assert rows["validate"].split() == ["1", "2", "4,000", "120", "long", "–"]
     # It runs on the login node.
     assert "lightfield" not in rows
+    # No job requests more than the partition allows.
+    plan = snakemake(
+        folder, "--profile", "profiles/slurm", *more, *arguments, "partition_minutes=40"
+    )
+    rows = [line.split() for line in plan.stdout.splitlines()]
+    limits = {row[0]: int(row[4]) for row in rows if row and row[0] in ("render", "validate")}
+    assert set(limits) == {"render", "validate"} and max(limits.values()) <= 40
     # This machine's own jobs are not submitted.
     here = snakemake(folder, "--dry-run", *arguments)
     assert "slurm_partition" not in here.stdout and "phase" in here.stdout
