@@ -192,7 +192,8 @@ def test_a_run_goes_on_after_its_controller_did_not_answer(tmp_path):
     log = folder / "terminal.log"
     with Node(tmp_path / "node") as node:
         path = f"{which.parent}:{node.environment['PATH']}"
-        environment = node.environment | {"PYTHONPATH": str(IMPATIENT), "PATH": path}
+        places = f"{IMPATIENT}:{folder / 'envs'}"
+        environment = node.environment | {"PYTHONPATH": places, "PATH": path}
         with log.open("wb") as terminal:
             run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
         wait_for_views(folder, 1, run)
