@@ -89,7 +89,7 @@ rule check_gpu:
     resources:
         **RUN.gpu,
         mem_mb=6000,
-        runtime=60,
+        runtime=RUN.at_most(60),
     params:
         device=RUN.settings.device,
         cache=RUN.of_first("paths.trials"),

@@ -45,7 +45,7 @@ rule calibrate:
     resources:
         **RUN.gpu,
         mem_mb=6000,
-        runtime=240,
+        runtime=RUN.at_most(240),
     params:
         device=RUN.settings.device,
         cache=RUN.of_first("paths.trials"),
@@ -87,7 +87,7 @@ rule measure_error:
     resources:
         **RUN.gpu,
         mem_mb=6000,
-        runtime=240,
+        runtime=RUN.at_most(240),
     params:
         device=RUN.settings.device,
         cache=RUN.of_first("paths.trials"),

@@ -33,7 +33,7 @@ for NAME, EXPORTED in EXPORT_RULES.items():
             format=rf"(?!(?:{OTHER_EXPORTS})[/.])[a-z0-9_]+",
         resources:
             mem_mb=4000,
-            runtime=120,
+            runtime=RUN.at_most(120),
         params:
             format=EXPORTED.pattern("format"),
             dataset=subpath(input.dataset, parent=True),
@@ -64,7 +64,7 @@ use rule export as export_sequence with:
         format=one_of(SEQUENCE_EXPORTS),
     resources:
         mem_mb=4000,
-        runtime=240,
+        runtime=RUN.at_most(240),
     params:
         dataset=RUN.paths.folder,
     message:

@@ -20,7 +20,7 @@ rule build_members:
     resources:
         **RUN.gpu,
         mem_mb=8000,
-        runtime=1440,
+        runtime=RUN.at_most(1440),
     params:
         device=RUN.settings.device,
     message:

@@ -20,7 +20,7 @@ rule mesh:
         RUN.times_of(MESH)
     resources:
         mem_mb=8000,
-        runtime=60,
+        runtime=RUN.at_most(60),
     params:
         folder=subpath(output[0], parent=True),
     message:

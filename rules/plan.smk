@@ -22,7 +22,7 @@ rule probe:
     resources:
         **RUN.gpu,
         mem_mb=6000,
-        runtime=60,
+        runtime=RUN.at_most(60),
     params:
         device=RUN.settings.device,
     message:

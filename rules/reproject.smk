@@ -79,6 +79,7 @@ rule reproject:
     benchmark:
         RUN.times_of(REPROJECT)
     resources:
+        **REQUESTS.reprojection_limit,
         mem_mb=2000,
     params:
         views=RUN.paths.views,

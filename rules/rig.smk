@@ -21,7 +21,7 @@ rule free_places:
         RUN.times_of(FREE_PLACES)
     resources:
         mem_mb=8000,
-        runtime=60,
+        runtime=RUN.at_most(60),
     params:
         inventory=optional("inventory"),
     message:
@@ -77,7 +77,7 @@ rule check_cameras:
         RUN.times_of(CHECK_CAMERAS)
     resources:
         mem_mb=8000,
-        runtime=60,
+        runtime=RUN.at_most(60),
     params:
         inventory=optional("inventory"),
     message:

@@ -20,7 +20,7 @@ rule build_scene:
         RUN.times_of(BUILD_SCENE)
     resources:
         mem_mb=8000,
-        runtime=30,
+        runtime=RUN.at_most(30),
     message:
         "Building the scene {wildcards.name}"
     shell:
@@ -48,7 +48,7 @@ rule import_model:
     localrule: PLAN.is_stored
     resources:
         mem_mb=8000,
-        runtime=30,
+        runtime=RUN.at_most(30),
     message:
         "Importing {input.model}"
     shell:
@@ -100,7 +100,7 @@ rule inventory:
         and any(d.source.blend or d.source.model for d in RUN.build.scenes.values())
     resources:
         mem_mb=8000,
-        runtime=30,
+        runtime=RUN.at_most(30),
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:

@@ -27,7 +27,7 @@ rule validate:
     threads: 2
     resources:
         mem_mb=4000,
-        runtime=120,
+        runtime=RUN.at_most(120),
     params:
         dataset=RUN.paths.folder,
         optional=optional("inventory", "splits", clearance="cameras"),
@@ -88,7 +88,7 @@ rule validate_sequence:
         rig="[A-Za-z0-9_.-]+",
     resources:
         mem_mb=4000,
-        runtime=120,
+        runtime=RUN.at_most(120),
     params:
         rig=RUN.paths.folder,
         removed=RUN.removed,

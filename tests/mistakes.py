@@ -707,6 +707,11 @@ EXPLAINED = [
         {"type": "blend_camera", "camera": {"lens": "file", "resolution": [8, 8]}},
         "rigs.LFSphere.type: blend_camera needs scene.blend",
     ),
+    ("scene.licence", "CC0-1.0", "scene.licence: belongs to the top of the file, beside scene"),
+    ("render.credit", "me", "render.credit: belongs to the top of the file, beside scene"),
+    ("samples", 64, "samples: belongs to render"),
+    ("rigs.LFSphere.resolution", [8, 8], "did you mean rotation? resolution belongs to camera"),
+    ("publish", PUBLISH | {"credit": "me"}, "publish.credit: belongs to the top of the file"),
     (
         "rigs.LFSphere.camera",
         {"lens": "file", "resolution": [8, 8]},

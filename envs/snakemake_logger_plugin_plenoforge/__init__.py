@@ -28,6 +28,10 @@ REPLACED = (
 # What --printshellcmds shows as Snakemake itself does: jobs, with the reason for each.
 OF_JOBS = (LogEvent.RUN_INFO, LogEvent.JOB_INFO, LogEvent.SHELLCMD)
 
+# How Slurm's executor says under which name it submits jobs, and that it has submitted one.
+SLURM_RUN = re.compile(r"SLURM run ID: (\S+)")
+SUBMITTED = re.compile(r"Job (\d+) has been submitted with SLURM jobid ")
+
 # None until the Snakefile is read, and in other workflows.
 display = None
 # Whether Snakemake uses this plugin.
@@ -49,6 +53,8 @@ class LogHandler(LogHandlerBase):
         self.quiet = {choice.name for choice in self.common_settings.quiet or ()}
         self.has_started = False
         self.submission = None
+        # The number in the batch system of the group whose jobs' errors follow.
+        self.batch_job = None
 
     def emit(self, record):
         """Show what one record says."""
@@ -76,21 +82,33 @@ class LogHandler(LogHandlerBase):
             display.planned(is_dry_run=self.common_settings.dryrun, is_shown=is_shown)
         elif event == LogEvent.GROUP_INFO:
             self.submission = display.submission(record.group_id)
-        elif event is None and record.getMessage().startswith("SLURM run ID"):
+        elif event is None and (told := SLURM_RUN.match(record.getMessage())):
             # Nothing else tells which executor runs the jobs.
-            display.uses_slurm = True
+            display.slurm_run = told[1]
+        elif event is None and (told := SUBMITTED.match(record.getMessage())):
+            display.submitted(int(told[1]))
         elif event == LogEvent.JOB_INFO and self.common_settings.dryrun:
             resources = dict(record.resources.items())
             display.requested(record.rule_name, paths(record.log), record.threads, resources)
         elif event == LogEvent.JOB_INFO:
             # Jobs of a group are indented, and follow their group.
             submission = self.submission if record.indent else display.submission()
-            logs, outputs = paths(record.log), paths(record.output)
-            display.started(record.jobid, record.rule_name, logs, outputs, submission)
+            display.started(
+                record.jobid,
+                record.rule_name,
+                paths(record.log),
+                paths(record.output),
+                submission,
+                record.threads,
+                dict(record.resources.items()),
+            )
         elif event == LogEvent.JOB_FINISHED:
             display.finished(record.job_id)
+        elif event == LogEvent.GROUP_ERROR:
+            self.batch_job = getattr(record, "external_jobid", None)
         elif event == LogEvent.JOB_ERROR:
-            display.failed(record.jobid, record.rule_msg)
+            batch_job = self.batch_job if record.indent else record.aux.get("external_jobid")
+            display.failed(record.jobid, record.rule_msg, batch_job)
 
     def is_worth_a_line(self, record):
         """Return whether to print a plain message. Before a run, all of them, as of --lint."""
@@ -108,10 +126,12 @@ class LogHandler(LogHandlerBase):
             print(text, file=sys.stderr, flush=True)
 
     def close(self):
-        """End the display: Snakemake has said everything."""
-        if display:
-            display.close()
-        super().close()
+        """End the display: Snakemake has said everything. A dry run may end with an error."""
+        try:
+            if display:
+                display.close()
+        finally:
+            super().close()
 
 
 def refusal_of(record):

@@ -113,6 +113,22 @@ def test_a_preset_that_leaves_less_than_blenders_smallest_image_is_refused(tmp_p
     assert dataset.rig.camera.resolution == (48, 4)
 
 
+def test_all_numbers_of_yaml_1_2_are_numbers(tmp_path):
+    """The numbers of the core schema, YAML 1.2.2, section 10.3.2."""
+    texts = [
+        f"{sign}{digits}{exponent}"
+        for sign in ("", "-", "+")
+        for digits in ("25", "2.5", "2.", ".5", "0.0")
+        for exponent in ("", "e1", "e+1", "e-1", "E1", "E-07")
+    ]
+    texts.append("0o17")
+    file = tmp_path / "numbers.yaml"
+    file.write_text("".join(f"{text!r}: {text}\n" for text in texts))
+    numbers = yaml_files.read_yaml(file, "numbers")
+    assert numbers == {text: 15 if "o" in text else float(text) for text in texts}
+    assert numbers["2.5e1"] == 25
+
+
 def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
     file = tmp_path / "numbers.yaml"
     numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}
@@ -451,6 +467,21 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected):
     assert "rule " not in result.stdout + result.stderr
 
 
+@pytest.mark.slow
+def test_a_mistake_has_the_file_that_configfile_names(tmp_path):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("preset: full\nenergy:\n  watts: -2.5e1\nscenes: [nowhere]\n")
+    folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
+    arguments = ["--cores", "1", "--dry-run", "--configfile", str(mine), "--config", *folders]
+    result = forks.run_snakemake(arguments, ROOT)
+    assert f"error: {mine}:3: energy.watts: is -25.0; must be a number at least 0" in result.stderr
+    mine.write_text(mine.read_text().replace("-2.5e1", "2.5e1"))
+    result = forks.run_snakemake(arguments, ROOT)
+    assert f"error: {mine}:4: scenes: there is no scene 'nowhere'" in result.stderr
+    result = forks.run_snakemake([*arguments, "scenes=smoek"], ROOT)
+    assert "error: --config: scenes: there is no scene 'smoek'; is smoke or" in result.stderr
+
+
 def test_no_two_scenes_may_share_a_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
     for name in ("room", "room_tiny"):
@@ -518,10 +549,13 @@ def test_a_key_of_the_configuration_has_the_line_of_the_file_that_says_it(tmp_pa
     content = {"preset": "best", "scenes": 7, "energy": {"cores": 0, "watts": -1}, "presets": {}}
     with pytest.raises(UserError) as caught:
         config_file.load_config(content)
-    message = config_file.with_lines(str(caught.value), [users_file, defaults], {"scenes"})
+    places = {"scenes": ["--config"]}
+    message = config_file.with_lines(
+        str(caught.value), lambda key: places.get(key, [users_file, defaults])
+    )
     assert "config.yaml:1: energy.cores: is 0" in message
     assert "defaults/config.yaml:4: energy.watts: is -1" in message
-    assert "config.yaml: scenes: " in message
+    assert "--config: scenes: " in message
     assert "config.yaml: presets: " in message
 
 

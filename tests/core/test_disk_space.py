@@ -249,7 +249,7 @@ def test_a_dry_run_names_everything_that_the_run_would_refuse(tmp_path):
     arguments = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
     result = snakemake(folder, *arguments)
     refused = [line for line in result.stderr.splitlines() if line.startswith("would be refused")]
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == 1, result.stderr
     assert len(refused) == 4, refused
     message = "\n".join(refused)
     assert re.search(r": results: .* GB are free on its disk, and this run writes some", message)

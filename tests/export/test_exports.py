@@ -1057,6 +1057,26 @@ def test_yaml_refuses_points_of_imported_views_without_depth(dataset, tmp_path):
         TypeAdapter(Scene).validate_python(scene)
 
 
+def test_a_blend_camera_with_frames_is_refused_for_what_it_is():
+    content = {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1},
+        "rigs": {
+            "Own": {
+                "type": "blend_camera",
+                "frames": {"first": 1, "last": 9},
+                "camera": LENSES["perspective"],
+            }
+        },
+        "exports": {"dnerf": {"sources": ["views"]}},
+    }
+    with pytest.raises(
+        ValidationError, match="the rig Own is of type blend_camera, whose"
+    ) as caught:
+        TypeAdapter(Scene).validate_python(content)
+    assert "fewer than two frames" not in str(caught.value)
+
+
 def test_a_sensor_s_pictures_without_a_pass_are_refused_in_yaml():
     content = {
         "scene": {"blend": "a.blend"},

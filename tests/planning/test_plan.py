@@ -17,6 +17,7 @@ from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.measurement.equal_error import of_measurement
+from lightfield.planning import time_limits
 from lightfield.planning.cost import rendering
 from lightfield.planning.estimate import ProbedViews, read_probe
 from lightfield.planning.forecast import Request, requests_table
@@ -101,6 +102,35 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
     assert count(cluster=Cluster(jobs=100, cores=2)) == 7
 
 
+@pytest.mark.parametrize("minutes", [60, 240, 480, 1440])
+def test_a_shard_keeps_the_limit_of_its_partition(sphere, minutes):
+    """A render and its reprojections are one job, one after the other."""
+    cluster = Cluster(jobs=100, cores=16, minutes=minutes)
+    limited = replace(sphere, cluster=cluster)
+    reprojections = len(limited.reprojections) * time_limits.minutes_of_reprojection(limited)
+    for first, end in limited.shards:
+        cost = rendering(limited, end - first)
+        render = cost.most_minutes(cluster.speed, time_limits.limit_of_render(limited))
+        assert render + reprojections <= minutes
+        expected = cost.seconds / 60 / 16
+        # Several times the expected time, unless the limit is too small for it.
+        assert render >= min(5 * expected, minutes - reprojections)
+        assert render >= 5 * expected or end - first == 1
+    assert len(limited.shards) >= len(replace(sphere, cluster=Cluster(jobs=100, cores=16)).shards)
+
+
+def test_shards_of_a_cluster_with_gpus_count_a_gpus_minutes(sphere):
+    """A view of 107 minutes of a core takes less than two minutes of a GPU."""
+    cluster = Cluster(jobs=10, cores=2, has_gpus=True)
+    on_gpus = replace(sphere, cluster=cluster)
+    assert len(on_gpus.shards) == 64
+    (first, end) = on_gpus.shards[0]
+    on_cores = replace(sphere, cluster=Cluster(jobs=10, cores=2))
+    assert len(on_cores.shards) == 288
+    cost = rendering(on_gpus, end - first)
+    assert cost.most_minutes(cluster.speed) < 150 < cost.most_minutes(2)
+
+
 def test_the_probe_of_a_sequences_first_frame_counts_for_all_frames(tmp_path):
     datasets = scene_datasets("garden_sequence")
     frames = [
@@ -180,11 +210,19 @@ def test_a_plan_for_a_cluster_lists_what_jobs_request(tmp_path):
     assert plan.returncode == 0, plan.stderr
     rows = dict(line.split(maxsplit=1) for line in plan.stdout.splitlines() if line)
     assert rows["rule"].split() == ["jobs", "CPUs", "mem_mb", "runtime", "slurm_partition", "gpu"]
+    # A GPU renders two of the eight panoramas in more than five minutes.
     jobs, cpus, memory, _, *others = rows["render"].split()
-    assert (jobs, cpus, memory, others) == ("8", "2", "9,000", ["long", "1"])
+    assert (jobs, cpus, memory, others) == ("4", "2", "9,000", ["long", "1"])
     assert rows["validate"].split() == ["1", "2", "4,000", "120", "long", "–"]
     # It runs on the login node.
     assert "lightfield" not in rows
+    # No job requests more than the partition allows.
+    plan = snakemake(
+        folder, "--profile", "profiles/slurm", *more, *arguments, "partition_minutes=40"
+    )
+    rows = [line.split() for line in plan.stdout.splitlines()]
+    limits = {row[0]: int(row[4]) for row in rows if row and row[0] in ("render", "validate")}
+    assert set(limits) == {"render", "validate"} and max(limits.values()) <= 40
     # This machine's own jobs are not submitted.
     here = snakemake(folder, "--dry-run", *arguments)
     assert "slurm_partition" not in here.stdout and "phase" in here.stdout

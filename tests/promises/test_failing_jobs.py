@@ -253,14 +253,17 @@ def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
 def test_the_batch_systems_log_is_named_for_a_job_that_never_began(failing, groups, name):
     submit = failing.folder / "submit.sh"
     said = "slurmstepd: error: execve(): python: No such file or directory"
-    submit.write_text(f"echo '{said}' > .snakemake/$1-17.log; echo failed\n")
+    # The job's number is what it prints, and the stand-in's status of the job, too.
+    submit.write_text(f"echo '{said}' > .snakemake/$1-failed.log; echo failed\n")
+    other = failing.folder / f".snakemake/{name}-17.log"
+    other.write_text("slurmstepd: error: another job's\n")
     earlier = failing.folder / failing.jobs["render"]["log"][0]
     earlier.parent.mkdir(parents=True, exist_ok=True)
     earlier.write_text("error: of an earlier run\n")
     os.utime(earlier, (WHEN, WHEN))
     options = [*on_a_cluster("bash submit.sh {name}"), *groups]
     terminal = failing.fail("render", options=options)
-    log = Path(f".snakemake/{name}-17.log")
+    log = Path(f".snakemake/{name}-failed.log")
     assert terminal.endswith(f"render failed: {said}\n  log: {log}\n"), terminal
     # The next run must not take it for its own.
     (failing.folder / log).unlink()
@@ -270,16 +273,33 @@ REFUSAL = "sbatch: error: Batch job submission failed: Invalid partition name sp
 UNKNOWN = "The given account nobody's appears to be invalid. Available accounts: mine"
 
 
+# As sbatch says it with --test-only.
+OF_GROUP = "allocation failure: Invalid partition name specified"
+
+
 @pytest.mark.parametrize(
-    ("account", "said"),
+    ("account", "groups", "said"),
     [
-        ("mine", f"SLURM sbatch failed. The error message was '{REFUSAL}'."),
-        ("nobody's", UNKNOWN),
+        ("mine", [], f"SLURM sbatch failed. The error message was '{REFUSAL}'."),
+        (
+            "mine",
+            ["--groups", "render=shard", "reproject=shard"],
+            f"render failed: sbatch refused it: {OF_GROUP}",
+        ),
+        ("nobody's", [], UNKNOWN),
     ],
 )
-def test_the_end_says_why_slurm_refuses_a_job(failing, tmp_path, monkeypatch, account, said):
+def test_the_end_says_why_slurm_refuses_a_job(
+    failing, tmp_path, monkeypatch, account, groups, said
+):
     commands = dict.fromkeys(["sinfo", "scontrol", "squeue", "sacct"], "")
-    commands |= {"sbatch": f"echo '{REFUSAL}' >&2; exit 1", "sacctmgr": "echo mine"}
+    commands |= {
+        "sbatch": f"[ $1 = --test-only ] && echo '{OF_GROUP}' >&2 || echo '{REFUSAL}' >&2; exit 1",
+        "sacctmgr": "echo mine",
+    }
+    other = failing.folder / ".snakemake/slurm_logs/rule_render/17.log"
+    other.parent.mkdir(parents=True, exist_ok=True)
+    other.write_text("slurmstepd: error: another job's\n")
     for name, script in commands.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
         (tmp_path / name).chmod(0o755)
@@ -292,6 +312,7 @@ def test_the_end_says_why_slurm_refuses_a_job(failing, tmp_path, monkeypatch, ac
             "slurm",
             "--jobs=1",
             *resources,
+            *groups,
             "--slurm-init-seconds-before-status-checks",
             "1",
         ],
@@ -301,7 +322,8 @@ def test_the_end_says_why_slurm_refuses_a_job(failing, tmp_path, monkeypatch, ac
     ends_before_jobs = account != "mine" and sys.version_info < (3, 13)
     lines = terminal.splitlines()
     assert said in " ".join(lines), terminal
-    assert ends_before_jobs or lines[-2].startswith("render failed: "), terminal
+    assert ends_before_jobs or lines[-1].startswith("render failed: "), terminal
+    assert "17.log" not in terminal
 
 
 def test_a_run_without_slurm_ends_before_its_first_job(failing, tmp_path, monkeypatch):
@@ -441,7 +463,7 @@ def test_a_model_with_a_time_in_the_future_is_named_before_the_first_job(tmp_pat
         moment = time.time() + hours * 3600
         os.utime(model, (moment, moment))
         plan = snakemake(folder, "--dry-run", *arguments)
-        assert plan.returncode == 0, plan.stderr
+        assert plan.returncode == is_refused, plan.stderr
         said = "would be refused: shape.obj: its time is in the future"
         assert (said in plan.stderr) == is_refused
     os.utime(model, (time.time() + 5 * 3600,) * 2)

@@ -80,9 +80,9 @@ def test_another_folder_of_results_is_refused_before_a_job_and_in_the_plan(tiny_
     (refusal,) = (
         line
         for line in plan.splitlines()
-        if line.startswith("would be refused: config.yaml: results:")
+        if line.startswith("would be refused: --config: results:")
     )
-    assert status == 0 and "is missing" not in plan and "outdated:" not in plan
+    assert status == 1 and "is missing" not in plan and "outdated:" not in plan
     status, run = said(tiny_build, "results=elsewhere")
     assert status == 1
     assert run.splitlines()[-1] == refusal.replace("would be refused", "error")

@@ -188,6 +188,39 @@ def test_a_run_that_leaves_jobs_out_calls_nothing_valid(tiny_build):
     assert VALID in said and "not " not in said
 
 
+def planned_views(folder):
+    """Return how many views a plan renders. Without any, the column is empty."""
+    forecast = snakemake(folder, "--dry-run", *tiny.CHOSEN).stdout
+    (row,) = re.findall(r"^views +\d+ +(?:(\d+) )? *\d.*$", forecast, re.M)
+    return int(row or 0)
+
+
+def test_a_plan_counts_only_the_views_that_a_run_will_render(tiny_build):
+    tiny.edit(tiny_build, "    size: 0.5\n", "    size: 0.5\n    split: {every: 3}\n")
+    assert planned_views(tiny_build) == 0
+    tiny.build(tiny_build)
+    # No view a second time.
+    assert set(rendered(tiny_build).values()) == {1}
+    (tiny_build / DATASET / "exr/view_0001f.exr").unlink()
+    assert planned_views(tiny_build) == 1
+    tiny.edit(tiny_build, "size: 0.5", "size: 0.6")
+    assert planned_views(tiny_build) == 6
+
+
+def test_a_run_that_leaves_the_page_of_all_datasets_out_does_not_name_it(tiny_build):
+    handlers = tiny_build / "scripts/lightfield/workflow/handlers.py"
+    # As if there were many datasets, of which only this page is named.
+    handlers.write_text(handlers.read_text().replace("MOST_PAGES = 12\n", "MOST_PAGES = 0\n"))
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    (tiny_build / "results/index.html").unlink()
+    said = tiny.build(tiny_build, "--until", "page")
+    assert "\nvalid: 1 dataset: results\n" in said
+    assert "valid: 1 dataset: results/index.html" not in said
+    said = tiny.build(tiny_build)
+    assert "\nvalid: 1 dataset: results/index.html\n" in said
+    assert (tiny_build / "results/index.html").is_file()
+
+
 def test_a_page_of_views_that_contradict_each_other_is_not_called_valid(tiny_build):
     first, second = (tiny_build / DATASET / f"exr/view_000{n}f.exr" for n in (0, 1))
     shutil.copyfile(first, second)

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -160,13 +161,13 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path, 
             )
         first = folder / "results/rooms/0000/member.json"
         wait_until(first.exists, run, log=log)
-        time = first.stat().st_mtime_ns
+        written = first.stat().st_mtime_ns
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
         assert run.wait(1800) == 0, log.read_text()
         states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
     assert "CANCELLED" in states
     assert "6 of 6 members of rooms built" in log.read_text()
-    assert first.stat().st_mtime_ns == time
+    assert first.stat().st_mtime_ns == written
     # The same members on one machine, in one batch.
     alone = checkout(tmp_path / "alone", rooms=ROOMS.replace("batch: 3", "batch: 6"))
     result = snakemake(alone, *OF_ROOMS)
@@ -176,6 +177,54 @@ def test_members_go_out_to_a_cluster_and_a_cancelled_batch_keeps_them(tmp_path, 
         views = [line for line in (folder / sums).read_text().splitlines() if "exr/" in line]
         assert len(views) == 2
         assert set(views) <= set((alone / sums).read_text().splitlines())
+
+
+def test_a_run_goes_on_after_its_controller_did_not_answer(tmp_path):
+    """A job ends meanwhile. The profile's settings let the executor ask again until it answers."""
+    install()
+    folder = slower_checkout(tmp_path / "cluster")
+    build(folder, *INPUTS)
+    # A cluster without accounting has no sacct, for which the executor asks `which`.
+    (tmp_path / "bin").mkdir()
+    which = tmp_path / "bin/which"
+    which.write_text('#!/bin/sh\n[ "$1" = sacct ] && exit 1\nexec /usr/bin/which "$@"\n')
+    which.chmod(0o755)
+    log = folder / "terminal.log"
+    with Node(tmp_path / "node") as node:
+        path = f"{which.parent}:{node.environment['PATH']}"
+        places = f"{IMPATIENT}:{folder / 'envs'}"
+        environment = node.environment | {"PYTHONPATH": places, "PATH": path}
+        with log.open("wb") as terminal:
+            run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
+        wait_for_views(folder, 1, run)
+        controller = node.daemons["slurmctld"]
+        controller.terminate()
+        controller.wait(30)
+        # Five attempts without an answer, which is what the executor makes by itself, take 55 s.
+        time.sleep(80)
+        node.start("slurmctld", "-D")
+        assert run.wait(900) == 0, log.read_text()
+    said = log.read_text()
+    assert "warning: Slurm does not answer: " in said and "note: Slurm answers again" in said
+    assert set(rendered(folder).values()) == {1}
+    assert len(views_of(folder)) == 6
+
+
+def test_the_end_has_the_words_of_sbatch_for_a_refused_group(tmp_path, in_forks):
+    install()
+    folder = checkout(tmp_path / "cluster")
+    build(folder, *INPUTS)
+    log = folder / "terminal.log"
+    more = ["--retries", "0", "--set-resources", "render:mem_mb=90000000"]
+    with Node(tmp_path / "node") as node, log.open("wb") as terminal:
+        shard = bookkeeping.shard(CUBOID, "perspective", SHARDS[0])
+        words = ["--profile", "profiles/slurm", "--cores", "2", *more, *CONFIG, "--", shard]
+        run = start_snakemake(
+            folder, *words, env=node.environment, stdout=terminal, stderr=terminal
+        )
+        assert run.wait(600) == 1, log.read_text()
+    said = "render failed: sbatch refused it: allocation failure: Requested node configuration is"
+    assert log.read_text().splitlines()[-1].startswith(said), log.read_text()
 
 
 def test_the_documented_program_needs_nothing_of_the_project():

@@ -193,7 +193,7 @@ def test_an_edited_blend_is_taken_without_the_lock_file_that_its_error_names(pro
     assert result.returncode != 0
     assert f"; to take the new file, delete {lock}" in result.stderr
     result = build(folder, proof, "--dry-run")
-    assert result.returncode == 0
+    assert result.returncode == 1
     (refusal,) = re.findall("^would be refused: (.*)$", result.stderr, re.M)
     assert refusal.endswith(f"; to take the new file, delete {lock}")
     (folder / lock).unlink()

@@ -165,7 +165,13 @@ def test_a_camera_that_touches_the_floor_is_refused(room, run_program, tmp_path)
     output = ("--output", tmp_path / "cameras.json")
     result = run_program("check_cameras.py", *arguments, *output, check=False)
     assert result.returncode == 1
-    assert "1 of 2 cameras are inside a surface" in result.stderr
+    # The floor is at z = 0, and the lower camera half a millimetre above it.
+    assert (
+        "1 of 2 cameras touch a surface, which is 0.5 mm away from the nearest: view"
+        in result.stderr
+    )
+    assert "inside" not in result.stderr
+    assert "smaller" not in result.stderr
 
 
 def test_cameras_are_checked_against_particles(folder, run_program, tmp_path):

@@ -736,6 +736,13 @@ def test_clamped_values_are_a_warning(small_dataset: Path) -> None:
     assert "9 values in 1 views were clamped" in result.summary()
 
 
+def test_the_terminal_is_told_of_clamped_light(small_dataset: Path, run_program) -> None:
+    headed(images.CLAMPED_ATTRIBUTE, 9)(small_dataset)
+    shown = run_program("validate.py", small_dataset)
+    said = "warning: 9 values in 1 views were clamped to the half range"
+    assert said in shown.stderr.splitlines()
+
+
 BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
     "no file": (
         lambda small_dataset: (small_dataset / "lightfield.json").unlink(),

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable, Set
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -154,6 +154,12 @@ class Configuration(Settings):
         "set it. Without this key, this machine renders.",
         json_schema_extra={"unit": "jobs"},
     )
+    partition_minutes: AtLeastOne | None = Field(
+        None,
+        description="Longest run time of a job that the cluster's partition allows. Shards get so "
+        "few views that no job requests more. Without this key, nothing limits it.",
+        json_schema_extra={"unit": "min"},
+    )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
         None,
         description="Largest size of a package's parts. Without this key, a package is one file.",
@@ -208,26 +214,35 @@ def load_config(content: Any) -> Configuration:
     return checked_yaml(_CONFIGURATION, content, f"{_FILE}: {{}}".format)
 
 
-def with_lines(message: str, files: Iterable[Path], given_keys: Set[str]) -> str:
-    """Return the message of an error with the line of each key that it names in a config.yaml.
+def with_lines(message: str, files_of: Callable[[str], Sequence[Path | str]]) -> str:
+    """Return the message of an error with the place of each key that it names in a config.yaml.
 
-    ``files`` are those whose keys make the configuration, the one that counts first. The
-    ``given_keys`` come from the command line, and have no line.
+    ``files_of`` returns where a key at the top may stand, the place that counts first: files, and
+    texts for places without lines. Without any, the message keeps ``config.yaml``.
     """
-    from lightfield.settings.yaml_files import find_key, read_settings_text
-
-    texts = {(name := _shown(path)): read_settings_text(path, name) for path in files}
 
     def with_line(message_line: str) -> str:
         problem = message_line.removeprefix(f"{_FILE}: ")
-        if problem == message_line or re.split("[.:]", problem)[0] in given_keys:
+        if problem == message_line:
             return message_line
-        keys = {name: find_key(problem, text) for name, text in texts.items()}
-        name = max(keys, key=lambda name: keys[name][0])
-        depth, number = keys[name]
-        return f"{name}:{number}: {problem}" if depth else message_line
+        return _located(problem, files_of(re.split("[.:]", problem)[0])) or message_line
 
     return "\n".join(map(with_line, message.splitlines()))
+
+
+def _located(problem: str, places: Iterable[Path | str]) -> str | None:
+    """Return a problem after the place that has most of the keys with which it begins. Or None."""
+    from lightfield.settings.yaml_files import find_key, read_settings_text
+
+    most_keys, located = 0, None
+    for place in places:
+        if isinstance(place, str):
+            return f"{place}: {problem}"
+        name = _shown(place)
+        depth, line = find_key(problem, read_settings_text(place, name))
+        if depth > most_keys:
+            most_keys, located = depth, f"{name}:{line}: {problem}"
+    return located
 
 
 def _shown(path: Path) -> str:

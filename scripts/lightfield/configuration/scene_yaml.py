@@ -13,6 +13,7 @@ from typing import Any, Self
 from pydantic import TypeAdapter, ValidationError, model_validator
 
 from lightfield.configuration.family import Family, stand_in
+from lightfield.configuration.misplaced_keys import with_place
 from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks import (
     exports,
@@ -170,7 +171,11 @@ def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
             content = stand_in(content)
             is_family = True
     locate = _located_in_family if is_family else located
-    return checked_yaml(_SCENE, content, lambda problem: locate(problem, text, file))
+
+    def located_key(problem: str) -> str:
+        return locate(with_place(problem, Scene.model_fields), text, file)
+
+    return checked_yaml(_SCENE, content, located_key)
 
 
 def _located_in_family(problem: str, text: str, file: str) -> str:

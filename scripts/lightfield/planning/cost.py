@@ -26,6 +26,7 @@ from lightfield.formats.render_block import MeasuredTargetError, RenderBlock
 from lightfield.planning import sampling
 from lightfield.planning.estimate import Estimate, Known, ProbedViews, ViewSize, read_probe
 from lightfield.planning.sampling import cost_in_samples
+from lightfield.planning.time_limits import longest_job, most_minutes
 
 if TYPE_CHECKING:
     from lightfield.configuration.dataset import Dataset
@@ -82,9 +83,9 @@ _MOST_SHOWN_VIEWS = 120
 _START_UP_PART = 0.05
 # More jobs would lengthen the plan, but not render faster. A cluster may get more.
 _USUAL_SHARDS = 64
-# On a cluster each job is expected to take at least and at most so long, but at least one view. A
-# batch system may take a minute to start a job.
-_CLUSTER_JOB_MINUTES = (5, 120)
+# On a cluster each job is expected to take at least so many minutes. A batch system may take a
+# minute to start a job.
+_SHORTEST_JOB = 5
 # Planning more shards than this takes too long.
 _MOST_SHARDS = 10_000
 
@@ -128,12 +129,12 @@ class Cost:
         """Return the memory that a job requests. Each further attempt requests more."""
         return math.ceil(self.memory_bytes / 1e6) * attempt
 
-    def most_minutes(self, cores: int) -> int:
+    def most_minutes(self, cores: float, limit: int | None = None) -> int:
         """Return a job's time limit: several times its estimate, and at least half an hour.
 
-        Its work is shared by ``cores``.
+        Its work is shared by ``cores``. The partition may ``limit`` its minutes.
         """
-        return 30 + math.ceil(5 * self.seconds / 60 / cores)
+        return most_minutes(self.seconds, cores, limit)
 
     @property
     def stall_seconds(self) -> int:
@@ -268,7 +269,9 @@ def shard_count(dataset: Dataset) -> int:
     least_seconds = START_UP_SECONDS / _START_UP_PART
     most = _USUAL_SHARDS
     if dataset.cluster:
-        least, longest = (60 * each * dataset.cluster.cores for each in _CLUSTER_JOB_MINUTES)
+        speed = dataset.cluster.speed
+        longest = 60 * longest_job(dataset) * speed
+        least = min(60 * _SHORTEST_JOB * speed, longest)
         least_seconds = max(least_seconds, least)
         short_jobs = math.ceil(view_count * seconds / longest)
         most = min(max(most, dataset.cluster.jobs, short_jobs), _MOST_SHARDS)

@@ -26,6 +26,8 @@ from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
 
+# The check of what the renderer has counted in the views' own files.
+COUNTS = "counts"
 # How many surface patches of a view are compared with its neighbours.
 _RAYS_A_VIEW = 400
 
@@ -451,7 +453,7 @@ def checks(
             f"{missed:.1%} of the depths are inf; volumes are no surfaces: {names}"
         )
     counted = {file: fact for file, fact in readable.items() if fact.nan is not None}
-    check = _outcome(image_set, "counts", counted, "have their renderer's counts, without NaN")
+    check = _outcome(image_set, COUNTS, counted, "have their renderer's counts, without NaN")
     clamped = [fact.clamped for fact in counted.values() if fact.clamped]
     if clamped:
         text = f"{sum(clamped)} values in {len(clamped)} views were clamped to the half range"

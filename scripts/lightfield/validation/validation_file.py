@@ -12,13 +12,13 @@ from lightfield.engine.receipts import made_in
 from lightfield.formats.layout import REPORT, SUMS, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
-from lightfield.validation import clipping, emptiness, sequence
+from lightfield.validation import clipping, emptiness, pixels, sequence
 from lightfield.validation.files import remove_strays
 from lightfield.validation.result import Result
 from lightfield.validation.validate import validate
 
 # The checks whose warnings the terminal shows.
-_SHOWN_WARNINGS = (clipping.NAME, emptiness.NAME)
+_SHOWN_WARNINGS = (clipping.NAME, emptiness.NAME, pixels.COUNTS)
 
 
 def check(job: Validate) -> Result:

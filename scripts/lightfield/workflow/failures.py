@@ -1,13 +1,15 @@
 """Says why a run failed, and which log has the details."""
 
+import glob
 import itertools
 import signal
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from lightfield.core.disk_space import obstacle
 from lightfield.core.errors import LESS_MEMORY
+from lightfield.planning.forecast import Request
 
 # The likely cause when a signal ended a program.
 _SIGNALS = {
@@ -45,16 +47,22 @@ CLOCKS_DIFFER = 5
 
 @dataclass
 class StartedJob:
-    """A job that runs or ran: its rule, log and outputs.
+    """A job that runs or ran: what it requested, its log and outputs.
 
     ``began`` is in seconds since 1970. ``message`` is the executor's message on its failure.
+    ``batch_job`` is its number in the batch system, if it failed after it was submitted to one.
     """
 
-    rule: str
+    request: Request
     log: Path | None
     outputs: Sequence[Path]
     began: float
     message: str = ""
+    batch_job: str | None = None
+
+    @property
+    def rule(self) -> str:
+        return self.request.rule
 
     def cause(self) -> str | None:
         """Return why it failed, by its log, or by the full disk that cut the log short.
@@ -80,23 +88,45 @@ class Submission:
     group: str | None = None
     jobs: list[StartedJob] = field(default_factory=list)
 
-    def causes(self) -> list[tuple[str, str, Path | None]]:
-        """Return the rule, cause and log of each of its jobs that failed."""
+    @property
+    def batch_job(self) -> str | None:
+        """The number in the batch system of jobs that failed there."""
+        return next((job.batch_job for job in self.jobs if job.batch_job), None)
+
+    @property
+    def rules(self) -> str:
+        """The names of its rules."""
+        return ", ".join(sorted({job.rule for job in self.jobs}))
+
+    def causes(
+        self, why_refused: Callable[["Submission"], str | None] = lambda submission: None
+    ) -> list[tuple[str, str, Path | None]]:
+        """Return the rule, cause and log of each of its jobs that failed.
+
+        ``why_refused`` returns why a batch system did not take the jobs.
+        """
         # Snakemake says of each job of a group that it failed.
         failed = [job for job in self.jobs if self.group is None or not job.is_finished()]
         causes = [(job.rule, why, job.log) for job in failed if (why := job.cause())]
-        return causes or [self._cause_without_logs(job) for job in failed[:1]]
+        if causes or not failed:
+            return causes
+        return [self._cause_without_logs(failed[0], why_refused)]
 
-    def _cause_without_logs(self, job: StartedJob) -> tuple[str, str, Path | None]:
+    def _cause_without_logs(
+        self, job: StartedJob, why_refused: Callable[["Submission"], str | None]
+    ) -> tuple[str, str, Path | None]:
         """Return the rule, cause and log of a job that wrote no log, as if it never began.
 
-        The cause is in the batch system's log, or in the executor's message.
+        The cause is in the batch system's log, or in the executor's message. A job that was not
+        submitted has no log: a file in its place is an earlier run's.
         """
-        rules = "_".join(sorted({job.rule for job in self.jobs}))
-        batch = batch_log(f"{self.group}_{rules}" if self.group else rules, job.began)
+        if not self.batch_job and (refusal := job.message or why_refused(self)):
+            return job.rule, refusal, None
+        batch = batch_log(self.batch_job, job.began) if self.batch_job else None
+        why = (batch and cause(batch)) or job.message
         # A full disk takes no log at all.
-        why = (batch and cause(batch)) or job.message or (job.log and obstacle(job.log))
-        return job.rule, why or "it said nothing", batch or job.log
+        why = why or (job.log and obstacle(job.log)) or "it said nothing"
+        return job.rule, why, batch or job.log
 
 
 def cause(log: Path) -> str | None:
@@ -162,13 +192,13 @@ def is_newer(path: Path, time: float) -> bool:
     return path.is_file() and path.stat().st_mtime >= time - CLOCKS_DIFFER
 
 
-def batch_log(name: str, since: float) -> Path | None:
-    """Return the newest log that a batch system wrote for a job or group, or None.
+def batch_log(batch_job: str, since: float) -> Path | None:
+    """Return the log that a batch system wrote for one of its jobs, by its number. Or None.
 
     Looks in the folders that the profiles give Slurm. The log must be newer than ``since``, in
     seconds since 1970.
     """
     folder = Path(".snakemake")
-    logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]
-    new_logs = [log for log in logs if is_newer(log, since)]
-    return max(new_logs, key=lambda log: log.stat().st_mtime, default=None)
+    name = glob.escape(batch_job)
+    logs = [*folder.glob(f"slurm_logs/**/{name}.log"), *folder.glob(f"*-{name}.log")]
+    return next((log for log in logs if is_newer(log, since)), None)

@@ -13,8 +13,8 @@ from typing import Any
 
 from lightfield.configuration.dataset import Dataset
 from lightfield.core.terminal import was_interrupted
-from lightfield.core.units import duration
-from lightfield.planning.cost import Cost, estimate_of, rendering
+from lightfield.core.units import count, duration
+from lightfield.planning.cost import JOB, Cost, estimate_of, rendering
 from lightfield.planning.estimate import Estimate
 from lightfield.planning.forecast import Work, forecast, requests_table
 from lightfield.planning.phases import SENSOR_PHASE
@@ -24,6 +24,7 @@ from lightfield.workflow.jobs import (
     BUILD_MEMBERS,
     CALIBRATE,
     COUNT_MEMBERS,
+    INDEX,
     ORDER,
     PACK,
     PAGE,
@@ -33,7 +34,9 @@ from lightfield.workflow.jobs import (
 from lightfield.workflow.known_times import time_files
 from lightfield.workflow.run_config import ending_run
 from lightfield.workflow.run_display import RunDisplay, Task
+from lightfield.workflow.slurm import Watch, interrupt
 from lightfield.workflow.start import StartChecks, explain_full_disk
+from lightfield.workflow.unfinished_views import unfinished_views
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
@@ -86,11 +89,23 @@ class Handlers:
             plan.make_ways()
             run_lock.take(plan.scene_folders())
             self.display.at_close(explain_full_disk)
-            self._checks.check(self.display.uses_slurm)
+            self._checks.check(self.display.slurm_run is not None)
             plan.write_new_settings()
             self._checks.remove_leftovers()
             self._begin_display()
             announce_stop()
+            self._watch_slurm()
+
+    def _watch_slurm(self) -> None:
+        """End the run if it waits for jobs that Slurm does not have any more."""
+        display = self.display
+        if display.slurm_run:
+            Watch(display.slurm_run, display.on_cluster, display.say, self._end).start()
+
+    def _end(self, why: str) -> None:
+        """End the run from outside Snakemake, and print why."""
+        self.display.end = why
+        interrupt()
 
     def succeed(self) -> None:
         """Print the end of a run that made all that it should."""
@@ -191,7 +206,7 @@ class Handlers:
         """Print what the run took, and why it ended."""
         self._print_summary()
         failures = "" if was_interrupted() else self.display.failures()
-        print(failures or UNFINISHED, file=sys.stderr, flush=True)
+        print(self.display.end or failures or UNFINISHED, file=sys.stderr, flush=True)
 
     def _print_summary(self) -> None:
         """Print what the run took."""
@@ -217,8 +232,9 @@ class Handlers:
                 ends[self._validity(dataset)].append(plan.shown(dataset.paths.page))
         for state, paths in ends.items():
             if len(paths) > MOST_PAGES:
-                index = plan.shown(f"{self._run.results}/index.html")
-                paths = [f"{len(paths)} datasets: {index}"]
+                index = "" if is_left(plan.receipt_path(INDEX.name)) else "/index.html"
+                all_of_them = plan.shown(f"{self._run.results}{index}")
+                paths = [f"{count(len(paths), 'dataset')}: {all_of_them}"]
             for path in paths:
                 print(f"{state}: {path}", file=sys.stderr)
 
@@ -244,21 +260,34 @@ class Handlers:
     # The forecast of a dry run.
 
     def _print_forecast(self) -> None:
-        """Print the jobs, views, CPU time and size of a dry run's phases and datasets."""
+        """Print the jobs, views, CPU time and size of a dry run's phases and datasets.
+
+        Exit with an error if the run would be refused.
+        """
         self._plan.announce_changes()
-        self._checks.announce_refusals()
+        is_refused = self._checks.announce_refusals()
         jobs = sorted(self._plan.planned_jobs(), key=lambda planned: ORDER[planned.job])
         print(forecast([self._work_of(planned) for planned in jobs]))
         if self._run.cluster:
             self._print_requests(jobs)
+        if is_refused:
+            sys.exit(1)
 
     def _work_of(self, planned: PlannedJob) -> Work:
-        """Return a job's part of the forecast."""
+        """Return a job's part of the forecast. Views that earlier runs finished do not count."""
+        rest = planned
+        if planned.job is RENDER:
+            end = int(planned.names["first"]) + unfinished_views(self._plan, planned)
+            rest = PlannedJob(RENDER, {**planned.names, "end": str(end)})
+        views = self._rendered_views(rest)
+        # A job without a view to render does not start Blender.
+        is_finished = rest.job is RENDER and not views
+        cost = JOB if is_finished else self._cost_of(rest) or Cost()
         return Work(
             self._phase_of(planned),
             self._dataset_name_of(planned),
-            self._rendered_views(planned),
-            self._cost_of(planned) or Cost(),
+            views,
+            cost,
             self._estimate_of(planned),
         )
 

@@ -5,6 +5,7 @@ from functools import partial
 
 from lightfield.core.gpus import CUDA
 from lightfield.planning.cost import Cost, rendering, shard_threads
+from lightfield.planning.time_limits import limit_of_render, minutes_of_reprojection
 from lightfield.workflow.jobs import Job
 from lightfield.workflow.run import HasWildcards, Run
 
@@ -20,8 +21,33 @@ class JobRequests:
         return lambda wildcards, attempt: self._cost_of(job, wildcards).megabytes(attempt)
 
     def minutes_of(self, job: Job) -> Callable[[HasWildcards, int], int]:
-        """Return the resource function of a job's time limit in minutes."""
-        return lambda wildcards, threads: self._cost_of(job, wildcards).most_minutes(threads)
+        """Return the resource function of a job's time limit in minutes. The job renders."""
+
+        def minutes(wildcards: HasWildcards, threads: int) -> int:
+            cost = self._cost_of(job, wildcards)
+            cluster = self._run.cluster
+            if cluster is None:
+                return cost.most_minutes(threads)
+            dataset = self._run.asked(self._run.build.dataset, wildcards)
+            speed = max(threads, cluster.speed) if cluster.has_gpus else threads
+            return cost.most_minutes(speed, limit_of_render(dataset))
+
+        return minutes
+
+    @property
+    def reprojection_limit(self) -> dict[str, Callable[[HasWildcards], int]]:
+        """The resource of a reprojection's time limit.
+
+        It is left out if the partition has no limit, so that a profile's default counts.
+        """
+        run = self._run
+        if run.cluster is None or run.cluster.minutes is None:
+            return {}
+        return {
+            "runtime": lambda wildcards: (
+                minutes_of_reprojection(run.asked(run.build.dataset, wildcards)) or 1
+            )
+        }
 
     def _cost_of(self, job: Job, wildcards: HasWildcards) -> Cost:
         """Return the cost of a job."""

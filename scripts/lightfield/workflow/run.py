@@ -88,8 +88,7 @@ class Run:
         try:
             settings = load_config(content)
             # On a cluster, shards are small, so that no job waits long for the last one.
-            jobs = settings.cluster_jobs
-            cluster = Cluster(jobs=jobs, cores=count) if jobs else None
+            cluster = _cluster(settings, count) if settings.cluster_jobs else None
             build = Build.load(settings, cluster)
             if is_main:
                 _check_presence(build)
@@ -133,6 +132,11 @@ class Run:
     def runs_here(self) -> bool:
         """Whether all jobs run on this machine."""
         return self.cluster is None
+
+    def at_most(self, minutes: int) -> int:
+        """Return the time limit of a job, within what a cluster's partition allows."""
+        limit = self.cluster and self.cluster.minutes
+        return min(minutes, limit) if limit else minutes
 
     # Where everything lies.
 
@@ -300,6 +304,17 @@ class Run:
         """Return a scene's .blend. A user's own file is on the machine that runs Snakemake."""
         dataset = self.asked(self.build.scene, wildcards)
         return self.marks.local(dataset.blend) if dataset.source.blend else dataset.blend or []
+
+
+def _cluster(settings: Configuration, cores: int) -> Cluster:
+    """Return the cluster of a configuration, whose jobs have so many cores."""
+    assert settings.cluster_jobs
+    return Cluster(
+        jobs=settings.cluster_jobs,
+        cores=cores,
+        minutes=settings.partition_minutes,
+        has_gpus=settings.device not in ("auto", "cpu"),
+    )
 
 
 def _count(cores: Callable[[], int]) -> int:

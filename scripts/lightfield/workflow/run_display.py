@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from lightfield.core import progress
 from lightfield.core.units import count, duration
 from lightfield.planning.forecast import Request
+from lightfield.workflow import slurm
 from lightfield.workflow.failures import StartedJob, Submission, failure_report, first_sentence
 
 if TYPE_CHECKING:
@@ -133,8 +134,10 @@ class RunDisplay:
         self._live: Live | None = None
         # Whether Snakemake's logger plugin calls this.
         self.is_told = False
-        # Whether Snakemake submits the jobs to Slurm.
-        self.uses_slurm = False
+        # The name of the run's jobs in Slurm, if Snakemake submits them there.
+        self.slurm_run: str | None = None
+        # Why the run was ended from outside Snakemake.
+        self.end: str | None = None
         # What the jobs of a dry run would request, by their logs.
         self.requests: dict[str, Request] = {}
         self._is_shown = False
@@ -147,6 +150,10 @@ class RunDisplay:
         self._running: set[int] = set()
         self._failed: set[int] = set()
         self._new_failures: set[int] = set()
+        # The jobs that the executor has submitted to a cluster one by one.
+        self._submitted: set[int] = set()
+        # Why sbatch refuses groups, by their rules.
+        self._refusals: dict[str, str | None] = {}
         self._shown_warnings: set[str] = set()
         # The jobs that compile, and the times from which and until which any job did.
         self._compiling: set[Path] = set()
@@ -205,15 +212,21 @@ class RunDisplay:
         logs: Sequence[str],
         outputs: Sequence[str],
         submission: Submission,
+        cores: int = 1,
+        resources: Mapping[str, Any] | None = None,
     ) -> None:
-        """Take notice of a job that starts, perhaps for another time."""
+        """Take notice of a job that starts, perhaps for another time, and of what it requests."""
         with self._lock:
             now = time.time()
             path = self._find_log(logs[0]) if logs else None
-            self._jobs[number] = StartedJob(rule, path, [Path(output) for output in outputs], now)
+            request = Request(rule, cores, resources or {})
+            self._jobs[number] = StartedJob(
+                request, path, [Path(output) for output in outputs], now
+            )
             submission.jobs.append(self._jobs[number])
             self._submissions[number] = submission
             self._running.add(number)
+            self._submitted.discard(number)
             self._failed.discard(number)
             # A job without outputs takes seconds, and answers on the terminal.
             if path and outputs:
@@ -233,14 +246,34 @@ class RunDisplay:
                 task.ended = time.time()
                 self._open.pop(task.log, None)
 
-    def failed(self, number: int, message: str | None) -> None:
-        """Take notice of a job that failed, and of the executor's message. This may come twice."""
+    def submitted(self, number: int) -> None:
+        """Take notice of a job that the executor has submitted to a cluster, in no group."""
+        with self._lock:
+            self._submitted.add(number)
+
+    def on_cluster(self) -> frozenset[int]:
+        """Return the numbers of the jobs on a cluster for which Snakemake waits."""
+        with self._lock:
+            submissions = self._submissions
+            return frozenset(
+                number
+                for number in self._running
+                if number in self._submitted or submissions[number].group
+            )
+
+    def failed(self, number: int, message: str | None, batch_job: str | None = None) -> None:
+        """Take notice of a job that failed. This may come twice.
+
+        ``message`` is the executor's, and ``batch_job`` the number in the batch system of a job
+        that has been submitted to one.
+        """
         with self._lock:
             self._running.discard(number)
             if task := self._started.get(number):
                 self._end_compilation(task)
             if number in self._jobs and number not in self._failed:
                 self._jobs[number].message = first_sentence(message or "")
+                self._jobs[number].batch_job = batch_job
                 self._failed.add(number)
                 self._new_failures.add(number)
 
@@ -357,8 +390,20 @@ class RunDisplay:
 
     def _explain(self, numbers: Iterable[int]) -> str:
         submissions = {id(each): each for each in map(self._submissions.__getitem__, numbers)}
-        causes = [cause for each in submissions.values() for cause in each.causes()]
+        causes = [
+            cause for each in submissions.values() for cause in each.causes(self._why_refused)
+        ]
         return failure_report(sorted(causes, key=str))
+
+    def _why_refused(self, submission: Submission) -> str | None:
+        """Return why Slurm has refused a group of jobs. None for other submissions."""
+        if self.slurm_run is None or submission.group is None or submission.batch_job:
+            return None
+        # Groups of the same rules request about the same.
+        if submission.rules not in self._refusals:
+            requests = [job.request for job in submission.jobs]
+            self._refusals[submission.rules] = slurm.refusal(requests)
+        return self._refusals[submission.rules]
 
     def _report_phases(self) -> None:
         waiting = {task.phase for task in self._open.values()}

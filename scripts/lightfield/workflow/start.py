@@ -22,6 +22,7 @@ from lightfield.workflow.job_requests import JobRequests
 from lightfield.workflow.jobs import BUILD_MEMBERS, CHECK_BLEND, GPU_CHECK, INVENTORY, RENDER
 from lightfield.workflow.run import Run
 from lightfield.workflow.run_config import NOTES
+from lightfield.workflow.slurm import check_slurm
 
 # With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -53,8 +54,8 @@ class StartChecks:
         self._check_disk_space()
         self._check_times()
 
-    def announce_refusals(self) -> None:
-        """Print in a dry run what the real run would refuse."""
+    def announce_refusals(self) -> bool:
+        """Print in a dry run what the real run would refuse. Return whether there is anything."""
         checks: list[Callable[[], None]] = [
             self._plan.check_folders,
             self._check_device,
@@ -72,6 +73,7 @@ class StartChecks:
                 problems[str(error)] = None
         for problem in problems:
             print(f"would be refused: {problem}", file=sys.stderr)
+        return bool(problems)
 
     def _check_device(self) -> None:
         """Print on which GPU this machine renders. Raise `UserError` if the device is missing."""
@@ -176,21 +178,6 @@ class StartChecks:
                 f"removed {len(removed)} files and folders that killed runs have left",
                 file=sys.stderr,
             )
-
-
-def check_slurm() -> None:
-    """Raise `UserError` if no Slurm answers here."""
-    try:
-        asked_slurm = subprocess.run(
-            ["sinfo"], capture_output=True, encoding="utf-8", errors="replace"
-        )
-    except OSError:
-        problem = "there is no command sinfo"
-    else:
-        lines = asked_slurm.stderr.strip().splitlines()
-        problem = lines[-1] if asked_slurm.returncode and lines else ""
-    if problem:
-        raise UserError(f"--executor slurm: no Slurm answers: {problem}: run this on a login node")
 
 
 def explain_full_disk() -> None:

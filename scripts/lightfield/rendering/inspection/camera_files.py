@@ -1,7 +1,7 @@
 """Writes free places for cameras in a scene's geometry, and the clearance of each camera."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,15 +58,8 @@ def write_clearance(job: CheckCameras) -> None:
         }
         for name, distance, is_inside in zip(names, distances, are_inside.tolist(), strict=True)
     }
-    enclosed_views = [name for name in names if views[name]["inside"]]
-    if enclosed_views:
-        objects = sorted({name for name in enclosing if name}) or ["a surface"]
-        more = " …" if len(enclosed_views) > 8 else ""
-        raise UserError(
-            f"{job.lightfield}: {len(enclosed_views)} of {len(names)} cameras are inside "
-            f"{', '.join(objects)}: {', '.join(enclosed_views[:8])}{more}; "
-            "move the rig or make it smaller (center and size in the scene YAML)"
-        )
+    if problems := [*_enclosed(names, enclosing), *_touching(names, enclosing, distances)]:
+        raise UserError(f"{job.lightfield}: {'; '.join(problems)}")
     shown = clearance.contents()
     cameras = (lightfield.lens, lightfield.world_from_cameras)
     content: dict[str, Any] = {"views": views}
@@ -88,6 +81,36 @@ def write_clearance(job: CheckCameras) -> None:
     nearest = min(distances)
     away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"
     print(f"{len(names)} cameras, none inside geometry; the nearest surface is {away} away")
+
+
+def _enclosed(names: Sequence[str], enclosing: Sequence[str | None]) -> Iterator[str]:
+    """Yield a line if objects enclose cameras."""
+    views = [name for name, around in zip(names, enclosing, strict=True) if around]
+    if views:
+        objects = ", ".join(sorted({name for name in enclosing if name}))
+        yield (
+            f"{len(views)} of {len(names)} cameras are inside {objects}: {_listed(views)}; move "
+            "the rig or make it smaller (center and size in the scene YAML)"
+        )
+
+
+def _touching(
+    names: Sequence[str], enclosing: Sequence[str | None], distances: Floats
+) -> Iterator[str]:
+    """Yield a line if cameras that no object encloses touch a surface."""
+    touch = (distances < clearance.TOUCHING) & np.array([around is None for around in enclosing])
+    if touch.any():
+        nearest = 1000 * distances[touch].min()
+        views = [name for name, touches in zip(names, touch, strict=True) if touches]
+        yield (
+            f"{len(views)} of {len(names)} cameras touch a surface, which is {nearest:.2g} mm away "
+            f"from the nearest: {_listed(views)}; a camera needs {1000 * clearance.TOUCHING:g} mm "
+            "of free space: move the rig away from the surface (center in the scene YAML)"
+        )
+
+
+def _listed(views: Sequence[str]) -> str:
+    return f"{', '.join(views[:8])}{' …' if len(views) > 8 else ''}"
 
 
 def _framing_warnings(lightfield: LightField, box: Floats | None) -> Iterator[str]:
