@@ -107,6 +107,7 @@ class OpenYaml(Change):
         for empty in rig_objects.empties(scene):
             bpy.data.objects.remove(empty)
         scene.plenoforge_yaml = str(path)
+        rig_objects.measure(scene)
         for name, settings in rigs.items():
             rig_objects.add(scene, name, settings)
         scene[_OPENED] = list(rigs)

@@ -246,10 +246,32 @@ def test_a_rig_of_each_type_is_opened_and_checked(lens, blender, tmp_path):
     for number, name in enumerate(rigs):
         facts, panel = shown[3 * number + 1 : 3 * number + 3]
         assert {*facts} <= {*panel}
-        if name == "blend_camera":
+        if name in ("blend_camera", "random"):
             assert {"Cameras: known after the build", "Inside objects: not checked"} <= {*facts}
         else:
             assert "Inside objects: 0" in facts
+
+
+def test_a_rig_that_fits_the_scene_is_drawn_around_it_and_stays_so(blender, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "scene: {blend: mine.blend}\nrender: {samples: 1}\nrigs:\n"
+        "  around: {type: ring, count: 5, size: fit, center: fit, camera: "
+        "{lens: rectilinear, fov: 60, resolution: [32, 32]}}\n"
+    )
+    before = path.read_text()
+    middle = [3, -2, 1]
+    steps = (["ball", [middle, {}]], "register", opened(path), "rigs", written(path))
+    *_, shown, refused, moved, refused_again = blender(
+        *steps, ["change", ["around"], {"location__x": 4}], written(path)
+    )
+    assert (refused, moved, refused_again) == (None, None, None)
+    places, _ = cameras(shown["around"]["cameras"], 5)
+    distances = np.linalg.norm(places - middle, axis=1)
+    # The sphere around the ball's box has a radius of 0.173 m, and is in 60° from twice of it.
+    np.testing.assert_allclose(distances, 1.05 * 2 * 0.1 * 3**0.5, rtol=1e-3)
+    after = path.read_text()
+    assert after == before.replace("center: fit", "center: [4, -2, 1]")
 
 
 def test_the_panel_shows_the_active_rig(blender, project):

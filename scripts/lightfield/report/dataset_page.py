@@ -46,7 +46,7 @@ def write(job: ReportHtml) -> None:
     folder = job.dataset
     name = job.dataset_name
     lightfield = LightField.read(folder / NAME)
-    rig = job.settings.rig
+    rig = lightfield.placed(job.settings.rig)
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     packed = views.collect(

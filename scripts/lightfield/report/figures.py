@@ -52,9 +52,9 @@ class Overview:
 def draw(job: ReportFigures) -> None:
     """Write all pictures of a dataset."""
     dataset = job.dataset
-    rig = job.settings.rig
     output = job.output
     lightfield = LightField.read(dataset / NAME)
+    rig = lightfield.placed(job.settings.rig)
     lightfield.require_rig(rig)
     views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
     lens = lightfield.lens

@@ -133,6 +133,7 @@ class InventorySettings(Settings):
     look_version: int | None = cause("Version of what is read of the file's look, if it is used.")
     followed_camera: str | None = cause("As in the scene YAML.")
     light_groups: Any = cause("As in the scene YAML.")
+    measures_box: bool | None = cause("Whether a rig fits the scene's box.")
 
 
 class Inventory(Stage[InventorySettings]):

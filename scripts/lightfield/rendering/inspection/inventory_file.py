@@ -24,6 +24,7 @@ from lightfield.rendering.inspection import (
     blend_facts,
     external_files,
     light,
+    scene_box,
     scene_memory,
     simulations,
     unknown_colours,
@@ -110,6 +111,8 @@ def write_of_datasets(
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
+    if any(dataset.rig.is_fitted for dataset in datasets):
+        contents["box"] = scene_box.measure(shown_frames)
     if scene_block.get("blend"):
         frames.go_to(shown_frames[0])
         try:
