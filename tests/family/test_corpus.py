@@ -11,14 +11,17 @@ import families
 import numpy as np
 import pytest
 from faults import CORPUS_KINDS, FAULTS, spoil
+from PIL import Image
 
 from lightfield import open_corpus, open_dataset
 from lightfield.configuration.corpus import Shares
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.engine import receipts
+from lightfield.family import corpus_looks
 from lightfield.formats.lightfield import LightField
 from lightfield.imaging import images
+from lightfield.imaging.look import Look
 from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.validation.verification import faults
 from lightfield.workflow import status
@@ -242,6 +245,22 @@ def test_a_receipt_has_all_files_of_a_corpus_also_if_they_are_kept(
 
 def in_member(name):
     return name.endswith("member.json") or "/plane/" in name
+
+
+def test_thumbnails_have_the_look_of_the_scenes_pictures(family):
+    make(family)
+    plain = (family / "thumbnails/0002.webp").read_bytes()
+    make(family, look={"name": "AgX"})
+    shown = np.asarray(Image.open(family / "thumbnails/0002.webp").convert("RGB"), float)
+    assert (family / "thumbnails/0002.webp").read_bytes() != plain
+    views = corpus_looks.chosen_views(
+        family / "0002/plane", LightField.read(family / "0002/plane/lightfield.json")
+    )
+    light = images.read_image(views[len(views) // 2]).colour
+    expected = 255 * Look.of("AgX", 0).developed(np.nan_to_num(light))
+    assert shown.reshape(-1, 3).mean(axis=0) == pytest.approx(
+        expected.reshape(-1, 3).mean(axis=0), abs=4
+    )
 
 
 def test_a_cached_member_is_not_read_again(family):

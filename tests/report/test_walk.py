@@ -159,20 +159,22 @@ def look_at_leaves(lens, matrix):
     return np.where(has_leaf[..., None], leaves, colour), np.where(has_leaf, near, distance)
 
 
-def look_from(tab, place, yaw, pitch, is_in_motion=False):
+def look_from(tab, place, yaw, pitch, is_in_motion=False, is_zoomed_out=False):
     """Return the canvas from a place (HEIGHT, WIDTH, 3) in sRGB from 0 to 1.
 
-    In motion the canvas has a part of the pixels, so that the walk is larger.
+    In motion the canvas has a part of the pixels, so that the walk is larger. Zoomed out, it has
+    the field of view of `EYE`, also for views through a narrower lens.
     """
     factor = 3 if is_in_motion else 1
     uri = tab.evaluate(
-        """([at, yaw, pitch, width, height, isInMotion]) => {
+        """([at, yaw, pitch, width, height, isInMotion, isZoomedOut]) => {
             walk.size = [width, height];
             Object.assign(walk, { at, yaw, pitch });
+            if (isZoomedOut) zoomBy(0);
             drawWalk(isInMotion);
             return walk.canvas.toDataURL("image/png");
         }""",
-        [place, yaw, pitch, factor * WIDTH, factor * HEIGHT, is_in_motion],
+        [place, yaw, pitch, factor * WIDTH, factor * HEIGHT, is_in_motion, is_zoomed_out],
     )
     picture = Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")
     return np.asarray(picture.resize((WIDTH, HEIGHT))) / 255
@@ -224,7 +226,7 @@ def test_the_canvas_shows_what_is_in_a_mirror(tmp_path, show):
     source, lens = SourceDataset(folder, "", ".exr"), lenses.from_camera(EYE)
     field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
     place = [0.14, 0, -0.16]
-    shown = look_from(opened, place, 0, 0)
+    shown = look_from(opened, place, 0, 0, is_zoomed_out=True)
     matrix = matrix_of(place, 0, 0)
     true, _ = mirrors.see_framed_mirror(lens, matrix)
     exposure = opened.evaluate("viewer.exposure")
@@ -357,18 +359,23 @@ def test_a_browser_without_webgl_2_says_so(small, show):
 NARROW = {"lens": "rectilinear", "fov": 50, "resolution": [48, 48]}
 AROUND = {"size": 3.0, "center": BALL.tolist(), "camera": NARROW}
 DOWN = {"type": "plane", "cameras": [3, 3], "size": 0.5, "rotation": [-90, 0, 0]}
+# None of its axes lies along an axis of the world, so its places are in a plane but for rounding.
+TILTED = {"type": "plane", "cameras": [9, 9], "size": 0.6, "rotation": [17, 11, 23]}
 
 
 @pytest.mark.parametrize(
     "rig",
     [
+        AROUND | {"type": "hemisphere", "count": 6},
+        AROUND | {"type": "hemisphere", "count": 8},
         AROUND | {"type": "hemisphere", "count": 12},
         AROUND | {"type": "ring", "count": 8},
-        DOWN | {"camera": NARROW, "center": [0, 1.8, 1.5]},
+        DOWN | {"center": [0, 1.8, 1.5]},
+        TILTED | {"look_at": BALL.tolist()},
     ],
-    ids=["hemisphere", "ring", "from above"],
+    ids=["hemisphere of 6", "hemisphere of 8", "hemisphere of 12", "ring", "from above", "tilted"],
 )
-def test_the_walk_begins_where_the_cameras_look(tmp_path, show, rig):
+def test_the_walk_begins_where_the_cameras_see_most(tmp_path, show, rig):
     page = written_page(tmp_path / "dataset", NARROW, rig, look_at_ball_alone)
     opened = show(page)
     wait(opened)
@@ -378,7 +385,23 @@ def test_the_walk_begins_where_the_cameras_look(tmp_path, show, rig):
     middle = shown[HEIGHT // 2, WIDTH // 2]
     assert middle[0] > 0.5
     assert middle[0] > 2 * middle[1]
-    assert opened.evaluate("metresToEdge(walk.at)") > -1e-6
+    assert opened.evaluate("metresToEdge(walk.at)") > 0
+    # The lens sees 50 degrees. A picture of 80 would be filled from its surroundings.
+    opened.locator("#walk-holes").click()
+    holes = look_from(opened, at, yaw, pitch)
+    assert (holes[..., 0] > holes[..., 1] + 0.3).mean() < 0.03
+
+
+def test_the_eye_can_walk_off_a_tilted_plane(tmp_path, show):
+    opened = show(written_page(tmp_path / "dataset", NARROW, TILTED, look))
+    wait(opened)
+    opened.evaluate("walk.before = walk.at, moveEye(0.05, 0, 0)")
+    assert opened.evaluate("Math.hypot(...minus(walk.at, walk.before))") == pytest.approx(
+        0.05 * opened.evaluate("walk.extent"), rel=0.01
+    )
+    # But not away from all cameras.
+    opened.evaluate("moveEye(5, 0, 0)")
+    assert opened.evaluate("Math.hypot(...minus(walk.at, walk.before))") < 0.6
 
 
 def test_the_eye_stays_inside_the_volume(shared_tab):
@@ -550,14 +573,14 @@ def test_holes_are_pink_and_sources_have_the_colour_of_their_number(tmp_path, sh
     palette = palette_of(opened)
     # The eye sees more than the views. They all show the middle, and nothing of what is behind.
     press(opened, "Holes")
-    holes = look_from(opened, at, 0, 0)
+    holes = look_from(opened, at, 0, 0, is_zoomed_out=True)
     assert np.ptp(holes[HEIGHT // 2, WIDTH // 2]) < 0.02
     assert holes[2, 2] == pytest.approx([1, 0, 0.8], abs=0.01)
     assert look_from(opened, at, math.pi, 0).reshape(-1, 3) == pytest.approx(
         np.tile([1, 0, 0.8], (WIDTH * HEIGHT, 1)), abs=0.01
     )
     press(opened, "Sources")
-    sources = look_from(opened, at, 0, 0)
+    sources = look_from(opened, at, 0, 0, is_zoomed_out=True)
     assert 255 * sources[HEIGHT // 2, WIDTH // 2] == pytest.approx(palette[-1], abs=4)
     assert sources[2, 2] == pytest.approx([0, 0, 0], abs=0.01)
     # Near the edge of what the views show, fewer of them show it.
@@ -648,6 +671,16 @@ def test_the_default_field_of_view_keeps_source_pixels_small(shared_tab, width, 
     assert math.radians(80) - 1e-9 <= wide <= math.radians(widest) + 1e-9
     pixels = width / 2 / math.tan(wide / 2) * SMALL_PIXEL
     assert pixels <= 3 + 1e-6 or wide == pytest.approx(math.radians(120))
+
+
+def test_a_narrow_lens_begins_at_its_own_field_of_view(tmp_path, show):
+    opened = show(written_page(tmp_path / "dataset", NARROW, DOWN, look))
+    wait(opened)
+    wide = "2 * Math.atan(1 / scales(160, 90)[0])"
+    assert opened.evaluate(wide) == pytest.approx(math.radians(50))
+    # A user may still look at more than the lens sees.
+    opened.evaluate("zoomBy(0.01)")
+    assert opened.evaluate(wide) == pytest.approx(math.radians(80))
 
 
 def test_keys_zoom_in_and_back(shared_tab):

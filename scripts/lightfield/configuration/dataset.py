@@ -14,7 +14,8 @@ from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.core.names import FILE, PARTS, scene_folder
+from lightfield.configuration.shown_look import ShownLook, shown_look
+from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
@@ -41,6 +42,8 @@ class Dataset(Capture):
     preset: str
     rig_name: str
     rig_folder: str
+    # The scene YAML, in which `source`, `render` and `rig` are without the preset's limits.
+    written: scene_yaml.Scene
     reprojections: dict[str, Reprojection]
     flow: scene_yaml.Flow | None
     mesh: scene_yaml.MeshFiles | None
@@ -113,6 +116,11 @@ class Dataset(Capture):
         """Whether something is developed with the look of the user's .blend. Otherwise None."""
         made = [*self.reprojections.values(), *self.exports.selected.values()]
         return any(getattr(each, "look", None) == FILE for each in made) or None
+
+    @property
+    def shown_look(self) -> ShownLook | None:
+        """The look of the dataset's pictures, if they have one."""
+        return shown_look(self.reprojections.values(), self.exports.selected.values())
 
     # Files that a dataset may lack.
 
@@ -216,21 +224,21 @@ class Dataset(Capture):
         return shard_bounds(self.view_count, self.shard_count(self))
 
     @property
-    def stages(self) -> list[str]:
-        """The stages that make the dataset's images, shard by shard."""
-        stages = ["render", *self.reprojections]
+    def shard_folders(self) -> list[str]:
+        """The folders of receipts of the shards that make the dataset's images."""
+        folders = [RENDERED, *self.reprojections]
         if self.flow:
-            stages.append(passes.FLOW.name)
-        return stages
+            folders.append(passes.FLOW.name)
+        return folders
 
-    def receipts(self, stage: str) -> list[str]:
-        """Return the receipts of all shards at one of the ``stages``."""
-        return [self.paths.receipt(stage, first, end) for first, end in self.shards]
+    def receipts(self, folder: str) -> list[str]:
+        """Return the receipts of all shards in one of the `shard_folders`."""
+        return [self.paths.receipt(folder, first, end) for first, end in self.shards]
 
     @property
     def all_receipts(self) -> list[str]:
-        """The receipts of all stages."""
-        return [file for stage in self.stages for file in self.receipts(stage)]
+        """The receipts of all shards."""
+        return [file for folder in self.shard_folders for file in self.receipts(folder)]
 
     def testing_rigs(self, export: Export) -> tuple[str, ...]:
         """Return the folders of the rigs whose views go into an ``export``, to test with."""

@@ -33,7 +33,7 @@ def write(job: Corpus) -> dict[str, Any]:
     settings = job.settings
     (folder / SUMS).unlink(missing_ok=True)
     members = read_members(folder, settings.members)
-    looks = corpus_looks.looks(folder, members, job.cache)
+    looks = corpus_looks.looks(folder, members, job.cache, settings.look)
     content = describe(settings, members, looks)
     write_json(folder / CORPUS, content)
     corpus_page.write(folder, content)

@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightfield.configuration.corpus import THUMBNAILS
+from lightfield.configuration.shown_look import ShownLook
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_bytes, write_json
 from lightfield.core.progress import Progress
@@ -22,6 +23,7 @@ from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.depth import converted
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import Look as BlenderLook
 from lightfield.workflow.member_record import MemberRecord
 
 # Views of a dataset that are read, evenly spread over it.
@@ -37,16 +39,23 @@ Array = pictures.Array
 Look = Mapping[str, Any]
 
 
-def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[str, Look]:
+def looks(
+    folder: Path,
+    members: Sequence[MemberRecord],
+    cache: Path,
+    shown_look: ShownLook | None = None,
+) -> dict[str, Look]:
     """Return the look of each valid member by its name, and write the missing thumbnails.
 
-    Removes the thumbnails of others. ``folder`` is the family's. Raises `UserError` if a view is
-    missing or damaged.
+    ``shown_look`` is Blender's look of the thumbnails, if they have one. Removes the thumbnails of
+    others. ``folder`` is the family's. Raises `UserError` if a view is missing or damaged.
     """
     cached = _read(cache)
     valid = [member for member in members if member.is_valid and member.datasets]
     looks_by_member = {
-        member.name: cached[member.name] for member in valid if _holds(folder, member, cached)
+        member.name: cached[member.name]
+        for member in valid
+        if _holds(folder, member, cached, shown_look)
     }
     if receipt := receipts.current():
         for name in looks_by_member:
@@ -55,7 +64,10 @@ def looks(folder: Path, members: Sequence[MemberRecord], cache: Path) -> dict[st
     if new:
         progress = Progress(len(new), "thumbnails", "members", len(looks_by_member))
         for number, member in enumerate(new, 1):
-            looks_by_member[member.name] = {"made_of": _made_of(member), **_look(folder, member)}
+            looks_by_member[member.name] = {
+                "made_of": _made_of(member, shown_look),
+                **_look(folder, member, shown_look),
+            }
             if number % STEP == 0:
                 write_json(cache, looks_by_member)
             progress.done()
@@ -86,25 +98,30 @@ def _read(cache: Path) -> dict[str, dict[str, Any]]:
     return content if isinstance(content, dict) else {}
 
 
-def _made_of(member: MemberRecord) -> str:
+def _made_of(member: MemberRecord, shown_look: ShownLook | None) -> str:
     """Return a key that changes with the datasets' bytes and with the settings of their looks."""
     sums = [[rig, dataset.sha256sums] for rig, dataset in sorted(member.datasets.items())]
-    made_of = repr([sums, VIEWS, THUMBNAIL, _QUALITY])
+    made_of = repr([sums, VIEWS, THUMBNAIL, _QUALITY, *([shown_look] if shown_look else [])])
     return hashlib.sha256(made_of.encode()).hexdigest()
 
 
-def _holds(folder: Path, member: MemberRecord, cached: Mapping[str, dict[str, Any]]) -> bool:
+def _holds(
+    folder: Path,
+    member: MemberRecord,
+    cached: Mapping[str, dict[str, Any]],
+    shown_look: ShownLook | None,
+) -> bool:
     """Return whether the cache knows a member as it is, and its thumbnail is whole."""
     entry = cached.get(member.name, {})
     path = thumbnail(folder, member.name)
     return (
-        entry.get("made_of") == _made_of(member)
+        entry.get("made_of") == _made_of(member, shown_look)
         and path.is_file()
         and sha256(path) == entry.get("thumbnail")
     )
 
 
-def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
+def _look(folder: Path, member: MemberRecord, shown_look: ShownLook | None) -> dict[str, Any]:
     """Read views of a member, and write its thumbnail. Return what the views show.
 
     - ``depth``: the least and the largest distance in metres, or null without any surface.
@@ -118,7 +135,8 @@ def _look(folder: Path, member: MemberRecord) -> dict[str, Any]:
     opacity = sum(view["opacity"] for view in views)
     depths = [depth for view in views for depth in view["depth"]]
     covered = [view["covered"] for view in views if view["covered"] is not None]
-    content = _webp(views[len(views) // 2]["image"])
+    look = shown_look.resolved(LightField.read(datasets[0] / NAME)) if shown_look else None
+    content = _webp(views[len(views) // 2]["image"], look)
     write_bytes(thumbnail(folder, member.name), content)
     return {
         "depth": [round(min(depths), 4), round(max(depths), 4)] if depths else None,
@@ -170,9 +188,9 @@ def _measured(path: Path, rays: Array, meaning: str | None) -> dict[str, Any]:
     }
 
 
-def _webp(image: Array) -> bytes:
+def _webp(image: Array, look: BlenderLook | None) -> bytes:
     """Return linear (height, width, 4) pixels with associated alpha as a thumbnail."""
     file = io.BytesIO()
-    picture = Image.fromarray(pictures.thumbnail(image, THUMBNAIL))
+    picture = Image.fromarray(pictures.thumbnail(image, THUMBNAIL, look=look))
     picture.save(file, "WEBP", quality=_QUALITY, method=4)
     return file.getvalue()

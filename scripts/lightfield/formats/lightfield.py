@@ -312,9 +312,15 @@ class LightField:
         return "relight" in self.content.get("reprojection", {})
 
     @property
+    def look(self) -> dict[str, Any] | None:
+        """The look with which the views are developed, if they are."""
+        look: dict[str, Any] | None = self.content.get("reprojection", {}).get("look")
+        return look
+
+    @property
     def has_look(self) -> bool:
         """Whether the views are developed with one of Blender's looks."""
-        return "look" in self.content.get("reprojection", {})
+        return self.look is not None
 
     @property
     def follows_views(self) -> bool:

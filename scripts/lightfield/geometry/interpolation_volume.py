@@ -22,11 +22,13 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from lightfield.geometry.lenses import Lens
 
 _CONE_SIDES = 360
+# A volume that is thinner than this part of its length is made of rounding.
+_FLAT = 1e-6
 
 Floats = NDArray[np.float64]
 
@@ -71,10 +73,9 @@ def parts_to_edge(world_from_cameras: Floats, lens: Lens, places: Floats) -> Flo
     positions = world_from_cameras[:, :3, 3]
     middle = positions.mean(axis=0)
     nowhere = np.full(len(places), np.inf)
-    try:
-        hull = ConvexHull(positions)
-    except QhullError:
+    if flatness(positions) < _FLAT:
         return nowhere
+    hull = ConvexHull(positions)
     outward = ((positions - middle) * -world_from_cameras[:, :3, 2]).sum() >= 0
     mesh = [tuple(map(int, cell)) for cell in hull.simplices]
     planes = _immersive_planes(mesh, hull, world_from_cameras, lens, not outward)
@@ -83,6 +84,15 @@ def parts_to_edge(world_from_cameras: Floats, lens: Lens, places: Floats) -> Flo
     reach = -(planes[:, :3] @ middle + planes[:, 3])
     parts: Floats = ((places - middle) @ planes[:, :3].T / reach).max(axis=1)
     return parts
+
+
+def flatness(positions: Floats) -> float:
+    """Return how thin the space is that ``positions`` (n, 3) span: its thickness by its length.
+
+    0 for positions in a plane, but for rounding.
+    """
+    spans = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
+    return float(spans[2] / spans[0]) if len(spans) == 3 and spans[0] > 0 else 0.0
 
 
 def neighbours(mesh: list[tuple[int, ...]]) -> list[tuple[int, int]]:

@@ -7,6 +7,7 @@ bpy. Every version of bpy brings the library that can read its configuration.
 import hashlib
 import importlib.util
 import sys
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -108,6 +109,17 @@ def looks(view: str) -> list[str]:
     names = [look.getName() for look in blender().config.getLooks()]
     own = [name for name in names if name.partition(_SEPARATOR)[0] == view]
     return own or [name for name in names if _SEPARATOR not in name]
+
+
+def title(look: Mapping[str, Any]) -> str:
+    """Return the name of a look for people, as `view_and_look` takes it.
+
+    ``look`` has the keys view and look, as in lightfield.json.
+    """
+    view, name = look["view"], look["look"]
+    if name == NO_LOOK:
+        return str(view)
+    return name if name.startswith(f"{view}{_SEPARATOR}") else f"{view}{_SEPARATOR}{name}"
 
 
 def is_data(view: str) -> bool:

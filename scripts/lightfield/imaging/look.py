@@ -165,6 +165,14 @@ class Look:
         shown *= np.float32(2**bits - 1)
         return np.rint(shown, out=shown).astype(f"uint{bits}")
 
+    def table(self, shaper: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return the 8-bit pixels (n, n, n, 3) of all light whose channels are in ``shaper`` (n,).
+
+        Red changes along the first axis, and blue along the last one.
+        """
+        red, green, blue = np.meshgrid(shaper, shaper, shaper, indexing="ij")
+        return np.asarray(self.to_pixels(np.stack([red, green, blue], axis=-1), 8), np.uint8)
+
     @cached_property
     def _processor(self) -> Any:
         """What turns light into pixels, built of the steps that Blender takes, in its order."""

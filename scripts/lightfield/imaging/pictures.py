@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from lightfield.imaging.look import Look
 from lightfield.imaging.tonemap import to_8_bit, tone_map
 
 Array = np.ndarray[Any, Any]
@@ -23,23 +24,30 @@ def luminance(colour: Array) -> Array:
     return np.asarray(colour @ weights)
 
 
-def exposure_for(colour: Array) -> float:
+def exposure_for(colour: Array, look: Look | None = None) -> float:
     """Return the exposure in stops that puts the typical pixel of (..., 3) at middle grey.
 
-    Typical is the geometric mean of the luminance (Reinhard et al. 2002, equation 1) over pixels
-    that are not black. So pixels outside an image circle do not count.
+    A ``look`` has its own exposure, so it needs none. Typical is the geometric mean of the
+    luminance (Reinhard et al. 2002, equation 1) over pixels that are not black. So pixels outside
+    an image circle do not count.
     """
+    if look:
+        return 0.0
     light = luminance(colour)
     lit = light[np.isfinite(light) & (light > 1e-6)]
     return float(np.log2(MIDDLE_GREY / np.exp(np.log(lit).mean()))) if lit.size else 0.0
 
 
-def develop(colour: Array, exposure: float) -> Array:
-    """Turn scene-linear (height, width, 3) colour into 8-bit sRGB pixels."""
+def develop(colour: Array, exposure: float, look: Look | None = None) -> Array:
+    """Turn scene-linear (height, width, 3) colour into 8-bit sRGB pixels, by a ``look`` if any."""
+    if look:
+        return look.to_pixels(colour * np.float32(2.0**exposure), 8)
     return to_8_bit(tone_map(np.ascontiguousarray(colour), exposure, WHITE))
 
 
-def thumbnail(image: Array, side: int, exposure: float | None = None) -> Array:
+def thumbnail(
+    image: Array, side: int, exposure: float | None = None, look: Look | None = None
+) -> Array:
     """Return linear (height, width, 4) pixels with associated alpha as a small sRGB picture.
 
     Its longer side has at most ``side`` pixels. Transparent views lie on a middle grey. Without
@@ -49,9 +57,9 @@ def thumbnail(image: Array, side: int, exposure: float | None = None) -> Array:
     scale = min(1.0, side / max(width, height))
     small = shrunk(image, max(1, round(width * scale)), max(1, round(height * scale)))
     if exposure is None:
-        exposure = exposure_for(small[..., :3])
+        exposure = exposure_for(small[..., :3], look)
     grey = MIDDLE_GREY / 2**exposure
-    return develop(small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1)), exposure)
+    return develop(small[..., :3] + grey * (1 - small[..., 3:].clip(0, 1)), exposure, look)
 
 
 def shrunk(colour: Array, width: int, height: int) -> Array:

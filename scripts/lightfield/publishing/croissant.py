@@ -168,9 +168,18 @@ def _file_sets(published: Published) -> list[dict[str, Any]]:
             ],
             "encodingFormat": FORMATS[name.rpartition(".")[2]],
             "includes": f"*.{name}",
+            **_colours(name, published),
         }
         for name in published.fields
     ]
+
+
+def _colours(name: str, published: Published) -> dict[str, str]:
+    """Return a description of what the values of a member are, if it is a PNG."""
+    if not name.endswith(".png"):
+        return {}
+    look = published.looks.get(name)
+    return {"description": f"sRGB{f', developed by Blender with the look {look}' if look else ''}"}
 
 
 def _views() -> dict[str, Any]:

@@ -78,6 +78,7 @@ def describe(published: Published) -> str:
         first_shard=next(iter(published.shards.values()))[0]["file"],
         fields=published.fields,
         meanings={name: _meaning(name, published.lightfield) for name in published.fields},
+        looks=published.looks,
         limits=_limits(published.publication),
         citation=published.citation,
     )

@@ -15,7 +15,7 @@ from lightfield.configuration.exports import SEQUENCE_EXPORTS
 from lightfield.configuration.scene_yaml import Credits
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, open_file, read_keys, sha256, write_json
+from lightfield.core.files import atomic_path, open_file, read_json, read_keys, sha256, write_json
 from lightfield.core.names import READER
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
@@ -25,6 +25,7 @@ from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_part
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
+from lightfield.imaging.blender_looks import title
 from lightfield.publishing import reader
 from lightfield.publishing.markdown import markdown
 from lightfield.report import snippet
@@ -110,10 +111,27 @@ def card(folder: Path, name: str, scene: Credits, rig: str | None = None) -> dic
             if (first / name).is_dir()
         ],
         "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
+        **({"looks": looks} if (looks := _looks(folder, first)) else {}),
         "software": f"Cycles in bpy {bpy}" if bpy else None,
         "cite": [SILVR, *([scene.credit] if scene.credit else [])],
         "python": snippet.reading(name, lightfield),
         "loaders": dict(_loaders(folder, first, view)),
+    }
+
+
+def _looks(folder: Path, first: Path) -> dict[str, str]:
+    """Return Blender's look of each folder of pictures that has one. Other pictures are sRGB.
+
+    ``first`` is the folder of a sequence's first frame. Without a sequence, it is ``folder``.
+    """
+    looks = {path.parent: LightField.read(path).look for path in first.glob(f"*/{NAME}")}
+    for path in {*files_below(first), *_lists_of_sequence(folder)}:
+        if path.name == MANIFEST:
+            looks[path.parent] = read_json(path).get("look")
+    return {
+        place.relative_to(folder).as_posix(): title(look)
+        for place, look in sorted(looks.items())
+        if look
     }
 
 
@@ -167,7 +185,7 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     Further parts are named <target's stem>.2.tar and so on. Removes the parts of an earlier
     package.
     """
-    readme = markdown("card.md.j2", **{"frames": None, **content})
+    readme = markdown("card.md.j2", **{"frames": None, "looks": None, **content})
     texts = {
         CARD: json.dumps(content, indent=1) + "\n",
         README: readme,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lightfield.configuration.publication import CARD, CROISSANT
 from lightfield.configuration.scene_yaml import Credits
+from lightfield.configuration.shown_look import ShownLook
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
@@ -27,7 +28,13 @@ def write(job: Publish) -> None:
     settings = job.settings
     name = job.output.resolve().name
     published = publish(
-        job.folder, name, settings.scene, job.output, settings.most_bytes, settings.rig
+        job.folder,
+        name,
+        settings.scene,
+        job.output,
+        settings.most_bytes,
+        settings.rig,
+        look=settings.look,
     )
     size = sum(file["bytes"] for file in published.files)
     print(f"{job.output}: {units.count(len(published.files), 'file')}, {units.size(size)}")
@@ -40,10 +47,13 @@ def publish(
     output: Path,
     most: float | None,
     rig: str | None = None,
+    *,
+    look: ShownLook | None = None,
 ) -> Published:
     """Write the shards and the descriptions of the dataset in ``folder`` to ``output``.
 
     A shard has at most ``most`` bytes, or `shards.SHARD_BYTES`. ``rig`` is the type of the rig.
+    Thumbnails have the ``look``.
     Warns of texts that the scene YAML lacks, which the descriptions then lack, too. Raises
     `UserError` if the dataset is not finished, or if the scene YAML has no key ``publish``.
     """
@@ -63,14 +73,16 @@ def publish(
         raise UserError(f"{folder / SUMS}: is missing; only a valid dataset can be published")
     datasets = [shards.read_dataset(folder, dataset) for dataset in folders]
     output.mkdir(parents=True, exist_ok=True)
-    written = shards.write_shards(output, name, datasets, most or shards.SHARD_BYTES)
+    lightfield = LightField.read(next(each for each in folders if (each / NAME).is_file()) / NAME)
+    shown = look.resolved(lightfield) if look else None
+    written = shards.write_shards(output, name, datasets, most or shards.SHARD_BYTES, shown)
     rest = shards.write_others(output, name, datasets)
     names = {field for dataset in datasets for sample in dataset.samples for field in sample.files}
     published = Published(
         name,
         scene,
         card,
-        LightField.read(next(each for each in folders if (each / NAME).is_file()) / NAME),
+        lightfield,
         {split: package.listed(paths) for split, paths in written.items()},
         package.listed([output / shards.INDEX, rest]),
         ("json", *sorted({*names, shards.THUMBNAIL})),

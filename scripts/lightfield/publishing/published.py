@@ -1,5 +1,6 @@
 """A published dataset: the facts in the files that describe it."""
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,6 +54,20 @@ class Published:
     def files(self) -> list[dict[str, Any]]:
         """The entries of all files except the descriptions."""
         return [*(entry for entries in self.shards.values() for entry in entries), *self.others]
+
+    @property
+    def looks(self) -> dict[str, str]:
+        """Blender's look of each of the ``fields`` that is a picture with one."""
+        # In a sequence, a folder lies in the folder of a frame.
+        looks = {
+            place.rpartition("/")[2]: look for place, look in self.card.get("looks", {}).items()
+        }
+        folders = {field: re.split(r"[+.]", field)[0] for field in self.fields}
+        return {
+            field: looks[folder]
+            for field, folder in folders.items()
+            if field.endswith(".png") and folder in looks
+        }
 
     @property
     def citation(self) -> str:

@@ -31,6 +31,7 @@ from lightfield.formats.layout import (
     view_files,
 )
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
+from lightfield.imaging.look import Look
 from lightfield.publishing import thumbnails
 from lightfield.publishing.package import add_entry, tar_size
 
@@ -162,12 +163,17 @@ def _add_file(
 
 
 def write_shards(
-    output: Path, name: str, datasets: Sequence[DatasetFiles], most: float
+    output: Path,
+    name: str,
+    datasets: Sequence[DatasetFiles],
+    most: float,
+    look: Look | None = None,
 ) -> dict[str, list[Path]]:
     """Write the samples as tars of at most ``most`` bytes. Return the tars of each split.
 
     Each sample has a thumbnail, which Hugging Face's viewer shows
-    (huggingface.co/docs/hub/datasets-webdataset). It is made only when its tar is written.
+    (huggingface.co/docs/hub/datasets-webdataset). It is made only when its tar is written,
+    with the ``look`` if there is one.
     `INDEX` beside them says which tar has which view. A larger sample has a tar of its own. Removes
     tars of an earlier publication. Raises `UserError` if two views have the same key.
     """
@@ -177,13 +183,13 @@ def write_shards(
             raise UserError(f"{output}: {count} views have the key {key} in shards; rename them")
     for old in output.glob("*.tar"):
         old.unlink()
-    exposure = thumbnails.exposure_of([sample.files[_VIEW] for sample in samples])
+    exposure = thumbnails.exposure_of([sample.files[_VIEW] for sample in samples], look)
     progress = Progress(len(samples), name, "views")
     shards: dict[str, list[Path]] = {}
     rows = []
     for split in PARTS:
         of_split = (
-            replace(sample, thumbnail=thumbnails.jpeg(sample.files[_VIEW], exposure))
+            replace(sample, thumbnail=thumbnails.jpeg(sample.files[_VIEW], exposure, look))
             for sample in samples
             if sample.split == split
         )

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import Look
 
 # Pixels of a thumbnail's longer side.
 SIDE = 256
@@ -17,16 +18,18 @@ _QUALITY = 85
 _MEASURED_VIEWS = 9
 
 
-def exposure_of(views: Sequence[Path]) -> float:
+def exposure_of(views: Sequence[Path], look: Look | None = None) -> float:
     """Return the exposure in stops of the thumbnails of views."""
     step = -(-len(views) // _MEASURED_VIEWS)
-    return statistics.median(pictures.exposure_for(_light(view)[..., :3]) for view in views[::step])
+    return statistics.median(
+        pictures.exposure_for(_light(view)[..., :3], look) for view in views[::step]
+    )
 
 
-def jpeg(view: Path, exposure: float) -> bytes:
-    """Return the thumbnail of a view as a JPEG."""
+def jpeg(view: Path, exposure: float, look: Look | None = None) -> bytes:
+    """Return the thumbnail of a view as a JPEG, with a ``look`` if there is one."""
     file = io.BytesIO()
-    picture = Image.fromarray(pictures.thumbnail(_light(view), SIDE, exposure))
+    picture = Image.fromarray(pictures.thumbnail(_light(view), SIDE, exposure, look))
     picture.save(file, "JPEG", quality=_QUALITY)
     return file.getvalue()
 

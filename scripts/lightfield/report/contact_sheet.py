@@ -11,6 +11,7 @@ import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import Look
 from lightfield.imaging.pictures import Array
 
 _SHEET_WIDTH = 1600
@@ -24,10 +25,11 @@ INK = (0.8, 0.8, 0.8)
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
 
 
-def sheet(views: Sequence[Path], width: int, height: int) -> Array:
+def sheet(views: Sequence[Path], width: int, height: int, look: Look | None = None) -> Array:
     """Return the sheet's 8-bit pixels (height, width, 3). Each view has its name beneath.
 
-    The views are EXRs, which are developed here, or PNGs. Their size is ``width`` × ``height``.
+    The views are EXRs, which are developed here, with a ``look`` if there is one, or PNGs. Their
+    size is ``width`` × ``height``.
     """
     columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
     rows = math.ceil(len(views) / columns)
@@ -36,14 +38,14 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
     cell_width = max(1, min(cell_width, _SHEET_WIDTH * width // height))
     cell_height = max(1, round(cell_width * height / width))
     cells = [small_view(path, cell_width, cell_height) for path in views]
-    exposure = pictures.exposure_for(np.stack(cells))
+    exposure = pictures.exposure_for(np.stack(cells), look)
 
     step_x = cell_width + GAP
     step_y = cell_height + GAP + _CAPTION
     page = np.full((GAP + rows * step_y, GAP + columns * step_x, 3), _BACKGROUND, dtype=np.uint8)
     corners = [(GAP + n % columns * step_x, GAP + n // columns * step_y) for n in range(len(views))]
     for path, cell, (left, top) in zip(views, cells, corners, strict=True):
-        developed = cell if path.suffix == ".png" else pictures.develop(cell, exposure)
+        developed = cell if path.suffix == ".png" else pictures.develop(cell, exposure, look)
         page[top : top + cell_height, left : left + cell_width] = developed
     buffer = oiio.ImageBuf(page)
     for path, (left, top) in zip(views, corners, strict=True):

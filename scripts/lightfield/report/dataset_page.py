@@ -21,10 +21,9 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.formats.sensors import settings_in
 from lightfield.geometry import rigs
-from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
-from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.blender_looks import FILE_LOOK, title
 from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
 from lightfield.stages.report import ReportHtml
@@ -49,12 +48,14 @@ def write(job: ReportHtml) -> None:
     rig = lightfield.placed(job.settings.rig)
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
+    look = job.settings.look.resolved(lightfield) if job.settings.look else None
     packed = views.collect(
         folder / IMAGES,
         lightfield,
         rig,
         _unreadable(validation),
         _sensor_folder(folder, lightfield),
+        look,
     )
     middle = lightfield.views[middle_view(rig)]
     lights = pass_pictures.light_groups(folder, lightfield, middle, packed.data["exposure"])
@@ -77,8 +78,10 @@ def write(job: ReportHtml) -> None:
         lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
-        passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
-        reprojected=list(_reprojected(folder)),
+        passes=list(
+            pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"], look)
+        ),
+        reprojected=list(_reprojected(folder, lightfield)),
         render=lightfield.render,
         python=snippet.reading(name, lightfield),
         validation=validation,
@@ -191,7 +194,7 @@ def facts(
         "Views": f"{len(parts)}" + (f" ({', '.join(counts)})" if counts else ""),
         "Rig": rig_text(rig, lightfield.world_from_cameras[:, :3, 3]),
         "Lens": lens.description,
-        "Field of view": _field_of_view(lens),
+        "Field of view": " × ".join(f"{math.degrees(a):.4g}°" for a in lens.field_of_view),
         "Resolution": f"{lens.width} × {lens.height}",
         "Frame": str(lightfield.frame),
         "Samples": samples,
@@ -217,23 +220,11 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"
 
 
-def _field_of_view(lens: Lens) -> str:
-    """Return the angles that the image spans, across and down, through the principal point."""
-    x, y = lens.center
-    lines = (
-        lens.rays(np.linspace(0, lens.width, 513), y),
-        lens.rays(x, np.linspace(0, lens.height, 513)),
-    )
-    angles = []
-    for rays in lines:
-        visible_rays = rays[np.isfinite(rays[:, 0])]
-        chords = np.linalg.norm(np.diff(visible_rays, axis=0), axis=1)
-        angles.append(math.degrees(2 * np.arcsin(chords / 2).sum()))
-    return " × ".join(f"{angle:.4g}°" for angle in angles)
+def _reprojected(folder: Path, rendered: LightField) -> Iterator[tuple[str, str, int, int, str]]:
+    """Yield the name of each reprojection of the ``rendered`` views, and what it changes.
 
-
-def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
-    """Yield name, lens, number of views, number of shown views, and sheet of each reprojection."""
+    Then yield the numbers of its views and of the shown views, and a sheet of the latter.
+    """
     for path in sorted(folder.glob(f"*/{NAME}")):
         lightfield = LightField.read(path)
         lens = lightfield.lens
@@ -242,8 +233,21 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
         suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
         sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), _SHEET_QUALITY)
-        title = f"{lens.description}{', relit' if lightfield.is_relit else ''}"
-        yield path.parent.name, title, count, len(shown), sheet
+        yield path.parent.name, _change(rendered, lightfield), count, len(shown), sheet
+
+
+def _change(rendered: LightField, reprojected: LightField) -> str:
+    """Return what a reprojection changes in the ``rendered`` views, in a few words."""
+    changes = []
+    if reprojected.lens != rendered.lens:
+        changes.append(f"through another lens, {reprojected.lens.description}")
+    if reprojected.is_relit:
+        changes.append("under other lights")
+    if look := reprojected.look:
+        changes.append(f"with the look {title(look)}")
+    if settings_in(reprojected.content):
+        changes.append("as a sensor sees them")
+    return "; ".join(changes) or "as other files"
 
 
 def _exported_files(folder: Path) -> Iterator[tuple[str, str]]:
@@ -280,9 +284,9 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):
         reprojected = LightField.read(reprojection)
-        change = "under other lights" if reprojected.is_relit else "through another lens"
-        meaning = f"the same views {change}: {reprojected.lens.description}"
-        meanings.append((f"{reprojection.parent.name}/", meaning))
+        meanings.append(
+            (f"{reprojection.parent.name}/", f"the same views {_change(lightfield, reprojected)}")
+        )
     meanings += _exported_files(folder)
     meanings.append(("validation.json", "the checks and their results"))
     if valid:

@@ -59,7 +59,8 @@ def draw(job: ReportFigures) -> None:
     views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
     lens = lightfield.lens
     thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]
-    sheet = contact_sheet.sheet(thinned, lens.width, lens.height)
+    look = job.settings.look.resolved(lightfield) if job.settings.look else None
+    sheet = contact_sheet.sheet(thinned, lens.width, lens.height, look)
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
     if job.settings.chooses_tests:
@@ -70,8 +71,8 @@ def draw(job: ReportFigures) -> None:
         overview = _read_panorama(job.panorama)
     else:
         overview = read_view(views[middle_view(rig)], lightfield)
-    exposure = pictures.exposure_for(overview.colour)
-    images.write_png(output / "overview.png", pictures.develop(overview.colour, exposure))
+    exposure = pictures.exposure_for(overview.colour, look)
+    images.write_png(output / "overview.png", pictures.develop(overview.colour, exposure, look))
     _draw_depth(output / "depth", overview)
     draw_noise(output / "noise", overview)
 

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from lightfield.imaging import pictures
+from lightfield.imaging.blender_looks import title
+from lightfield.imaging.look import Look
 
 Array = NDArray[Any]
 
@@ -23,6 +25,10 @@ Array = NDArray[Any]
 _TOE_STOPS = 7.0
 # 12 bits of depth: a step is 0.3 percent in a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096
+# A table of 48 lights is within 0.6 of 255 levels of AgX in 99 of 100 colours, and has 31 kB.
+_LOOK_SIDE = 48
+# The toe and the highest light of a look's table, in stops.
+_LOOK_STOPS = (-9.0, 8.0)
 NO_DEPTH = 0
 MISS = DEPTH_STEPS - 1
 
@@ -86,6 +92,25 @@ def pack_depth(
     packed[..., 0] = numbers >> 8
     packed[..., 1] = numbers & 255
     return packed
+
+
+def pack_look(look: Look) -> dict[str, Any]:
+    """Return a look as a table of pixels, which a page interpolates between `_LOOK_SIDE` lights.
+
+    The lights are spaced as light is packed: evenly in log(1 + light / toe), up to ``highest``. The
+    table is a picture with red downwards, and green and blue across.
+    """
+    # The exposure moves the range in which a view transform does something.
+    toe, highest = (2.0 ** (stops - look.exposure) for stops in _LOOK_STOPS)
+    parts = np.arange(_LOOK_SIDE) / (_LOOK_SIDE - 1)
+    table = look.table(toe * np.expm1(parts * np.log1p(highest / toe)))
+    return {
+        "name": title(vars(look)),
+        "side": _LOOK_SIDE,
+        "toe": toe,
+        "highest": highest,
+        "table": webp(table.reshape(_LOOK_SIDE, -1, 3)),
+    }
 
 
 def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:

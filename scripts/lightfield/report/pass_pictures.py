@@ -12,6 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField, View
 from lightfield.formats.passes import FLOW, Pass, is_group, of_group
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import Look
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.tonemap import to_8_bit
 from lightfield.report.packing import light_scale, pack_light, webp
@@ -29,11 +30,11 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def collect(
-    folder: Path, lightfield: LightField, view: View, exposure: float
+    folder: Path, lightfield: LightField, view: View, exposure: float, look: Look | None = None
 ) -> Iterator[tuple[str, str, str]]:
     """Yield name, meaning and picture of each readable pass of a view. Leaves out light groups.
 
-    ``exposure`` in stops applies to passes of light.
+    ``exposure`` in stops and ``look`` apply to passes of light.
     """
     step = math.ceil(max(lightfield.lens.width, lightfield.lens.height) / SIDE)
     passes = [(each, view.name) for each in lightfield.passes if not is_group(each)]
@@ -45,7 +46,7 @@ def collect(
         except UserError:
             continue  # Validation reports it.
         planes = [channels[channel][::step, ::step] for channel in view_pass.channels]
-        picture = _picture(view_pass, np.stack(planes, axis=-1), exposure)
+        picture = _picture(view_pass, np.stack(planes, axis=-1), exposure, look)
         yield view_pass.name, view_pass.meaning, webp(picture)
 
 
@@ -82,7 +83,7 @@ def light_groups(
     }
 
 
-def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
+def _picture(view_pass: Pass, pixels: Array, exposure: float, look: Look | None) -> Array:
     """Return a pass's pixels (height, width, channels) as 8-bit sRGB (height, width, 3)."""
     colours: Array
     match view_pass.kind:
@@ -90,7 +91,7 @@ def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
             # These lie between 0 and 1, so they need no exposure.
             return to_8_bit(np.ascontiguousarray(pixels, np.float32))
         case "light":
-            return pictures.develop(pixels.astype(np.float32), exposure)
+            return pictures.develop(pixels.astype(np.float32), exposure, look)
         case "value":
             colours = np.repeat(pixels.astype(np.float32), 3, axis=-1)
         case "normal":

@@ -19,6 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
+from lightfield.imaging.look import Look
 from lightfield.measurement.noise import relative_noise
 from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
@@ -28,6 +29,7 @@ from lightfield.report.packing import (
     light_step,
     pack_depth,
     pack_light,
+    pack_look,
     packed_bytes,
     webp,
 )
@@ -97,12 +99,14 @@ def collect(
     rig: Rig,
     unreadable: Collection[str] = (),
     sensor: Path | None = None,
+    look: Look | None = None,
 ) -> _PackedViews:
     """Read the views that the page shows, and pack them.
 
     ``folder`` holds the views of ``lightfield``. ``rig`` has placed their cameras. The
     ``unreadable`` views are black. ``sensor`` holds the views as a sensor sees them, if there are
-    any. Raises `UserError` for any other view that cannot be read.
+    any. The page develops them with the ``look``, if there is one. Raises `UserError` for any other
+    view that cannot be read.
     """
     names = [view.name for view in lightfield.views]
     lens = lightfield.lens
@@ -114,10 +118,14 @@ def collect(
         return read(folder / f"{names[number]}.exr", small, meaning)
 
     embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
+    middle = lightfield.world_from_cameras[middle_view(rig)]
+    # The view with the pose most similar to the middle view's.
+    offsets = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
+    first = int(np.argmin(offsets))
     for small in _lenses(lens, len(embedded)):
         views = [load(number, small) for number in embedded]
         depths = _depths(views, small)
-        shown = _pictures(views, depths, embedded, lightfield, small)
+        shown = _pictures(views, depths, embedded, first, lightfield, small, look)
         if sensor:
             for entry in shown["embedded"]:
                 entry["sensor"] = _sensed(sensor / f"{names[entry['view']]}.png", small)
@@ -125,16 +133,14 @@ def collect(
             break
     row = epipolar.find_row(rig, lightfield.world_from_cameras)
     row_views = epipolar.thinned(row.views, _MOST_ROWS) if row else []
-    middle = lightfield.world_from_cameras[middle_view(rig)]
-    distances = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
     data = {
         "views": _cameras(lightfield),
         "outline": [[_rounded(point) for point in line] for line in rig.outline()],
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
         "white": pictures.WHITE,
-        # The view with the pose most similar to the middle view's.
-        "first": int(np.argmin(distances)),
+        "look": pack_look(look) if look else None,
+        "first": first,
         "row": _epipolar_images(load, lightfield, row, row_views, shown["light"]) if row else None,
         **shown,
     }
@@ -211,13 +217,18 @@ def _pictures(
     views: list[PageView],
     depths: Array | None,
     embedded: list[int],
+    first: int,
     lightfield: LightField,
     small: Lens,
+    look: Look | None,
 ) -> dict[str, Any]:
-    """Return the packed pictures of the ``embedded`` views, through the lens ``small``."""
+    """Return the packed pictures of the ``embedded`` views, through the lens ``small``.
+
+    ``first`` is the place in ``embedded`` of the view in the middle of the rig.
+    """
     light = np.stack([view.colour for view in views])
     scale = light_scale(light)
-    exposure = round(pictures.exposure_for(light), 2)
+    exposure = round(pictures.exposure_for(light, look), 2)
     packed: list[dict[str, Any]] = [
         {"view": number, "light": webp(pack_light(colour, scale), _LIGHT_QUALITY)}
         for number, colour in zip(embedded, light, strict=True)
@@ -232,12 +243,17 @@ def _pictures(
     farther = seeming_farther(small, light, distances, world_from_cameras[embedded])
     for entry, depth, steps in zip(packed, depths, farther, strict=True):
         entry["depth"] = webp(pack_depth(depth, reach, steps))
-    colours = pictures.develop(light, exposure)
+    colours = pictures.develop(light, exposure, look)
     return shown | {
         "points": _points(distances, rays, world_from_cameras[embedded], colours),
         "depth": _depth_scale(depths, reach, lightfield.depth),
         "walk": walk.collect(
-            small, world_from_cameras[:, :3, 3], distances, fills_holes=not lightfield.transparent
+            small,
+            world_from_cameras[:, :3, 3],
+            world_from_cameras[embedded],
+            distances,
+            first,
+            fills_holes=not lightfield.transparent,
         ),
     }
 

@@ -1,4 +1,4 @@
-"""Collects the walk's data beside the views: the rays, the volume between the cameras, constants.
+"""Collects the walk's data beside the views: the rays, the volume, the start, constants.
 
 The walk in the browser (templates/walk/) chooses, draws and blends views as `synthesis.view` does.
 This module passes it the same constants.
@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
+from lightfield.geometry.interpolation_volume import flatness
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.visibility import pixel_indices
+from lightfield.report import walk_start
 from lightfield.report.packing import packed_bytes, webp
 from lightfield.stages.synthesis import BEST
 from lightfield.synthesis import apparent, kernels
@@ -21,13 +23,26 @@ Array = NDArray[Any]
 
 # The side in pixels of the octahedral map of the directions that the lens sees.
 _SIGHT = 64
+# Cameras count as flat if their volume is thinner than this part of its length. The eye may then
+# leave their surface by _SLACK of the length.
+_THIN = 0.05
+_SLACK = 0.1
 
 
-def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -> dict[str, Any]:
+def collect(
+    lens: Lens,
+    places: Array,
+    world_from_cameras: Array,
+    distances: Array,
+    first: int,
+    *,
+    fills_holes: bool,
+) -> dict[str, Any]:
     """Return the data of the walk.
 
     ``lens`` is the lens of the embedded views. ``places`` (n, 3) are the positions of all cameras.
-    ``distances`` (m, height, width) are the distances in the embedded views, in metres.
+    ``world_from_cameras`` (m, 4, 4) and ``distances`` (m, height, width), in metres, are those of
+    the embedded views. ``first`` is the number of the embedded view in the middle of the rig.
     ``fills_holes`` is as in `lightfield.synthesis.view.Sources`. Some of the keys:
 
     - ``rays``: the pixels' octahedral rays as a picture: above across, below down. The first two
@@ -36,7 +51,8 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     - ``planes`` (m, 4): the bounds n · p + c ≤ 0 of the volume between the cameras.
     - ``toRim``: a grey picture, 0 at the edge of the image circle, 255 far from it.
     - ``pixel``: the angle between two pixels, in radians.
-    - ``nearest``: the first percentile of the distances.
+    - ``fieldOfView``: the angles that the lens sees across and down, in radians.
+    - ``start``: where the walk begins: ``at``, and the angles ``yaw`` and ``pitch`` in radians.
     """
     steps = (np.arange(_SIGHT) + 0.5) / _SIGHT
     x, y = np.meshgrid(steps, steps)
@@ -47,6 +63,9 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
     coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype(np.uint16)
     stacked = np.concatenate([coded[..., 0], coded[..., 1]])
     to_rim = np.round(255 * synthesis.to_rim(lens)).astype(np.uint8)
+    typical = synthesis.typical(1 / positive) if positive.size else np.ones(2)
+    nearest = float(np.percentile(hit, 1)) if hit.size else 1.0
+    starts = walk_start.candidates(lens, world_from_cameras, distances, first, nearest)
     return {
         "rays": webp(np.stack([stacked >> 8, stacked & 255, 0 * stacked], -1).astype(np.uint8)),
         "sight": packed_bytes(is_seen.astype(np.uint8).tobytes()),
@@ -55,8 +74,9 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
         "toRim": webp(np.stack([to_rim] * 3, axis=-1)),
         "pixel": synthesis.pixel_angle(lens),
         "steepest": float(synthesis.steepest(lens)),
-        "distances": synthesis.typical(1 / positive).tolist() if positive.size else [1.0, 1.0],
-        "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
+        "fieldOfView": list(lens.field_of_view),
+        "start": walk_start.best(starts, lens, world_from_cameras, typical),
+        "distances": typical.tolist(),
         "best": BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": float(kernels.DISTANCE),
@@ -103,13 +123,11 @@ def _direction(points: Array) -> Array:
 
 
 def _bounds(places: Array) -> Array:
-    """Return the planes (n, 4) around all places (m, 3): their hull, or a box if they are flat."""
-    try:
-        planes: Array = np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
-        return planes
-    except QhullError:
-        low = places.min(axis=0)
-        high = places.max(axis=0)
-        slack = 0.1 * max(float(np.linalg.norm(high - low)), 0.1)
-        sides = np.concatenate([np.eye(3), -np.eye(3)])
-        return np.column_stack([sides, np.concatenate([-high, low]) - slack])
+    """Return the planes (n, 4) around all places (m, 3): their hull. Thin ones get some slack."""
+    around = places
+    if flatness(places) < _THIN:
+        length = max(float(np.linalg.norm(np.ptp(places, axis=0))), 0.1)
+        corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
+        around = (places[:, None] + _SLACK * length * corners).reshape(-1, 3)
+    planes: Array = np.unique(np.round(ConvexHull(around).equations, 9), axis=0)
+    return planes

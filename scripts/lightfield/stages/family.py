@@ -9,6 +9,7 @@ from pydantic import Field
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.corpus import CorpusOptions
 from lightfield.configuration.family import Draw, Member
+from lightfield.configuration.shown_look import ShownLook
 from lightfield.core.names import scene_folder
 from lightfield.core.paths import files_below
 from lightfield.engine.receipts import FOLDER
@@ -75,6 +76,7 @@ class CorpusSettings(CorpusOptions, ReaderSettings):
         description="Names of the members. Without this key, the corpus has all members that have "
         "a record.",
     )
+    look: ShownLook | None = Field(None, description="Look of the thumbnails.")
 
 
 class Corpus(Stage[CorpusSettings]):

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from lightfield.configuration.scene_yaml import Credits, load_scene
+from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.settings.base import ReaderSettings
 
@@ -45,6 +46,7 @@ class PackSettings(ReaderSettings):
         description="Type of the rig, such as ring. Without this key, it is the type in "
         "lightfield.json.",
     )
+    look: ShownLook | None = Field(None, description="Look of a published dataset's thumbnails.")
     scene: Credits = Field(
         Credits(), description="What the card says about the scene, and what publishing needs."
     )
@@ -64,7 +66,9 @@ class PackageByHand(ByHand):
     )
 
     def settings(self, given: Mapping[str, Any]) -> PackSettings:
-        return PackSettings.of(scene=load_scene(self.scene), gigabytes=self.gigabytes)
+        scene = load_scene(self.scene)
+        look = shown_look(scene.developments.values(), scene.exports.selected.values())
+        return PackSettings.of(scene=scene, gigabytes=self.gigabytes, look=look)
 
 
 class PublishByHand(PackageByHand):
@@ -92,6 +96,7 @@ class Publish(Stage[PackSettings]):
 
     name = "publish"
     function = "lightfield.publishing.publish:write"
+    version = 1
     by_hand = PublishByHand
 
     folder: Path = reads(FOLDER)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import Field, PlainSerializer
 
+from lightfield.configuration.shown_look import ShownLook
 from lightfield.core.names import ROOT
 from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.geometry.rigs import AnyRig, as_written
@@ -20,6 +21,7 @@ class FiguresSettings(ReaderSettings):
         description="Whether an export chooses test views, because the rig has no split. The "
         "drawing of the rig shows them.",
     )
+    look: ShownLook | None = Field(None, description="Look of the pictures.")
 
 
 class ReportFigures(Stage[FiguresSettings]):
@@ -59,6 +61,7 @@ class PageSettings(ReaderSettings):
     measurements: list[MeasurementFile] = Field(
         [], description="Files of measurements that the page shows."
     )
+    look: ShownLook | None = Field(None, description="Look of the page's pictures.")
 
 
 class ReportHtml(Stage[PageSettings]):
@@ -66,6 +69,7 @@ class ReportHtml(Stage[PageSettings]):
 
     name = "report_html"
     function = "lightfield.report.dataset_page:write"
+    version = 2
 
     dataset: Path = reads("folder of the dataset")
     dataset_name: str = option("name of the dataset, scene/rig", flag="--name", metavar="NAME")

@@ -173,6 +173,14 @@ class Lens(ABC):
         return "z" if self.has_z_depth else "distance"
 
     @property
+    def field_of_view(self) -> Pair:
+        """The angles in radians that the image spans across and down, through `center`."""
+        x, y = self.center
+        across = self.rays(np.linspace(0, self.width, 513), y)
+        down = self.rays(x, np.linspace(0, self.height, 513))
+        return _angle_along(across), _angle_along(down)
+
+    @property
     def mirrors(self) -> tuple[bool, bool]:
         """Whether the lower half mirrors the upper half, and the right half the left half."""
         return False, False
@@ -483,6 +491,13 @@ def _number(text: str, name: str) -> float:
     if name in ("PAN", "PITCH", "ROLL"):
         return float(text.removesuffix("deg"))
     raise ValueError(f"{name} is not an angle")
+
+
+def _angle_along(rays: Array) -> float:
+    """Return the angle in radians along a line of unit ``rays`` (n, 3), NaN where there is none."""
+    visible_rays = rays[np.isfinite(rays[:, 0])]
+    chords = np.linalg.norm(np.diff(visible_rays, axis=0), axis=1)
+    return float(2 * np.arcsin(chords / 2).sum())
 
 
 def _degrees(radians: float) -> float:

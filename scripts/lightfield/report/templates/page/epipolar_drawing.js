@@ -2,7 +2,8 @@
 
 import { DATA } from "./data.js";
 import { fitted, onceAFrame } from "./document.js";
-import { depthCode, depthOf, developed, paint } from "./packing.js";
+import { codeDeveloper } from "./look.js";
+import { depthCode, depthOf, paint } from "./packing.js";
 import { lines, viewer } from "./state.js";
 
 export function epipolarPixel(x, y) {
@@ -52,7 +53,7 @@ function linesPicture() {
   const picture = new OffscreenCanvas(columns, count);
   const image = new ImageData(columns, count);
   const colours = lines.depth ? lines.colours : null;
-  paint(image.data, lines.pixels[0], lines.pixels[1], epipolarPixel(0, 0), developed(viewer.exposure), colours);
+  paint(image.data, lines.pixels[0], lines.pixels[1], epipolarPixel(0, 0), codeDeveloper(viewer.look, viewer.exposure), colours);
   picture.getContext("2d").putImageData(image, 0, 0);
   return picture;
 }

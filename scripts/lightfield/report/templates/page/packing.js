@@ -14,14 +14,6 @@ export function encodeSrgb(linear) {
   return value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055;
 }
 
-// Tone mapping as in the contact sheet: Reinhard et al. 2002, equation 4.
-export function developed(exposure) {
-  return Uint8ClampedArray.from(LIGHT, (light) => {
-    const value = light * 2 ** exposure;
-    return 255 * encodeSrgb((value * (1 + value / DATA.white ** 2)) / (1 + value));
-  });
-}
-
 export const depthCode = (pixels, at) => ((pixels[at] << 8) | pixels[at + 1]) >> 4;
 
 export function depthOf(code, [low, high]) {
@@ -57,14 +49,14 @@ export async function decoded(uri) {
   return context.getImageData(0, 0, canvas.width, canvas.height).data;
 }
 
-// Fill `target` from packed pixels, from the pixel `first` on. Leave pixels of depth 0 transparent.
-export function paint(target, light, depth, first, table, colours) {
+// Fill `target` from packed pixels, from the pixel `first` on. `develop` writes a pixel from its codes, unless there are
+// `colours` of depth codes. Leave pixels of depth 0 transparent.
+export function paint(target, light, depth, first, develop, colours) {
   for (let pixel = 0; pixel < target.length; pixel += 4) {
     const source = 4 * first + pixel;
     const code = depth ? depthCode(depth, source) : MISS;
-    for (let channel = 0; channel < 3; channel++) {
-      target[pixel + channel] = colours ? colours[3 * code + channel] : table[light[source + channel]];
-    }
+    if (colours) target.set(colours.subarray(3 * code, 3 * code + 3), pixel);
+    else develop(light, source, target, pixel);
     target[pixel + 3] = depth && code === 0 ? 0 : 255;
   }
 }

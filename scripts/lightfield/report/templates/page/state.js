@@ -7,6 +7,8 @@ export const viewer = {
   canvas: element("viewer"),
   current: 0,
   exposure: DATA.exposure,
+  // The table of the look, once it is decoded.
+  look: null,
   depth: false,
   sensor: false,
   cache: new Map(),

@@ -3,13 +3,14 @@
 import { DATA } from "./data.js";
 import { chooseDepth, element, onceAFrame } from "./document.js";
 import { drawLines } from "./epipolar_drawing.js";
-import { LIGHT, bytesOf, decoded, depthCode, depthColours, depthOf, developed, metres, paint } from "./packing.js";
+import { codeDeveloper, lookTable } from "./look.js";
+import { LIGHT, bytesOf, decoded, depthCode, depthColours, depthOf, metres, paint } from "./packing.js";
 import { drawRig } from "./rig_drawing.js";
 import { rig, viewer } from "./state.js";
 import { clamp, dot, minus } from "./vectors.js";
 
 // A sensor's codes are shown as they are.
-const CODES = Uint8ClampedArray.from({ length: 256 }, (_, code) => code);
+const asTheyAre = (codes, source, target, at) => target.set(codes.subarray(source, source + 3), at);
 
 async function pixelsOf(number) {
   if (!viewer.cache.has(number)) {
@@ -32,6 +33,7 @@ async function open(number) {
   }
   drawRig();
   const pixels = await pixelsOf(number);
+  viewer.look = await lookTable;
   if (viewer.current !== number) return;
   viewer.pixels = pixels;
   drawView();
@@ -44,10 +46,10 @@ const drawView = onceAFrame(() => {
   const context = viewer.canvas.getContext("2d");
   const image = context.createImageData(width, height);
   if (viewer.sensor && !viewer.depth) {
-    paint(image.data, sensor, depth, 0, CODES, null);
+    paint(image.data, sensor, depth, 0, asTheyAre, null);
   } else {
     const colours = viewer.depth ? viewer.colours : null;
-    paint(image.data, light, depth, 0, developed(viewer.exposure), colours);
+    paint(image.data, light, depth, 0, codeDeveloper(viewer.look, viewer.exposure), colours);
   }
   context.putImageData(image, 0, 0);
   readOut();

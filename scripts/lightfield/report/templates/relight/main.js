@@ -3,7 +3,9 @@
 
 import { DATA } from "../page/data.js";
 import { element, onceAFrame } from "../page/document.js";
-import { decoded, encodeSrgb, lightByCode } from "../page/packing.js";
+import { lightDeveloper, lookTable } from "../page/look.js";
+import { decoded, lightByCode } from "../page/packing.js";
+import { viewer } from "../page/state.js";
 
 const LIGHTS = DATA.lights;
 // One entry for each group: its linear light by code, its codes, and its factors of R, G and B.
@@ -27,10 +29,10 @@ const drawLit = onceAFrame(() => {
   }
   const context = element("lit").getContext("2d");
   const image = context.createImageData(width, height);
-  const gain = 2 ** (LIGHTS.exposure + Number(element("lit-exposure").value));
-  for (let place = 0; place < total.length; place++) {
-    const value = gain * total[place];
-    image.data[place] = place % 4 === 3 ? 255 : 255 * encodeSrgb((value * (1 + value / DATA.white ** 2)) / (1 + value));
+  const develop = lightDeveloper(viewer.look, LIGHTS.exposure + Number(element("lit-exposure").value));
+  for (let place = 0; place < total.length; place += 4) {
+    develop([total[place], total[place + 1], total[place + 2]], image.data, place);
+    image.data[place + 3] = 255;
   }
   context.putImageData(image, 0, 0);
 });
@@ -77,6 +79,7 @@ async function startLights() {
   pictures.forEach((codes, number) => {
     lamps[number].codes = codes;
   });
+  viewer.look = await lookTable;
   canvas.setAttribute("aria-busy", "false");
   drawLit();
 }

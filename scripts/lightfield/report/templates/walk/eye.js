@@ -5,8 +5,8 @@ import { WALK, walk } from "./state.js";
 
 // The eye sees nothing nearer than this, in metres.
 export const NEAR = 0.01;
-// The limits of the field of view across the picture's longer side. Between these, it is so wide that a source's pixel
-// shows at most LARGEST_PIXEL pixels wide.
+// The limits of the widest field of view across the picture's longer side. Between these, it is so wide that a source's
+// pixel shows at most LARGEST_PIXEL pixels wide.
 const [NARROWEST, WIDEST] = [(80 * Math.PI) / 180, (120 * Math.PI) / 180];
 const LARGEST_PIXEL = 3;
 export const STEEPEST_PITCH = 1.5;
@@ -24,9 +24,20 @@ export function axes() {
   return [right, up, back];
 }
 
-export function fieldOfView(width, height) {
+function widestFieldOfView(width, height) {
   const wide = 2 * Math.atan((Math.max(width, height) / 2) * (WALK.pixel / LARGEST_PIXEL));
   return clamp(wide, NARROWEST, WIDEST);
+}
+
+// Return the field of view of the zoom 1: the lens's own, but not the widest. Beyond it, a picture would mostly be filled.
+export function fieldOfView(width, height) {
+  const [across, down] = WALK.fieldOfView;
+  return Math.min(width >= height ? across : down, widestFieldOfView(width, height));
+}
+
+// Return the zoom with the widest field of view, at most 1.
+export function leastZoom(width, height) {
+  return Math.tan(fieldOfView(width, height) / 2) / Math.tan(widestFieldOfView(width, height) / 2);
 }
 
 // Return the factors across and up by which a tangent becomes 1 at the picture's edges.

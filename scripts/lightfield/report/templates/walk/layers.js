@@ -1,6 +1,7 @@
 // Draws an eye's picture: each source into a layer of its own, then the blended layers.
 
 import { DATA } from "../page/data.js";
+import { LOOK } from "../page/look.js";
 import { viewer } from "../page/state.js";
 import { clamp, minus } from "../page/vectors.js";
 import { NEAR, metresToEdge } from "./eye.js";
@@ -227,7 +228,13 @@ function showPicture({ levels }, eye, target, corner, size) {
   gl.bindFramebuffer(gl.FRAMEBUFFER, target);
   gl.viewport(...corner, ...size);
   gl.useProgram(linked);
-  bindTextures(gl, uniforms, { ...fillTextures(levels, 0), palette: [gl.TEXTURE_2D, walk.palette] });
+  bindTextures(gl, uniforms, {
+    ...fillTextures(levels, 0),
+    palette: [gl.TEXTURE_2D, walk.palette],
+    look: [gl.TEXTURE_3D, walk.lookTexture],
+  });
+  gl.uniform1i(uniforms.hasLook, LOOK !== null);
+  if (LOOK) gl.uniform2f(uniforms.lookRange, LOOK.toe, LOOK.highest);
   gl.uniform1i(uniforms.fillsHoles, WALK.fillsHoles);
   gl.uniform1i(uniforms.isFirst, true);
   gl.uniform1f(uniforms.far, WALK.far);

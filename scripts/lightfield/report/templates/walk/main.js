@@ -3,6 +3,7 @@
 
 import { DATA } from "../page/data.js";
 import { element } from "../page/document.js";
+import { LOOK, lookTable } from "../page/look.js";
 import { bytesOf, decoded, depthOf } from "../page/packing.js";
 import { minus } from "../page/vectors.js";
 import { bestViews, missing } from "./choice.js";
@@ -90,6 +91,17 @@ function paletteTexture(gl) {
   return texture(gl, gl.TEXTURE_2D, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
 }
 
+// Return the table of the look, between whose entries shaders interpolate. Without a look it has one entry.
+function lookTexture(gl, table) {
+  const side = LOOK ? LOOK.side : 1;
+  const pixels = table || new Uint8Array(4);
+  const created = texture(gl, gl.TEXTURE_3D, gl.RGBA8, side, side, side, 0, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_WRAP_R, gl.CLAMP_TO_EDGE);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  return created;
+}
+
 // Let shaders draw into floats. Return null if the graphics card cannot.
 const enableFloats = (gl) => gl.getExtension("EXT_color_buffer_float");
 
@@ -104,6 +116,7 @@ function prepareDrawing(gl) {
   walk.enlarged = program(gl, wholePictureShader, filledShader + enlargedShader);
   walk.shown = program(gl, wholePictureShader, filledShader + shownShader);
   walk.palette = paletteTexture(gl);
+  walk.lookTexture = lookTexture(gl, walk.lookTable);
 }
 
 function uploadRays() {
@@ -156,6 +169,7 @@ async function startWalk() {
     return;
   }
   followLosses();
+  walk.lookTable = await lookTable;
   prepareDrawing(gl);
   await prepareSources();
   uploadRays();

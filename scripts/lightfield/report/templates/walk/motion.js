@@ -2,7 +2,7 @@
 
 import { along, clamp } from "../page/vectors.js";
 import { drawWalkSoon } from "./drawing.js";
-import { STEEPEST_PITCH, axes, insideVolume } from "./eye.js";
+import { STEEPEST_PITCH, axes, insideVolume, leastZoom } from "./eye.js";
 import { walk } from "./state.js";
 
 // Move the eye forward, sideways and upwards, in parts of the rig's extent. Forward and sideways are level.
@@ -37,9 +37,9 @@ export const TURNING = { ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 // The factor by which each key changes the zoom in a second.
 export const ZOOMING = { "+": 2, "=": 2, "-": 0.5 };
 
-// Enlarge the picture: from the default field of view to an eighth of it.
+// Enlarge the picture: from the widest field of view to an eighth of the default one.
 export function zoomBy(factor) {
-  walk.zoom = clamp(factor * walk.zoom, 1, 8);
+  walk.zoom = clamp(factor * walk.zoom, leastZoom(...walk.size), 8);
   drawWalkSoon();
 }
 

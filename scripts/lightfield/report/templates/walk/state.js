@@ -23,6 +23,8 @@ export const walk = {
   keys: new Map(),
   isMoving: false,
   frames: 0,
+  // The table of the look. null without one.
+  lookTable: null,
   ready: false,
   order: [],
   // How often loading has begun, or has ended because the graphics card was lost.
