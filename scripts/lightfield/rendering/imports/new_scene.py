@@ -128,7 +128,7 @@ def _of_model(file: Path, export: str | None) -> _Description:
     render = _render("  transparent: true  # without a background\n")
     around = _around([_SIDE, _SIDE])
     blocks = scene + render + around + _exports(export, "views")
-    return _Description(f"A model of {sides} in {file.name}, with cameras around it", blocks)
+    return _Description(f"{file.name}, a model of {sides}, with cameras around it", blocks)
 
 
 def _of_blend(file: Path, export: str | None) -> _Description:
@@ -148,7 +148,7 @@ def _of_blend(file: Path, export: str | None) -> _Description:
 """
     blocks = scene + _render("") + (front or _around(resolution)) + _exports(export, "views")
     where = "around its own camera" if front else "around what it shows"
-    return _Description(f"The .blend {file.name}, {_sides(box)} m, with cameras {where}", blocks)
+    return _Description(f"{file.name}, a .blend of {_sides(box)} m, with cameras {where}", blocks)
 
 
 def _of_views(folder: Path, export: str | None) -> _Description:
@@ -182,7 +182,7 @@ reprojections:
 """
     names = ", ".join(rigs)
     blocks += _exports(export, source)
-    return _Description(f"Rendered views in {folder.name}: {names}. Splits are their own", blocks)
+    return _Description(f"Rendered views in {folder.name}: {names}. They keep their splits", blocks)
 
 
 def _render(more: str) -> str:
