@@ -227,7 +227,7 @@ KEY_PAGES: dict[str, Page] = {
 # The programs, by what they are for.
 PROGRAM_GROUPS = {
     "Prepare a scene": [
-        "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
+        "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
         "make_lightfield", "free_places", "check_cameras", "import_views",
     ],
     "Build a family": ["build_members", "corpus", "count_members"],

@@ -20,7 +20,7 @@ from . import rig_objects
 from .scripts.lightfield.core.errors import UserError
 from .scripts.lightfield.geometry.lenses import Lens
 from .scripts.lightfield.geometry.lenses.rectilinear import Rectilinear
-from .scripts.lightfield.geometry.rigs import Rig, as_written, from_settings
+from .scripts.lightfield.geometry.rigs import Random, Rig, as_written, from_settings
 from .scripts.lightfield.geometry.rotations import euler_to_matrix
 from .scripts.lightfield.rendering.inspection import clearance
 
@@ -71,8 +71,11 @@ def cameras_at(settings: str, folder: Path) -> Cameras:
     """Return the cameras of a rig, from its keys as JSON. Paths start from ``folder``."""
     try:
         with chdir(folder):
-            poses = from_settings(json.loads(settings)).poses()
+            rig = from_settings(json.loads(settings))
+            poses = [] if rig.is_fitted or isinstance(rig, Random) else rig.poses()
     except UserError:
+        poses = []
+    if not poses:
         return Cameras(np.empty((0, 4, 4)), None)
     matrices = np.tile(np.eye(4), (len(poses), 1, 1))
     matrices[:, :3, :3] = euler_to_matrix(np.array([pose.rotation for pose in poses]))

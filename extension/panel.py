@@ -1,12 +1,13 @@
 """The side panel of the 3D viewport, and the operators of its buttons."""
 
+import textwrap
 from pathlib import Path
 from typing import Any, ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import drawing, rig_objects, scene_file, silvr
+from . import drawing, preview, rig_objects, scene_file, silvr
 from .scripts.lightfield.core.errors import UserError
 from .scripts.lightfield.core.names import FILE
 
@@ -107,6 +108,7 @@ class OpenYaml(Change):
         for empty in rig_objects.empties(scene):
             bpy.data.objects.remove(empty)
         scene.plenoforge_yaml = str(path)
+        rig_objects.measure(scene)
         for name, settings in rigs.items():
             rig_objects.add(scene, name, settings)
         scene[_OPENED] = list(rigs)
@@ -239,6 +241,43 @@ class ReadSilvr(Change):
         _show(context)
 
 
+class BuildPreview(Button):
+    """Build the active rig with small views, in the background, from the scene YAML as written"""
+
+    bl_idname = "plenoforge.build"
+    bl_label = "Build"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        build = preview.last()
+        return active(context) is not None and not (build and build.is_running)
+
+    def run(self, context: Any) -> None:
+        scene = context.scene
+        path = rig_objects.yaml_path(scene)
+        name, _ = rig_objects.kept(active(context))
+        _, settings = rig_objects.rig_of(scene, active(context))
+        if path and scene_file.read(path).get(name) != settings:
+            raise UserError(f"{name}: is not in {path.name} as it is drawn; press Write YAML")
+        preview.start(scene, name, scene.plenoforge_preset)
+
+
+class CancelBuild(Button):
+    """End the build and its jobs. Finished views stay, and the next build goes on"""
+
+    bl_idname = "plenoforge.cancel_build"
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, _context: Any) -> bool:
+        build = preview.last()
+        return build is not None and build.is_running
+
+    def run(self, _context: Any) -> None:
+        if build := preview.last():
+            build.cancel()
+
+
 def _activate(context: Any, obj: Any) -> None:
     for other in context.selected_objects:
         other.select_set(False)
@@ -284,6 +323,26 @@ class RigPanel(bpy.types.Panel):
             _draw_rig(layout.box(), scene, empty)
         layout.operator(CheckRigs.bl_idname, icon="VIEWZOOM")
         layout.operator(WriteYaml.bl_idname, icon="FILE_TICK")
+        if rig_objects.yaml_path(scene):
+            _draw_build(layout.box(), scene)
+
+
+def _draw_build(layout: Any, scene: Any) -> None:
+    """Show the button that builds, and how far the build is."""
+    if preview.needs_checkout(scene):
+        layout.prop(scene, "plenoforge_checkout")
+    row = layout.row(align=True)
+    row.prop(scene, "plenoforge_preset", text="")
+    row.operator(BuildPreview.bl_idname, icon="RENDER_STILL")
+    row.operator(CancelBuild.bl_idname, icon="X")
+    if build := preview.last():
+        layout.label(text=build.title)
+        # A panel is about so wide.
+        for line in textwrap.wrap(build.state, 60):
+            layout.label(text=line)
+        if build.page:
+            opener = layout.operator("wm.url_open", text="Open its page", icon="URL")
+            opener.url = build.page.as_uri()
 
 
 def _draw_rig(layout: Any, scene: Any, empty: Any) -> None:
@@ -365,6 +424,7 @@ HANDLERS = (
 )
 CLASSES = (
     *(RigProperties, OpenYaml, WriteYaml, AddRig, RemoveRig, SelectRig, CheckRigs, ReadSilvr),
+    *(BuildPreview, CancelBuild),
     RigPanel,
 )
 
@@ -374,6 +434,12 @@ def register() -> None:
         bpy.utils.register_class(each)
     bpy.types.Object.plenoforge = bpy.props.PointerProperty(type=RigProperties)
     bpy.types.Scene.plenoforge_yaml = bpy.props.StringProperty(subtype="FILE_PATH")
+    bpy.types.Scene.plenoforge_checkout = bpy.props.StringProperty(
+        name="Plenoforge", description="Folder of the checkout that builds", subtype="DIR_PATH"
+    )
+    bpy.types.Scene.plenoforge_preset = bpy.props.EnumProperty(
+        name="Preset", items=[(name, name, "") for name in preview.PRESETS]
+    )
     for handlers, function in HANDLERS:
         handlers.append(function)
 
@@ -383,6 +449,9 @@ def unregister() -> None:
         bpy.app.timers.unregister(_check_now)
     for handlers, function in HANDLERS:
         handlers.remove(function)
+    preview.stop()
+    del bpy.types.Scene.plenoforge_preset
+    del bpy.types.Scene.plenoforge_checkout
     del bpy.types.Scene.plenoforge_yaml
     del bpy.types.Object.plenoforge
     for each in reversed(CLASSES):

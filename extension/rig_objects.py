@@ -15,12 +15,13 @@ from mathutils import Matrix
 
 from . import scene_file
 from .scripts.lightfield.core.errors import UserError
-from .scripts.lightfield.geometry.rigs import Rig, from_settings
+from .scripts.lightfield.geometry.rigs import Rig, fitted, from_settings
 from .scripts.lightfield.geometry.rigs.grid import Grid
 from .scripts.lightfield.geometry.rigs.orbit import Orbit
 from .scripts.lightfield.geometry.rigs.plane import Plane
 from .scripts.lightfield.geometry.rigs.sphere import Sphere
 from .scripts.lightfield.geometry.rotations import euler_to_matrix, matrix_to_euler
+from .scripts.lightfield.rendering.inspection import clearance
 
 KEY = "plenoforge_rig"
 COLLECTION = "Plenoforge rigs"
@@ -28,6 +29,8 @@ COLLECTION = "Plenoforge rigs"
 EDITABLE = (Grid, Orbit, Sphere)
 # The keys that count cameras.
 COUNTS = ("cameras", "subdivisions", "count")
+# Custom property of a scene: the box around its surfaces when a scene YAML was opened.
+_BOX = "plenoforge_box"
 # A rotation is the same if its matrix differs by less. Blender computes in 32 bits.
 _SAME = 1e-6
 
@@ -60,11 +63,11 @@ def folder(scene: Any) -> Path:
 def add(scene: Any, name: str, settings: dict[str, Any]) -> Any:
     """Add an Empty for a rig. Raises `UserError` for wrong settings."""
     with chdir(folder(scene)):
-        rig = from_settings(settings, name)
+        rig = _fitted(scene, from_settings(settings, name))
     empty = bpy.data.objects.new(name, None)
     empty.empty_display_type = "CUBE"
     empty.empty_display_size = 0.5
-    empty.location = rig.center
+    empty.location = rig.middle
     empty.rotation_euler = np.radians(rig.rotation)
     empty.scale = rig.sides
     keep(empty, name, settings)
@@ -90,11 +93,26 @@ def rig_of(scene: Any, empty: Any) -> tuple[Rig, dict[str, Any]]:
     """
     name, settings = kept(empty)
     with chdir(folder(scene)):
-        rig = from_settings(settings, name)
+        rig = _fitted(scene, from_settings(settings, name))
         if is_editable(rig):
             settings = {**settings, **_moved(name, empty, rig)}
-            rig = from_settings(settings, name)
+            rig = _fitted(scene, from_settings(settings, name))
     return rig, settings
+
+
+def measure(scene: Any) -> None:
+    """Keep the scene's box, which rigs with size: fit or center: fit follow until the next time."""
+    box = clearance.surface_box()
+    scene[_BOX] = [] if box is None or not np.isfinite(box).all() else box.ravel().tolist()
+
+
+def _fitted(scene: Any, rig: Rig) -> Rig:
+    """Return the rig with numbers for a size and a center that fit the scene's box, if it has one.
+
+    Raises `UserError` for a flat box that has no room for cameras.
+    """
+    numbers_of_box = np.array(scene.get(_BOX, []), float)
+    return fitted(rig, numbers_of_box.reshape(2, 3)) if len(numbers_of_box) else rig
 
 
 def is_editable(rig: Rig) -> bool:
@@ -118,7 +136,7 @@ def _moved(name: str, empty: Any, rig: Rig) -> dict[str, Any]:
     if min(empty.scale) < 0:
         raise UserError(f"{name}: its Empty has a negative scale; make it positive")
     keys: dict[str, Any] = {}
-    if not np.array_equal(np.float32(rig.center), empty.location):
+    if not np.array_equal(np.float32(rig.middle), empty.location):
         keys["center"] = numbers(empty.location)
     if not np.allclose(euler_to_matrix(np.radians(rig.rotation)), rotation, atol=_SAME):
         is_xyz = empty.rotation_mode == "XYZ"

@@ -14,7 +14,7 @@ use rule lightfield as panorama_lightfield with:
     input:
         PLAN.reads(
             PANORAMA_LIGHTFIELD,
-            inventory=RUN.of_dataset("blend_inventory"),
+            inventory=RUN.of_dataset("rig_inventory"),
             model=RUN.of_dataset("model_record"),
             calibration=RUN.of_dataset("calibration"),
         ),

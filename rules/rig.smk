@@ -10,7 +10,7 @@ rule free_places:
             FREE_PLACES,
             check=RUN.of_dataset("blend_check"),
             blend=RUN.of_dataset("blend"),
-            inventory=RUN.of_dataset("blend_inventory"),
+            inventory=RUN.of_dataset("rig_inventory"),
         ),
     output:
         places=update(RUN.paths.places),

@@ -8,6 +8,7 @@ import importlib
 import itertools
 import json
 import sys
+import time
 import types
 from pathlib import Path
 
@@ -163,6 +164,41 @@ def select(name):
 def undo():
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         bpy.ops.ed.undo()
+
+
+def build_of(seconds):
+    """Call the timer's function as Blender does, until the build has ended. Return its states."""
+    preview = package().preview
+    states = []
+    end = time.monotonic() + seconds
+    while (interval := preview.tick()) is not None:
+        assert time.monotonic() < end, states
+        states.append(preview.last().state)
+        time.sleep(interval)
+    return [*dict.fromkeys(states), preview.last().state]
+
+
+def started(seconds):
+    """Wait until the build has started its jobs. Return its process."""
+    preview = package().preview
+    end = time.monotonic() + seconds
+    while "views in" not in preview.last().state and "jobs" not in preview.last().state:
+        assert time.monotonic() < end, preview.last().state
+        time.sleep(0.5)
+        preview.tick()
+    return preview.last()._process.pid
+
+
+def pressed_for(button):
+    """Press a button. Return the seconds for which Blender could do nothing else."""
+    start = time.monotonic()
+    assert press(button) is None
+    return time.monotonic() - start
+
+
+def set_scene(**properties):
+    for name, value in properties.items():
+        setattr(bpy.context.scene, name, value)
 
 
 def is_undone():

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from checkouts import checkout
 from conftest import BLENDER, ROOT
 from geometry.test_rigs import EACH as OF_CAMERAS
 from geometry.test_rigs import registered
@@ -246,10 +247,32 @@ def test_a_rig_of_each_type_is_opened_and_checked(lens, blender, tmp_path):
     for number, name in enumerate(rigs):
         facts, panel = shown[3 * number + 1 : 3 * number + 3]
         assert {*facts} <= {*panel}
-        if name == "blend_camera":
+        if name in ("blend_camera", "random"):
             assert {"Cameras: known after the build", "Inside objects: not checked"} <= {*facts}
         else:
             assert "Inside objects: 0" in facts
+
+
+def test_a_rig_that_fits_the_scene_is_drawn_around_it_and_stays_so(blender, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "scene: {blend: mine.blend}\nrender: {samples: 1}\nrigs:\n"
+        "  around: {type: ring, count: 5, size: fit, center: fit, camera: "
+        "{lens: rectilinear, fov: 60, resolution: [32, 32]}}\n"
+    )
+    before = path.read_text()
+    middle = [3, -2, 1]
+    steps = (["ball", [middle, {}]], "register", opened(path), "rigs", written(path))
+    *_, shown, refused, moved, refused_again = blender(
+        *steps, ["change", ["around"], {"location__x": 4}], written(path)
+    )
+    assert (refused, moved, refused_again) == (None, None, None)
+    places, _ = cameras(shown["around"]["cameras"], 5)
+    distances = np.linalg.norm(places - middle, axis=1)
+    # The sphere around the ball's box has a radius of 0.173 m, and is in 60° from twice of it.
+    np.testing.assert_allclose(distances, 1.05 * 2 * 0.1 * 3**0.5, rtol=1e-3)
+    after = path.read_text()
+    assert after == before.replace("center: fit", "center: [4, -2, 1]")
 
 
 def test_the_panel_shows_the_active_rig(blender, project):
@@ -272,6 +295,8 @@ def test_the_panel_shows_the_active_rig(blender, project):
         "Resolution: 64 × 48",
         "Inside objects: 0",
         *("Check cameras", "Write YAML"),
+        # The folder is no checkout, so the panel asks for one.
+        *("", "tiny", "", "Build", "Cancel"),
     ]
 
 
@@ -294,6 +319,81 @@ def test_a_rig_is_added_below_the_last_one(blender, project):
         is None
     )
     assert path.read_text().startswith(f"{text}\n  ring_1:\n    type: ring\n")
+
+
+ROOM = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  Other: {type: ring, count: 900, size: 1, center: [0, 0, 1.2], camera: &lens {lens: equidistant,
+    fov: 180, resolution: [16, 16]}}
+  View: {type: ring, count: 3, size: 1, center: [0, 0, 1.2], camera: *lens}
+"""
+
+
+@pytest.fixture
+def built_checkout(tmp_path):
+    """A checkout whose environment is the tests' own."""
+    gone = ROOM.replace("builder: room", "blend: gone.blend")
+    folder = checkout(tmp_path / "plenoforge", mine=ROOM, gone=gone)
+    (folder / ".venv").symlink_to(sys.prefix)
+    return folder
+
+
+def test_the_panel_builds_the_chosen_rig_and_shows_its_page(blender, built_checkout):
+    yaml_path = built_checkout / "configs/scenes/mine.yaml"
+    *_, before, seconds, during, states, after, _, again = blender(
+        *("register", opened(yaml_path), ["select", ["View"]], "panel"),
+        *(["pressed_for", ["build"]], "panel", ["build_of", [300]], "panel"),
+        *(["pressed_for", ["build"]], ["build_of", [120]]),
+    )
+    assert "Build" in before and "Cancel" in before
+    assert seconds < 2
+    assert "mine, View, tiny" in during
+    assert states[-1] == again[-1] == "valid"
+    assert {"valid", "Open its page"} <= {*after}
+    results = built_checkout / "results/mine_tiny"
+    assert [path.name for path in results.iterdir()] == ["View"]
+    assert json.loads((results / "View/validation.json").read_text())["valid"]
+    assert len(list((results / "View/exr").iterdir())) == 3
+
+
+def test_the_panel_shows_the_line_of_the_error(blender, built_checkout):
+    yaml_path = built_checkout / "configs/scenes/gone.yaml"
+    steps = ("register", opened(yaml_path), ["select", ["View"]], ["pressed_for", ["build"]])
+    *_, states, texts = blender(*steps, ["build_of", [120]], "panel")
+    assert "gone.blend" in states[-1] and "Traceback" not in states[-1]
+    assert "gone.blend" in " ".join(texts)
+
+
+def is_of_group(stat, group):
+    """Return whether a process of /proc works in a process group."""
+    try:
+        state, _, process_group, *_ = stat.read_text().rpartition(")")[2].split()
+    except OSError:
+        return False
+    return int(process_group) == group and state != "Z"
+
+
+def test_a_cancelled_build_leaves_no_process(blender, built_checkout):
+    yaml_path = built_checkout / "configs/scenes/mine.yaml"
+    *_, process, _, states = blender(
+        *("register", opened(yaml_path), ["select", ["Other"]]),
+        *(["set_scene", [], {"plenoforge_preset": "preview"}], ["pressed_for", ["build"]]),
+        *(["started", [120]], ["pressed_for", ["cancel_build"]], ["build_of", [60]]),
+    )
+    assert states[-1] == "cancelled"
+    assert not [path for path in Path("/proc").glob("[0-9]*/stat") if is_of_group(path, process)]
+
+
+def test_a_build_is_refused_until_the_yaml_has_the_rig_as_drawn(blender, project, tmp_path):
+    yaml_path = project / "configs/scenes/mine.yaml"
+    *_, no_checkout, _, moved = blender(
+        *("register", opened(yaml_path), ["select", ["wall"]], ["press", ["build"]]),
+        *(["change", ["wall"], {"location__x": 5}], ["press", ["build"]]),
+    )
+    assert "is no checkout of Plenoforge; choose it in the panel" in no_checkout
+    assert "wall: is not in mine.yaml as it is drawn; press Write YAML" in moved
 
 
 def test_opening_and_writing_leaves_every_scene_yaml_as_it_is(blender, tmp_path):

@@ -15,7 +15,7 @@ from lightfield.core.files import read_keys, reading
 from lightfield.core.names import FILE
 from lightfield.engine.stage import cause
 from lightfield.formats import blend
-from lightfield.formats.inventory import read_inventory
+from lightfield.formats.inventory import read_inventory, scene_box
 from lightfield.formats.lightfield import MODEL_PLACEMENT, OMNIDIRECTIONAL
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
@@ -60,12 +60,18 @@ class Capture:
         )
 
     def resolved(self, inventory: Path) -> Self:
-        """Return the capture with the values of a user's .blend, which its ``inventory`` lists.
+        """Return the capture with what the ``inventory`` of its scene says.
 
-        Raises `UserError` if the .blend lacks something that the scene YAML needs.
+        These are the values of a user's .blend, and the size and center of a rig that fits the
+        scene's box. Raises `UserError` if the scene lacks something that the scene YAML needs.
         """
-        if not self.source.blend:
-            return self
+        capture = self._of_blend(inventory) if self.source.blend else self
+        if not capture.rig.is_fitted:
+            return capture
+        return replace(capture, rig=rigs.fitted(capture.rig, scene_box(inventory)))
+
+    def _of_blend(self, inventory: Path) -> Self:
+        """Return the capture with the values of a user's .blend."""
         content = read_inventory(inventory, "blend", "external_files")
         with reading(inventory, "inventory"):
             facts = content["blend"]
@@ -237,8 +243,8 @@ class LightfieldSettings(Settings):
     def of_capture(cls, capture: Capture, panorama_width: int | None = None, **keys: Any) -> Self:
         """Return the settings for a capture, or for its panorama. ``keys`` are the other keys."""
         rig = capture.rig
-        # The centre of a .blend's camera is unknown until the .blend has been read.
-        if panorama_width and not isinstance(rig, BlendCamera):
+        # These centres are unknown until the scene has been read.
+        if panorama_width and not (isinstance(rig, BlendCamera) or rig.is_fitted):
             rig = panorama_rig(rig, panorama_width)
         return cls.of(
             scene=capture.scene_name,
@@ -266,7 +272,7 @@ def panorama_rig(rig: Rig, width: int) -> Rig:
         {
             "type": "lattice",
             "cameras": [1, 1, 1],
-            "center": rig.center,
+            "center": rig.middle.tolist(),
             "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
         }
     )

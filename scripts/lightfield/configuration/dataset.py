@@ -179,7 +179,12 @@ class Dataset(Capture):
     @property
     def lightfield_inventory(self) -> str | None:
         """The inventory on which lightfield.json depends: also for the names of light groups."""
-        return self.inventory if self.render.light_groups else self.blend_inventory
+        return self.inventory if self.render.light_groups else self.rig_inventory
+
+    @property
+    def rig_inventory(self) -> str | None:
+        """The inventory on which the places of the cameras depend, if they fit the scene's box."""
+        return self.inventory if self.rig.is_fitted else self.blend_inventory
 
     @property
     def calibration(self) -> str | None:

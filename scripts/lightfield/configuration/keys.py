@@ -24,7 +24,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import BUILDERS, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
-from lightfield.formats.lightfield import MACHINE, MODEL_PLACEMENT, LightField, View
+from lightfield.formats.lightfield import MACHINE, MODEL_PLACEMENT, RIG_FIT, LightField, View
 from lightfield.imaging.blender_looks import FILE_LOOK
 
 # The versions of the steps that make views. The keys of the views that a step concerns have its
@@ -136,8 +136,8 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
 
 
 # The keys of lightfield.json that change no view. Views are light, whatever look is given to
-# versions of them. A model's fingerprint says how it is placed.
-_NOT_OF_VIEWS = (MACHINE, FILE_LOOK, MODEL_PLACEMENT)
+# versions of them. A model's fingerprint says how it is placed, and the poses where the rig is.
+_NOT_OF_VIEWS = (MACHINE, FILE_LOOK, MODEL_PLACEMENT, RIG_FIT)
 
 
 def render_key(lightfield: LightField, view: View) -> str:

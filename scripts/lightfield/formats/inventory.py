@@ -3,11 +3,14 @@
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter
 
 # Pydantic needs this one in Python 3.11.
 from typing_extensions import TypedDict
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys
 from lightfield.settings.base import checked
 
@@ -29,6 +32,7 @@ class _Inventory(TypedDict, total=False):
     __pydantic_config__ = ConfigDict(strict=True)  # type: ignore[misc]
 
     blend: dict[str, Any]
+    box: list[list[float]] | None
     emitters: list[str]
     external_files: list[_ExternalFile]
     hidden: list[str]
@@ -47,3 +51,17 @@ def read_inventory(path: Path | str, *keys: str) -> dict[str, Any]:
     content = read_keys(path, "inventory.py", *keys)
     checked(_INVENTORY, content, str(path))
     return content
+
+
+def scene_box(path: Path | str) -> NDArray[np.float64]:
+    """Return the box (2, 3) in metres of the scene of an inventory.
+
+    Raises `UserError` if the scene has none, or if no rig needs it.
+    """
+    box = read_inventory(path, "box")["box"]
+    if box is None:
+        raise UserError(
+            f"{path}: box: the scene has none, because it shows no surface, or one whose places "
+            "are not finite; give the rig its size and center in metres"
+        )
+    return np.array(box, np.float64).reshape(2, 3)

@@ -47,6 +47,8 @@ EXPOSURE = "exposure"
 # The properties of the machine that made the file, as far as they change bytes. Each view names its
 # own machine.
 MACHINE = "machine"
+# The size and center of a rig that fits the scene's box, in metres.
+RIG_FIT = "rig_fit"
 # How a model came into the unit box: its shift in metres, and then its scale.
 MODEL_PLACEMENT = "model_placement"
 
@@ -337,6 +339,17 @@ class LightField:
             raise UserError(
                 f"{self.path}: frames: are {len(self.views)}, but its rig has {rig.view_count}"
             )
+
+    def placed(self, rig: "rigs.Rig") -> "rigs.Rig":
+        """Return the rig with the size and center that it has here, if they fit the scene's box."""
+        if not rig.is_fitted:
+            return rig
+        place = self._key(RIG_FIT)
+        size, center = (
+            tuple(value) if isinstance(value, list) else value
+            for value in (place.get("size"), place.get("center"))
+        )
+        return rig.model_copy(update={"size": size, "center": center})
 
     def require_centre(self) -> None:
         """Raise `UserError` if the rays of a view do not start from one point."""

@@ -32,7 +32,7 @@ def sees_all_round(rig: Rig) -> bool:
     places = np.array([pose.position for pose in poses])
     turns = euler_to_matrix(np.array([pose.rotation for pose in poses]))
     x, y = np.moveaxis(lens.pixels(directions @ turns), -1, 0)
-    side = (places - np.array(rig.center)) @ directions.T
+    side = (places - rig.middle) @ directions.T
     seen = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height) & (side >= -1e-9)
     return bool(seen.any(axis=0).mean() >= _SEEN_PART)
 
@@ -44,7 +44,7 @@ def middle_view(rig: Rig) -> int:
     that looks along +Y. A rig without rows has the middle view of its order.
     """
     poses = rig.poses()[:: rig.views_a_position]
-    places = (np.array([pose.position for pose in poses]) - np.array(rig.center)) @ rig.turn
+    places = (np.array([pose.position for pose in poses]) - rig.middle) @ rig.turn
     row = rig.middle_row(places) or range(len(poses))
     middle = row[len(row) // 2]
     if rig.is_round and len(row) < len(poses):

@@ -46,7 +46,7 @@ def write(job: ReportHtml) -> None:
     name = job.dataset_name
     dataset = OpenDataset.in_folder(folder)
     lightfield = dataset.lightfield
-    rig = job.settings.rig
+    rig = lightfield.placed(job.settings.rig)
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     look = job.settings.look.resolved(lightfield) if job.settings.look else None

@@ -55,7 +55,7 @@ def find_row(rig: Rig, world_from_cameras: Array) -> Row | None:
     if rig.is_omnidirectional:
         return None
     faces = rig.views_a_position
-    local = (world_from_cameras[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
+    local = (world_from_cameras[::faces, :3, 3] - rig.middle) @ rig.turn
     numbers = rig.middle_row(local)
     if len(numbers) < _FEWEST_CAMERAS:
         return None

@@ -50,10 +50,10 @@ class Overview:
 def draw(job: ReportFigures) -> None:
     """Write all pictures of a dataset."""
     dataset = job.dataset
-    rig = job.settings.rig
     output = job.output
     opened = OpenDataset.in_folder(dataset)
     lightfield = opened.lightfield
+    rig = lightfield.placed(job.settings.rig)
     lightfield.require_rig(rig)
     views = [view.path for view in opened.views]
     lens = lightfield.lens

@@ -7,6 +7,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from lightfield.configuration.exports import Exports
 from lightfield.configuration.keys import import_version
 from lightfield.configuration.scene_source import (
     BUILDER,
@@ -23,7 +24,7 @@ from lightfield.configuration.scene_source import (
 from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.rigs.rig import Frame
-from lightfield.settings.base import Settings
+from lightfield.settings.base import Name, Settings
 
 
 class BuildSettings(Settings):
@@ -143,6 +144,9 @@ class InventorySettings(Settings):
     light_groups: str | list[str] | dict[str, list[str]] | None = Field(
         None, description="As in the scene YAML."
     )
+    measures_box: bool | None = Field(
+        None, description="Whether to measure the scene's box, because a rig fits it."
+    )
 
 
 class Inventory(Stage[InventorySettings]):
@@ -163,3 +167,16 @@ class Inventory(Stage[InventorySettings]):
     def shared(self) -> Iterator[Path]:
         files = read_inventory(self.output, "external_files")["external_files"]
         yield from (self.blend.parent / file["path"] for file in files)
+
+
+class NewScene(PlainStage):
+    """Writes the scene YAML of a user's own .blend, model file or folder of views."""
+
+    name = "new_scene"
+    function = "lightfield.rendering.imports.new_scene:write"
+
+    file: Path = reads("a .blend, a model file, or a folder of views", positional=True)
+    scene: Name | None = option("name of the scene (default: the name of the file)", None)
+    export: str | None = option(
+        "format of an export of the views", None, enum=[*Exports.model_fields]
+    )

@@ -271,13 +271,15 @@ class Build:
 
         Empty for a rig whose cameras span no surface, because nothing lies between them.
         """
-        if dataset.rig.cells() is None:
+        # How far a rig reaches that fits the scene is unknown before the scene is read.
+        if dataset.rig.cells() is None or dataset.rig.is_fitted:
             return []
         return [
             other
             for other in self.chosen
             if other.scene_folder == dataset.scene_folder
             and other.rig.cells() is not None
+            and not other.rig.is_fitted
             and _reach(other) < _reach(dataset)
         ]
 

@@ -60,7 +60,7 @@ def free_places(dataset: Dataset) -> Fields | None:
         return None
     return {
         "blend": dataset.blend,
-        "inventory": dataset.blend_inventory,
+        "inventory": dataset.rig_inventory,
         "output": dataset.places,
     }
 

@@ -163,6 +163,7 @@ def inventory(dataset: Dataset) -> InventorySettings:
         look_version=1 if any(each.uses_file_look for each in datasets) else None,
         followed_camera=source.followed_camera,
         light_groups=written.render.light_groups or None,
+        measures_box=any(each.rig.is_fitted for each in datasets) or None,
     )
 
 

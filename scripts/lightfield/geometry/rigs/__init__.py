@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, TypeAdapter
 from lightfield.geometry.rigs.blend_camera import BlendCamera
 from lightfield.geometry.rigs.cuboid import Cuboid
 from lightfield.geometry.rigs.cylinder import Cylinder
+from lightfield.geometry.rigs.fit import fitted
 from lightfield.geometry.rigs.grid import Grid
 from lightfield.geometry.rigs.hemisphere import Hemisphere
 from lightfield.geometry.rigs.lattice import Lattice
@@ -37,6 +38,7 @@ __all__ = [
     "Rig",
     "Sphere",
     "as_written",
+    "fitted",
     "from_settings",
 ]
 

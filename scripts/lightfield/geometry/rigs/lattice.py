@@ -12,6 +12,8 @@ from lightfield.geometry.rigs.rig import UnitPoses, stack
 class Lattice(BoxGrid):
     """Cameras that fill a box, all looking along +Y."""
 
+    looks = "ahead"
+
     type: Literal["lattice"]
 
     def unit_poses(self) -> UnitPoses:

@@ -30,6 +30,7 @@ class Orbit(CountedRig):
 
     shape = "SPHERE"
     is_round = True
+    looks = "inward"
 
     @model_validator(mode="after")
     def _faces_inside_already(self) -> Self:

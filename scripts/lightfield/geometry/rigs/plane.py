@@ -17,6 +17,7 @@ class Plane(Grid):
 
     shape = "PLANE"
     fewest = (2, 2)
+    looks = "ahead"
 
     type: Literal["plane"]
     cameras: Annotated[tuple[Count, Count], as_list(2)] = Field(
@@ -41,7 +42,7 @@ class Plane(Grid):
     @property
     def extent(self) -> float | tuple[float, float, float]:
         if self.baseline is None:
-            return self.size
+            return super().extent
         columns, rows = self.cameras
         return (self.baseline * (columns - 1), 0.0, self.baseline * (rows - 1))
 

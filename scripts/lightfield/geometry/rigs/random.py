@@ -25,6 +25,7 @@ class Random(CountedRig):
     """
 
     shape = "CUBOID"
+    looks = "anywhere"
 
     type: Literal["random"]
     seed: int = Field(

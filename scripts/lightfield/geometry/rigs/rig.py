@@ -34,6 +34,8 @@ build_settings()
 Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
+# What a scene YAML says in place of a size or a center that follow from the scene's box.
+FIT = "fit"
 
 
 @dataclass(frozen=True)
@@ -146,18 +148,23 @@ class Rig(Settings):
     is_round: ClassVar[bool] = False
     # Whether the rig is as large as the box around its cameras, whatever its ``size``.
     is_loose: ClassVar[bool] = False
+    # Where the cameras look, unless face_inside or look_at turns them: at the middle, away from
+    # it, all along one axis, or each somewhere else.
+    looks: ClassVar[Literal["inward", "outward", "ahead", "anywhere"]] = "outward"
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
 
     type: str = Field(description="Type of the rig, which says how the cameras are placed.")
-    size: Size = Field(
+    size: Size | Literal["fit"] = Field(
         1,
-        description="Size of the rig: one number for all axes, or one each for x, y and z.",
+        description="Size of the rig: one number for all axes, or one each for x, y and z. fit: "
+        "it follows from the scene's box, from the rig's type and from its lens.",
         json_schema_extra={"unit": "m"},
     )
-    center: Vector = Field(
+    center: Vector | Literal["fit"] = Field(
         (0, 0, 0),
-        description="Position of the rig's middle in the world.",
+        description="Position of the rig's middle in the world. fit: the middle of the scene's "
+        "box, or a place before it if all cameras look one way.",
         json_schema_extra={"unit": "m"},
     )
     rotation: Vector = Field(
@@ -205,6 +212,25 @@ class Rig(Settings):
         if self.stereo is not None and self.cube_map:
             raise ValueError("stereo: does not go with cube_map")
         return self
+
+    @model_validator(mode="after")
+    def _fits_if_it_is_free(self) -> Self:
+        for key in ("size", "center"):
+            if self.is_loose and getattr(self, key) == FIT:
+                raise ValueError(
+                    f"{key}: fit does not go with type {self.type}, whose places are given; give "
+                    "numbers"
+                )
+        return self
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the size or the center follows from the scene's box.
+
+        Until `fit.fitted` has replaced them by numbers, the size counts as 1 m and the center as
+        the origin.
+        """
+        return FIT in (self.size, self.center)
 
     @property
     def positions(self) -> int:
@@ -279,13 +305,18 @@ class Rig(Settings):
 
     def to_world(self, points: Floats) -> Floats:
         """Return points (..., 3) of the unit box in world coordinates, in metres."""
-        placed: Floats = points * self.sides @ self.turn.T + np.asarray(self.center, dtype=float)
+        placed: Floats = points * self.sides @ self.turn.T + self.middle
         return placed
 
     @property
     def extent(self) -> float | tuple[float, float, float]:
         """The size in metres, as the scene YAML gives it, or as it follows from other keys."""
-        return self.size
+        return 1.0 if isinstance(self.size, str) else self.size
+
+    @property
+    def middle(self) -> Floats:
+        """The middle (3,) of the rig in the world, in metres."""
+        return np.zeros(3) if isinstance(self.center, str) else np.asarray(self.center, dtype=float)
 
     @property
     def sides(self) -> Floats:

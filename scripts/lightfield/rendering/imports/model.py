@@ -485,11 +485,16 @@ def _scale_to_box(path: Path, box: Box) -> dict[str, Any]:
     return {"shift": (-box.mean(0) + 0.0).tolist(), "scale": 1 / side}
 
 
+def is_plausible(side: float) -> bool:
+    """Return whether the largest side of a model may be a number of metres."""
+    return _PLAUSIBLE[0] <= side <= _PLAUSIBLE[1]
+
+
 def _placed(shift: Sequence[float], scale: float) -> str:
     """Return how a model came into the unit box, in words, and whether metres fit, too."""
     said = f"moved by ({', '.join(f'{each:.4g}' for each in shift)}), scaled by {scale:.4g}"
     side = 1 / scale
-    if _PLAUSIBLE[0] <= side <= _PLAUSIBLE[1]:
+    if is_plausible(side):
         said += (
             f"; its largest side, {side:.4g} in the file, is plausible in metres: unit: metres "
             "keeps its size and place"

@@ -9,9 +9,10 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.formats.inventory import read_inventory
+from lightfield.formats.inventory import read_inventory, scene_box
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import framing
+from lightfield.geometry.rigs import fitted
 from lightfield.geometry.rotations import Floats
 from lightfield.rendering.inspection import clearance, light
 from lightfield.rendering.inspection.clearance import REACH
@@ -26,6 +27,10 @@ def write_places(job: FreePlaces) -> None:
     settings = job.settings
     rig = settings.rig
     contents = _contents(job.inventory)
+    if rig.is_fitted:
+        if job.inventory is None:
+            raise UserError("--inventory: is missing; scripts/inventory.py measures the scene")
+        rig = fitted(rig, scene_box(job.inventory))
     blend_file.open_scene(job.blend, settings.model_dump(), contents)
     if isinstance(settings.frame, int):
         frames.go_to(settings.frame)

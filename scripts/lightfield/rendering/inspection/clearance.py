@@ -37,6 +37,8 @@ _DIRECTIONS = 3
 _RAYS = len(icosphere(1))
 # Types of objects that views show without depth, and types that views do not show.
 _WITHOUT_DEPTH = {"GREASEPENCIL", "VOLUME"}
+# Types of objects beside meshes that have a surface or a volume.
+_OTHER_SOLIDS = {"CURVE", "CURVES", "FONT", "META", "POINTCLOUD", "SURFACE", "VOLUME"}
 _SHOW_NOTHING = {"ARMATURE", "CAMERA", "EMPTY", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
 
@@ -82,10 +84,12 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
             yield obj.data, world_from_object, *_box(world_from_object, obj.bound_box)
 
 
-def _rendered() -> Iterator[tuple[Any, Any]]:
-    """Yield every rendered object and instance, and its world matrix."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    for instance in depsgraph.object_instances:
+def _rendered(depsgraph: Any = None) -> Iterator[tuple[Any, Any]]:
+    """Yield every rendered object and instance, and its world matrix.
+
+    Without a ``depsgraph``, the viewport's counts.
+    """
+    for instance in (depsgraph or bpy.context.evaluated_depsgraph_get()).object_instances:
         obj = instance.object
         # Particles may show copies of an object that is hidden itself.
         if instance.show_self and (instance.is_instance or not obj.hide_render):
@@ -98,6 +102,40 @@ def _box(world_from_object: Any, corners: Iterable[Any]) -> Floats:
     return np.array([places.min(axis=0), places.max(axis=0)])
 
 
+def surface_box(depsgraph: Any = None) -> Floats | None:
+    """Return the box (2, 3) around all that has a surface or a volume. None without any.
+
+    Shadow catchers do not count: they are floors for shadows. Without a ``depsgraph``, what the
+    viewport shows counts. Coordinates may be NaN.
+    """
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for obj, world_from_object in _rendered(depsgraph):
+        is_mesh = obj.type == "MESH"
+        if not (is_mesh and obj.data.polygons) and obj.type not in _OTHER_SOLIDS:
+            continue
+        box = _box(world_from_object, obj.bound_box)
+        if obj.is_shadow_catcher or ((box >= low) & (box <= high)).all():
+            continue
+        # The bounding box of a turned object is larger than the object.
+        if is_mesh:
+            matrix = np.array(world_from_object)
+            points = _corners(obj.data) @ matrix[:3, :3].T + matrix[:3, 3]
+            box = np.array([points.min(axis=0), points.max(axis=0)])
+        low, high = np.minimum(low, box[0]), np.maximum(high, box[1])
+    return None if np.isinf(low).all() else np.array([low, high])
+
+
+def _corners(mesh: Any) -> NDArray[np.float32]:
+    """Return the vertices (n, 3) of a mesh that are corners of faces."""
+    coordinates = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", coordinates)
+    numbers = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", numbers)
+    is_corner = np.zeros(len(mesh.vertices), np.bool_)
+    is_corner[numbers] = True
+    return coordinates.reshape(-1, 3)[is_corner]
+
+
 def outermost_points() -> Floats:
     """Return points (n, 3) of the open scene's meshes, without shadow catchers.
 
@@ -107,16 +145,14 @@ def outermost_points() -> Floats:
     farthest = np.full(len(directions), -np.inf)
     points = np.zeros(directions.shape)
     for obj, world_from_object in _rendered():
-        if obj.type != "MESH" or obj.is_shadow_catcher or not len(obj.data.vertices):
+        if obj.type != "MESH" or obj.is_shadow_catcher or not obj.data.polygons:
             continue
         matrix = np.array(world_from_object)
         corners = np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]
         is_farther = (corners @ directions.T).max(axis=0) > farthest
         if not is_farther.any():
             continue
-        local = np.empty(3 * len(obj.data.vertices), np.float32)
-        obj.data.vertices.foreach_get("co", local)
-        places = local.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+        places = _corners(obj.data) @ matrix[:3, :3].T + matrix[:3, 3]
         for index in np.flatnonzero(is_farther):
             along = places @ directions[index]
             nearest = int(along.argmax())

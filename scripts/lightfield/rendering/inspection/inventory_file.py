@@ -24,6 +24,7 @@ from lightfield.rendering.inspection import (
     blend_facts,
     external_files,
     light,
+    scene_box,
     scene_memory,
     simulations,
     unknown_colours,
@@ -118,6 +119,8 @@ def write(
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
+    if settings.measures_box:
+        contents["box"] = scene_box.measure(shown_frames)
     if is_own:
         frames.go_to(shown_frames[0])
         try:

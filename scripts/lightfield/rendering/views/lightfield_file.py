@@ -12,7 +12,7 @@ from lightfield.core.names import FILE
 from lightfield.engine.read_files import changed_since_plan, check_since_plan
 from lightfield.formats import blend, light_groups, published
 from lightfield.formats.inventory import read_inventory
-from lightfield.formats.lightfield import MACHINE, LightField
+from lightfield.formats.lightfield import MACHINE, RIG_FIT, LightField
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.imaging.blender_looks import FILE_LOOK
@@ -53,7 +53,7 @@ def from_settings(
     capture = settings.capture
     if inventory:
         capture = capture.resolved(inventory)
-    elif capture.source.blend:
+    elif capture.source.blend or capture.rig.is_fitted:
         raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
     if model:
         capture = capture.of_model(model)
@@ -72,6 +72,11 @@ def from_settings(
             raise UserError("--places: is missing; scripts/free_places.py writes it")
         capture = replace(capture, rig=capture.rig.placed(places))
     keys = capture.origin
+    if settings.rig.is_fitted and not settings.panorama_width:
+        fitting = capture.rig.model_dump(mode="json", include={"size", "center"})
+        keys[RIG_FIT] = fitting
+        text = ", ".join(f"{key}: {_shown(value)}" for key, value in fitting.items())
+        print(f"note: the {capture.rig.type} fits the box of {settings.scene}: {text}")
     # Imported views were rendered on another machine.
     if capture.imported:
         assert isinstance(capture.rig, rigs.Poses)
@@ -87,6 +92,13 @@ def from_settings(
     if capture.render.camera_motion:
         lightfield = lightfield.with_exposure()
     return lightfield
+
+
+def _shown(value: float | list[float]) -> str:
+    """Return a number, or a list of numbers, as a scene YAML has it."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_shown, value))}]"
+    return f"{value:.6g}"
 
 
 def _file_look(path: str | None, inventory: Path | None) -> dict[str, Any]:
