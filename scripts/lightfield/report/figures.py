@@ -19,9 +19,11 @@ from matplotlib.ticker import FuncFormatter
 from lightfield.core.errors import UserError
 from lightfield.export.trainer_splits import splits
 from lightfield.formats.layout import IMAGES
-from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.lightfield import NAME, LightField, View
+from lightfield.geometry.depth import converted
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs.grid import box_outline
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
@@ -35,6 +37,13 @@ _ELEVATION = 24.0
 MISS = "#b0b0b0"
 # The noise map has about this many blocks across.
 _NOISE_BLOCKS = 128
+# The box of a scene follows from so many views, with so many points across each. This part in
+# percent of the points may lie outside on each side.
+_BOX_VIEWS = 8
+_BOX_POINTS = 96
+_OUTSIDE = 0.1
+# A scene is drawn if it is at most so many times as long as the rig.
+_LARGEST_SCENE = 4.0
 _PART_COLOURS = {None: BLUE, "train": BLUE, "validation": ORANGE, "test": PURPLE}
 DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no depth"}
 
@@ -58,15 +67,17 @@ def draw(job: ReportFigures) -> None:
     lightfield.require_rig(rig)
     views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
     lens = lightfield.lens
-    thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]
+    layout = contact_sheet.layout(rig, len(views))
+    shown = [views[number] for number in layout.views]
     look = job.settings.look.resolved(lightfield) if job.settings.look else None
-    sheet = contact_sheet.sheet(thinned, lens.width, lens.height, look)
+    sheet = contact_sheet.sheet(shown, lens.width, lens.height, look, layout.columns)
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
     if job.settings.chooses_tests:
         tests = {view.name for view in splits(lightfield).test}
         parts = ["test" if view.name in tests else "train" for view in lightfield.views]
-    draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts)
+    box = scene_box(dataset / IMAGES, lightfield)
+    draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts, box)
     if job.panorama:
         overview = _read_panorama(job.panorama)
     else:
@@ -100,10 +111,43 @@ def read_view(path: Path, lightfield: LightField) -> Overview:
     return Overview(colour, np.where(outside, np.nan, depth).astype(np.float32), False, label)
 
 
-def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) -> None:
+def scene_box(folder: Path, lightfield: LightField) -> Array | None:
+    """Return the lowest and the highest corner (2, 3) of what some views show, in metres.
+
+    ``folder`` holds the views. None if they have no depth, or hit nothing.
+    """
+    if lightfield.depth is None:
+        return None
+    step = math.ceil(len(lightfield.views) / _BOX_VIEWS)
+    points = [_points_of(folder, lightfield, view) for view in lightfield.views[::step]]
+    seen = np.concatenate(points)
+    return np.percentile(seen, [_OUTSIDE, 100 - _OUTSIDE], axis=0) if len(seen) else None
+
+
+def _points_of(folder: Path, lightfield: LightField, view: View) -> Array:
+    """Return points (n, 3) of the world that a view shows. None of them if it cannot be read."""
+    assert lightfield.depth
+    overview = read_view(folder / f"{view.name}.exr", lightfield)
+    every = math.ceil(overview.depth.shape[1] / _BOX_POINTS)
+    rays = lightfield.lens.pixel_rays()[::every, ::every]
+    depth = overview.depth[::every, ::every]
+    distance = converted(depth, rays, lightfield.depth, "distance")
+    is_hit = np.isfinite(distance) & (distance > 0)
+    points: Array = (rays * distance[..., None])[is_hit] @ view.world_from_camera[:3, :3].T
+    return points + view.world_from_camera[:3, 3]
+
+
+def draw_rig(
+    stem: Path,
+    rig: Rig,
+    poses: Array,
+    parts: Sequence[str | None],
+    scene: Array | None = None,
+) -> None:
     """Draw each camera as a dot with an arrow along its view, as Figure 2 of the SILVR paper does.
 
     ``poses`` are (n, 4, 4). ``parts`` (n,) of the split, such as train and test, have colours.
+    ``scene`` (2, 3) is the scene's box. It is drawn only if the rig does not look lost in it.
     """
     turn = np.radians(_AZIMUTH)
     rise = np.radians(_ELEVATION)
@@ -120,8 +164,17 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
     near = np.linspace(0.35, 1.0, len(poses))
     ends = places[order] + arrow * forwards[order]
     lines = [line @ screen for line in rig.outline()]
+    box = []
+    if scene is not None and np.linalg.norm(scene[1] - scene[0]) <= _LARGEST_SCENE * extent:
+        sides = [line + 0.5 for line in box_outline()]
+        box = [(scene[0] + side * (scene[1] - scene[0])) @ screen for side in sides]
     with plot(stem, size=(7, 6)) as axes:
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
+        if box:
+            edges = LineCollection(box, colors=ORANGE, linewidths=0.8, linestyles="dashed")
+            edges.set_gid("scene")
+            axes.add_collection(edges)
+            axes.plot([], [], color=ORANGE, linewidth=0.8, linestyle="dashed", label="scene")
         start = places[order] @ screen
         end = ends @ screen
         axes.quiver(
@@ -148,9 +201,9 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
             axes.scatter(
                 [], [], s=20, color=_PART_COLOURS[part], label=f"{part} {parts.count(part)}"
             )
-        if any(parts):
+        if any(parts) or box:
             axes.legend(loc="upper right")
-        _draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
+        _draw_axes(axes, screen, np.concatenate([start, end, *lines, *box]), extent)
         axes.set_aspect("equal")
         axes.set_axis_off()
 
