@@ -150,16 +150,15 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
 
     Raises `UserError` if the file is refused.
     """
-    from lightfield.workflow.loading import datasets_of
-
     from lightfield.configuration.config_file import Preset
     from lightfield.configuration.scene_yaml import Scene
     from lightfield.core.files import sha256
     from lightfield.imaging import images
+    from lightfield.planning.loading import datasets_of
     from lightfield.rendering.inspection import inventory_file
     from lightfield.rendering.views import lightfield_file
-    from lightfield.stages import job_settings
     from lightfield.stages.views import RenderShard
+    from lightfield.workflow import job_settings
 
     camera = {"lens": "file", "resolution": [SIDE, SIDE]}
     scene = Scene.model_validate(
@@ -180,7 +179,8 @@ def of_plenoforge(path: Path, folder: Path) -> tuple[Array, list[str], str]:
     inventory = folder / "inventory.json"
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(io.StringIO()):
-        inventory_file.write_of_datasets(path, scene, [dataset], inventory, False)
+        settings = job_settings.inventory(dataset)
+        inventory_file.write(path, settings, [dataset], inventory, False)
         views = lightfield_file.from_settings(job_settings.lightfield(dataset), inventory)
         lightfield = folder / "lightfield.json"
         views.write(lightfield)

@@ -143,11 +143,11 @@ def a_build(views: int) -> None:
     seconds = row(f"build of {count} views of 8² in {len(dataset.shards)} shards")
     row("run with nothing to do")
     row("plan with nothing to do", "--dry-run")
-    print("| its stage | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |")
-    for stage in read_json(Path(dataset.paths.costs))["stages"]:
+    print("| its jobs | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |")
+    for kind in read_json(Path(dataset.paths.costs))["stages"]:
         print(
-            f"| {stage['stage']}, {stage['jobs']} jobs | {stage['wall_seconds']:.1f} "
-            f"| {stage['cpu_seconds']:.1f} | {stage['peak_memory_bytes'] / 1e6:.0f} |"
+            f"| {kind['stage']}, {kind['jobs']} jobs | {kind['wall_seconds']:.1f} "
+            f"| {kind['cpu_seconds']:.1f} | {kind['peak_memory_bytes'] / 1e6:.0f} |"
         )
     wall, cpu, memory = job_times(Path(f"work/benchmarks/{dataset.name}/report/page.tsv"))
     print(f"| page | {wall:.1f} | {cpu:.1f} | {memory / 1e6:.0f} |")

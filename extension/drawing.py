@@ -138,13 +138,14 @@ def check(scene: Any) -> float:
         obj.hide_viewport = True
     bpy.context.view_layer.update()
     try:
-        for parts, rig in rigs:
-            parts["cameras"][INSIDE] = np.flatnonzero(_are_inside(cameras(scene, rig))).tolist()
+        inside = [np.flatnonzero(_are_inside(cameras(scene, rig))).tolist() for _, rig in rigs]
     finally:
         for obj in hidden:
             obj.hide_viewport = False
-    for parts, rig in rigs:
-        _draw(parts, rig, cameras(scene, rig), parts["cameras"][INSIDE])
+    for (parts, rig), numbers in zip(rigs, inside, strict=True):
+        placed = cameras(scene, rig)
+        # Nobody knows yet whether cameras without a place are inside objects.
+        _draw(parts, rig, placed, numbers if len(placed.world_from_cameras) else None)
     return time.monotonic() - start
 
 
@@ -201,6 +202,8 @@ def _draw(parts: dict[str, Any], rig: Rig, placed: Cameras, inside: Any) -> None
     matrices, spacing = placed
     if inside is None:
         parts["cameras"].pop(INSIDE, None)
+    else:
+        parts["cameras"][INSIDE] = inside
     is_red = np.isin(np.arange(len(matrices)), inside or [])
     length = _LENGTH * (spacing[0] if spacing else max(0.25, rig.sides.max()))
     detail = _FINE if len(matrices) <= _MOST_FINE else _COARSE

@@ -8,6 +8,7 @@ from bpy.app.handlers import persistent
 
 from . import drawing, rig_objects, scene_file, silvr
 from .scripts.lightfield.core.errors import UserError
+from .scripts.lightfield.core.names import FILE
 
 # The keys of new rigs, by type.
 NEW_RIGS: dict[str, dict[str, Any]] = {
@@ -305,15 +306,17 @@ def _draw_rig(layout: Any, scene: Any, empty: Any) -> None:
 def facts(scene: Any, rig: Any, empty: Any) -> list[str]:
     """Return the lines of the panel about a rig."""
     placed = drawing.cameras(scene, rig)
-    lens = rig.camera.make()
+    is_of_file = rig.camera.lens == FILE
+    lens = "of the .blend's camera" if is_of_file else rig.camera.make().description
+    width, height = rig.camera.resolution
     size = " × ".join(f"{side:.3g}" for side in rig.sides)
     inside = drawing.inside(empty)
     lines = [
         f"Type: {rig.type}" + ("" if rig_objects.is_editable(rig) else ", not changed here"),
         f"Cameras: {len(placed.world_from_cameras) or 'known after the build'}",
         f"Size: {size} m",
-        f"Lens: {lens.description}",
-        f"Resolution: {lens.width} × {lens.height}",
+        f"Lens: {lens}",
+        f"Resolution: {width} × {height}",
         "Inside objects: " + ("not checked" if inside is None else str(inside)),
     ]
     if placed.spacing:

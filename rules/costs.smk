@@ -1,4 +1,5 @@
 # The costs of a dataset, and the progress of a build.
+from lightfield.core.names import RENDERED
 from lightfield.workflow.arguments import optional, status_arguments
 from lightfield.workflow.jobs import COSTS
 
@@ -23,7 +24,7 @@ rule costs:
     params:
         dataset=subpath(output.costs, ancestor=2),
         # These folders hold the history and the benchmarks of all earlier runs.
-        receipts=f"{PLAN.receipts}/{{scene}}/{{rig}}/render",
+        receipts=f"{PLAN.receipts}/{{scene}}/{{rig}}/{RENDERED}",
         benchmarks=f"{RUN.work}/benchmarks/{{scene}}/{{rig}}",
         # A calibration belongs to the preset, the scene itself to all of them.
         scene_benchmarks=RUN.of_dataset("scene_benchmarks"),

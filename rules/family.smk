@@ -1,4 +1,4 @@
-# Families of scenes. One job builds a batch of members, with all stages of each.
+# Families of scenes. One job builds a batch of members, with the stages of all their jobs.
 from lightfield.configuration.corpus import CORPUS_FILES
 from lightfield.workflow.jobs import BUILD_MEMBERS, CORPUS, COUNT_MEMBERS
 

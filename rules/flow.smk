@@ -1,4 +1,5 @@
 # The optical flow from each view to its neighbour.
+from lightfield.formats import passes
 from lightfield.workflow.jobs import FLOW
 
 
@@ -20,7 +21,7 @@ rule flow:
     resources:
         mem_mb=2000,
     params:
-        folder=RUN.paths.reprojected("flow"),
+        folder=RUN.paths.reprojected(passes.FLOW.name),
     message:
         "Computing the flow of views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}"

@@ -1,6 +1,6 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
-from lightfield.workflow.jobs import LENS_MAP, REPROJECT, REPROJECTED_LIGHTFIELD
+from lightfield.workflow.jobs import LENS_MAP, RENDER, REPROJECT, REPROJECTED_LIGHTFIELD
 
 
 rule reprojected_lightfield:
@@ -67,7 +67,7 @@ rule reproject:
     input:
         PLAN.reads(
             REPROJECT,
-            views=RUN.paths.receipt("render"),
+            views=PLAN.receipt_path(RENDER.name),
             lightfield=RUN.paths.lightfield,
             lens_maps=RUN.of_build(RUN.build.lens_maps),
         ),

@@ -751,7 +751,26 @@ EXPLAINED = [
     (
         "rigs.LFSphere.camera",
         {"lens": "rectilinear", "fov": 175, "resolution": [9, 9]},
-        "rigs.LFSphere.camera: its focal length in mm is 0.7859; must be at least 1 in Blender",
+        # A width of 36 mm, and Blender's shortest focal length of 1 mm.
+        "rigs.LFSphere.camera.fov: is 175; must be at most 173.6 in Blender",
+    ),
+    (
+        "rigs.LFSphere.camera.resolution",
+        [64, 3],
+        "rigs.LFSphere.camera.resolution: is [64, 3]; must be at least 4 × 4 pixels",
+    ),
+    (
+        "rigs.LFSphere.camera",
+        {"lens": "rectilinear", "focal_length": 0.9, "resolution": [9, 9]},
+        "rigs.LFSphere.camera: its focal length in mm is 0.9; must be at least 1 in Blender",
+    ),
+    *(
+        (
+            "rigs.LFSphere",
+            {"type": kind, "count": 8, "face_inside": True, "camera": CAMERA},
+            f"rigs.LFSphere.face_inside: does not go with type {kind}, whose cameras look inside",
+        )
+        for kind in ("hemisphere", "ring", "spiral")
     ),
     (
         "rigs.LFSphere.camera.fov",

@@ -10,6 +10,7 @@ Each is a .blend in FOLDER, saved at frame 1, with a lamp:
 - baked: a rigid body and simulation nodes that move, baked for the frames up to 20.
 - fluid: a fluid that is not baked.
 - box: a closed box of 2 m around the origin. split_box: the same with faces that are not joined.
+  lit_box: with a lamp in it. glowing_box: with a glowing surface. box_with_glow: with a bulb in it.
   open_box: the box without its side towards x. open_room: the open box with normals inwards.
 - leaves: a ball of leaves around the origin as one mesh. Half of the leaves show their backs.
 - dome: a hemisphere of 5 m over a floor. backdrop: a floor and a wall behind it, with normals that
@@ -152,6 +153,26 @@ def open_box():
     edit(lambda face: face.normal.x > 0.9)
 
 
+def lit_box():
+    cube("box")
+    bpy.ops.object.light_add(type="POINT", location=(0, 0.5, 0.5))
+
+
+def glow(obj):
+    material = bpy.data.materials.new("glow")
+    material.node_tree.nodes["Principled BSDF"].inputs["Emission Strength"].default_value = 1
+    obj.data.materials.append(material)
+
+
+def glowing_box():
+    glow(cube("box"))
+
+
+def box_with_glow():
+    cube("box")
+    glow(cube("bulb", size=0.1, location=(0, 0, 0.8)))
+
+
 def open_room():
     open_box()
     bpy.context.object.data.flip_normals()
@@ -195,7 +216,19 @@ def backdrop():
 
 def main():
     physics = (simulations, baked, fluid)
-    meshes = (box, split_box, open_box, open_room, leaves, dome, backdrop, floor)
+    meshes = (
+        box,
+        lit_box,
+        glowing_box,
+        box_with_glow,
+        split_box,
+        open_box,
+        open_room,
+        leaves,
+        dome,
+        backdrop,
+        floor,
+    )
     for make in (aspect, wall, pencil, *physics, *meshes):
         blend_file.new_scene()
         bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0, 0))

@@ -98,6 +98,21 @@ def test_an_export_that_cannot_take_what_a_preset_leaves_is_refused(tmp_path, mo
         scene_datasets("size", "tiny", Preset(views=12))
 
 
+def test_a_preset_that_leaves_less_than_blenders_smallest_image_is_refused(tmp_path, monkeypatch):
+    content = flowing({"type": "plane", "cameras": [4, 1]})
+    content["rigs"]["View"]["camera"]["resolution"] = [96, 8]
+    (tmp_path / "strip.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    problem = (
+        r"strip\.yaml:\d+: rigs\.View\.camera\.resolution: under the preset tiny, is \[24, 2\]; "
+        "must be at least 4 × 4"
+    )
+    with pytest.raises(UserError, match=problem):
+        scene_datasets("strip", "tiny", Preset(resolution=24))
+    (dataset,) = scene_datasets("strip", "tiny", Preset(resolution=48))
+    assert dataset.rig.camera.resolution == (48, 4)
+
+
 def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
     file = tmp_path / "numbers.yaml"
     numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}

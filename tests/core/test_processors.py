@@ -59,7 +59,7 @@ import sys
 from pathlib import Path
 from lightfield.core import processors
 with processors.only(int(sys.argv[1])):
-    from lightfield.rendering import blend_file
+    from lightfield.rendering.scenes import blend_file
 blend_file.open_scene(Path(sys.argv[2]))
 print(len(list(Path("/proc/self/task").iterdir())))
 """

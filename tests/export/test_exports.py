@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
 
 from lightfield import export
-from lightfield.configuration.exports import EXPORTS, Exports, settings_of
+from lightfield.configuration.exports import EXPORTS, SEQUENCE_EXPORTS, Exports, settings_of
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
@@ -964,7 +964,13 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             {},
             "has a lens that COLMAP lacks; reproject",
         ),
-        ("colmap", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
+        (
+            "colmap",
+            "again",
+            VIEWS,
+            {"depth": True},
+            "holds no depth; give reprojections.again format: exr",
+        ),
         ("nerfstudio", "views", VIEWS | {"resolution": [65, 65]}, {}, "use even sizes"),
         (
             "nerfstudio",
@@ -977,18 +983,38 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("nerf_synthetic", "views", VIEWS, {}, "is not a pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
-        ("opendibr", "again", VIEWS, {}, "holds no depth; give it format: exr"),
+        ("opendibr", "again", VIEWS, {}, "holds no depth; give reprojections.again format: exr"),
         ("miv", "views", VIEWS, {}, "a fisheye of 180 degrees with longitude: .-90, 90."),
         ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
         ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
-        ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
+        ("hci", "sensor", LENSES["perspective"], {}, "holds no depth; export the sensor's source"),
+        (
+            "colmap",
+            "sensor",
+            LENSES["perspective"],
+            {"look": "AgX"},
+            "look: is for EXR sources; give look to sensor",
+        ),
+        ("hci", "again", VIEWS, {}, "holds no depth; give reprojections.again format: exr"),
         ("scannetpp", "views", VIEWS, {}, "sees 180 degrees, but this layout ends below"),
         ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
         ("lichtfeld", "views", VIEWS | {"fov": 200}, {}, "sees 200 degrees, but LichtFeld's ends"),
         ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
         ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
-        ("lichtfeld", "again", VIEWS, {"format": "exr"}, "is not in EXR; give it format: exr"),
-        ("lichtfeld", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
+        (
+            "lichtfeld",
+            "again",
+            VIEWS,
+            {"format": "exr"},
+            "is not in EXR; give reprojections.again format: exr",
+        ),
+        (
+            "lichtfeld",
+            "again",
+            VIEWS,
+            {"depth": True},
+            "holds no depth; give reprojections.again format: exr",
+        ),
         ("lichtfeld", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
@@ -1001,9 +1027,58 @@ def test_yaml_that_a_consumer_cannot_take_is_refused(name, source, camera, optio
         "reprojections": {"again": {"camera": LENSES["perspective"]}},
         "exports": {name: {"sources": [source], **options}},
     }
+    if source == "sensor":
+        content["sensor"] = {}
     with pytest.raises(ValidationError, match=problem) as caught:
         TypeAdapter(Scene).validate_python(content)
-    assert f"exports.{name}.sources: " in str(caught.value)
+    assert f"exports.{name}." in str(caught.value)
+
+
+def yaml_without_depth(name, camera, **keys):
+    return {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1, "depth": "none", "passes": ["normal", "object", "motion"]},
+        "rigs": {"LF": EVEN_PLANE | {"camera": camera} | keys},
+        "exports": {name: {"sources": ["views"]}},
+    }
+
+
+@pytest.mark.parametrize("name", [name for name in EXPORTS if name not in SEQUENCE_EXPORTS])
+def test_yaml_refuses_the_exports_that_fail_without_depth(name, tmp_path):
+    """An export that works on views without depth is accepted. One that fails is refused."""
+    camera = LENSES["fisheye"] if name == "scannetpp" else LENSES["perspective"]
+    write_views(tmp_path / "dataset", camera, EVEN_PLANE)
+    path = tmp_path / "dataset/lightfield.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"depth": None}))
+    content = yaml_without_depth(name, camera)
+    try:
+        exported(tmp_path / "dataset", name, "views", tmp_path)
+    except UserError as error:
+        # The sphere's views have no passes.
+        if "depth" in str(error):
+            with pytest.raises(
+                ValidationError, match=r"holds no depth; leave out render\.depth: none"
+            ):
+                TypeAdapter(Scene).validate_python(content)
+            return
+    assert TypeAdapter(Scene).validate_python(content).exports.selected
+
+
+def test_yaml_refuses_points_of_imported_views_without_depth(dataset, tmp_path):
+    shutil.copytree(dataset / "exr", tmp_path / "LF/exr")
+    content = json.loads((dataset / "lightfield.json").read_text())
+    scene = {
+        "scene": {"dataset": str(tmp_path)},
+        "reprojections": {"flat": {"camera": LENSES["perspective"], "format": "exr"}},
+        "exports": {"colmap": {"sources": ["flat"]}},
+    }
+    path = tmp_path / "LF/lightfield.json"
+    path.write_text(json.dumps(content))
+    assert TypeAdapter(Scene).validate_python(scene).exports.colmap
+    path.write_text(json.dumps(content | {"depth": None}))
+    problem = "flat: the rig LF holds no depth; its lightfield.json says so; leave out the export"
+    with pytest.raises(ValidationError, match=problem):
+        TypeAdapter(Scene).validate_python(scene)
 
 
 def test_a_sensor_s_pictures_without_a_pass_are_refused_in_yaml():

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import yaml
 from conftest import BLENDER, ROOT
+from geometry.test_rigs import EACH as OF_CAMERAS
+from geometry.test_rigs import registered
 
 from lightfield.configuration.scene_yaml import read_scene
 from lightfield.formats.lightfield import LightField
@@ -213,6 +215,41 @@ def test_handles_and_the_panel_change_the_yaml_and_nothing_else(blender, project
         np.testing.assert_allclose(places, poses[:, :3, 3], atol=ROUNDING)
         cosines = ((ahead - places) * -poses[:, :3, 2]).sum(axis=1)
         np.testing.assert_allclose(cosines, np.linalg.norm(ahead - places, axis=1), atol=1e-5)
+
+
+# A rig of each type, by its keys in a scene YAML beside the type.
+EACH_TYPE = {
+    **OF_CAMERAS,
+    "poses": {"file": "poses.csv"},
+    "blend_camera": {"frames": {"first": 1, "last": 3}},
+}
+PERSPECTIVE = {"lens": "rectilinear", "fov": 60, "resolution": [32, 24]}
+
+
+@pytest.mark.parametrize("lens", [PERSPECTIVE, {"lens": "file", "resolution": [32, 24]}])
+def test_a_rig_of_each_type_is_opened_and_checked(lens, blender, tmp_path):
+    """Only a build knows the places of some cameras. The panel says so, and checks the others."""
+    assert EACH_TYPE.keys() == registered()
+    (tmp_path / "poses.csv").write_text("name,x,y,z,rx,ry,rz\na,0,0,1,0,0,0\n")
+    of_file = lens["lens"] == "file"
+    rigs = {
+        name: {"type": name, **keys, "camera": lens}
+        for name, keys in EACH_TYPE.items()
+        if name == "blend_camera" or not of_file
+    }
+    content = {"scene": {"blend": "mine.blend"}, "render": {"samples": 1}, "rigs": rigs}
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(content))
+    steps = [step for name in rigs for step in (["select", [name]], ["facts", [name]], "panel")]
+    _, refused, again, *shown = blender("register", opened(path), ["press", ["check"]], *steps)
+    assert (refused, again) == (None, None)
+    for number, name in enumerate(rigs):
+        facts, panel = shown[3 * number + 1 : 3 * number + 3]
+        assert {*facts} <= {*panel}
+        if name == "blend_camera":
+            assert {"Cameras: known after the build", "Inside objects: not checked"} <= {*facts}
+        else:
+            assert "Inside objects: 0" in facts
 
 
 def test_the_panel_shows_the_active_rig(blender, project):

@@ -353,13 +353,32 @@ def test_an_invalid_member_keeps_its_files_and_names_its_validation(face, tmp_pa
     box = "".join([*corners, *(f"f {side}\n" for side in sides)])
     (tmp_path / "face.obj").write_text(box)
     failure = build_of(face(size=0.1)).build("cpu", 1)["failure"]
-    assert failure["stage"] == "validate"
+    assert failure["stage"] == "publish_checksums"
     assert "exr/view_0000f.exr: is black" in failure["cause"]
     assert (tmp_path / "results/faces/face/ring/exr/view_0000f.exr").is_file()
     validation = tmp_path / "results/faces/face/ring/validation.json"
     assert failure["cause"].endswith(f"see {validation}")
     assert json.loads(validation.read_text())["valid"] is False
     assert not validation.with_name("sha256sums.txt").exists()
+
+
+@pytest.mark.slow
+def test_a_rig_that_tests_is_placed_as_the_rig_that_trains(face, tmp_path):
+    settings = face()
+    content = settings.scene | {
+        # The rig that tests comes first, and is smaller.
+        "rigs": {"a": RING | {"split": "test", "size": 2}, "b": RING | {"split": "train"}},
+        "exports": {"instant_ngp": {"sources": ["views"]}},
+    }
+    build = build_of(settings.model_copy(update={"scene": content}))
+    assert build.build("cpu", 1)["state"] == "valid"
+    tested, trained = (read_json(build.folder / rig / "transforms.json") for rig in "ab")
+    assert (tested["scale"], tested["offset"]) == (trained["scale"], trained["offset"])
+    distances = [
+        np.linalg.norm(np.array(export["frames"][0]["transform_matrix"])[:3, 3])
+        for export in (tested, trained)
+    ]
+    assert distances[1] == pytest.approx(1.5 * distances[0])
 
 
 @pytest.mark.slow

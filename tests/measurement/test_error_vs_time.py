@@ -455,7 +455,7 @@ import sys
 from pathlib import Path
 from lightfield.formats.lightfield import LightField
 from lightfield.measurement import trials
-from lightfield.rendering import cycles
+from lightfield.rendering.setup import cycles
 
 folder = Path(sys.argv[1])
 lightfield = LightField.read(folder / "lightfield.json")

@@ -194,7 +194,7 @@ def test_each_estimate_of_one_dataset_gives_the_same_hours(garden, denoise):
     )
     took = 8 * 4 * (2 + 3 * denoise) * SAMPLE_SECONDS
     rendered = {"view": "a", "finished": 9.0, "wall_seconds": took, "cpu_seconds": took}
-    run = history.Run(
+    run = history.ProcessHistory(
         {"started": 0.0, "device": "CPU", "threads": 1}, [rendered | {"render_seconds": took}]
     )
     size = full.model_copy(update={"samples": samples, "denoise": denoise})

@@ -68,8 +68,8 @@ def test_costs_of_jobs_add_up_but_only_one_is_in_memory():
     assert 3 * one == Cost(6.0, 300, 30.0)
 
 
-def test_the_stages_of_a_dataset_write_together_what_a_view_takes():
-    """A run checks the disk by the cost of a view, and prints the size of each stage."""
+def test_the_jobs_of_a_dataset_write_together_what_a_view_takes():
+    """A run checks the disk by the cost of a view, and prints the size of each phase."""
     for dataset in (*scene_datasets("smoke"), *scene_datasets("object")):
         written = rendering(dataset).disk_bytes + computing_flow(dataset).disk_bytes
         for name in dataset.reprojections:

@@ -279,7 +279,7 @@ def test_the_full_dataset_defaults_to_the_samples_of_the_blend(dataset):
 def test_other_programs_do_not_count_as_path_tracing():
     # Other programs used the machine too: of 20 s of wall time the process had 10, on one thread.
     lines = [*start(0.0), view("a", 20.0, wall=20.0, traced=16.0, cpu=10.0)]
-    part = history.Run(lines[0] | lines[1], [lines[2]])
+    part = history.ProcessHistory(lines[0] | lines[1], [lines[2]])
     (rendering,) = costs.renderings(part)
     assert rendering.path_tracing == pytest.approx(8.0)
     assert rendering.rest == pytest.approx(2.0)

@@ -151,7 +151,8 @@ from pathlib import Path
 import bpy
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, cycles
+from lightfield.rendering.scenes import blend_file
+from lightfield.rendering.setup import cycles
 blend_file.open_scene(Path(sys.argv[1]))
 bpy.data.cameras["Hero"].lens = 85
 path = Path(sys.argv[2])

@@ -12,6 +12,7 @@ from lightfield.core.files import sha256
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.planning.loading import datasets_of
+from lightfield.workflow import job_settings
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +36,8 @@ def inventory_of_path(path, frames, depth_of_field=False):
     }
     written = Scene.model_validate(content)
     datasets = datasets_of("tried", written, "full", Preset(), {})
-    inventory_file.write_of_datasets(path, written, datasets, path.with_suffix(".json"), False)
+    settings = job_settings.inventory(datasets[0])
+    inventory_file.write(path, settings, datasets, path.with_suffix(".json"), False)
 
 
 @pytest.mark.parametrize("mirror", [blend_scenes.mirrored_camera, blend_scenes.mirroring_parent])

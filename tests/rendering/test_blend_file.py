@@ -307,7 +307,7 @@ bpy.context.scene.frame_set(3)
 print("trusted:", *sorted(path.name for path in folder.iterdir()))
 for name in ("script", "driver"):
     (folder / name).unlink(missing_ok=True)
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 blend_file.open_scene(folder / "trap.blend")
 bpy.context.scene.frame_set(2)
 bpy.context.scene.frame_set(3)

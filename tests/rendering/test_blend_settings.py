@@ -158,7 +158,8 @@ def of_plenoforge(path, yaml):
     inventory = path.with_suffix(".json")
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
-        inventory_file.write_of_datasets(path, written, [dataset], inventory, False)
+        settings = job_settings.inventory(dataset)
+        inventory_file.write(path, settings, [dataset], inventory, False)
     views = lightfield_file.from_settings(job_settings.lightfield(dataset), inventory)
     folder = path.parent / "exr"
     with contextlib.redirect_stderr(io.StringIO()):

@@ -8,6 +8,7 @@ import pytest
 from conftest import BLENDER
 
 from lightfield.core.errors import UserError
+from lightfield.stages.scene import InventorySettings
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +37,7 @@ def listed(folder, tmp_path):
         output.unlink(missing_ok=True)
         blend = folder / f"{name}.blend"
         try:
-            inventory_file.write_of_datasets(blend, None, [], output, measures_memory=False)
+            inventory_file.write(blend, InventorySettings(), [], output, measures_memory=False)
         except UserError as error:
             assert not output.exists()
             return str(error)

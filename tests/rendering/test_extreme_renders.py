@@ -15,7 +15,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import extremes
 from pathlib import Path
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 case = next(case for case in extremes.cases() if case.name == sys.argv[2])
 blend_file.new_scene()
 case.build()
@@ -27,7 +27,7 @@ HIDDEN = """
 import sys
 from pathlib import Path
 import bpy
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 blend_file.new_scene()
 clear, fog = (bpy.data.materials.new(name) for name in ("clear", "fog"))
 clear.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.5

@@ -21,6 +21,7 @@ from lightfield.imaging import images
 from lightfield.planning.loading import datasets_of
 from lightfield.rendering.views import lightfield_file
 from lightfield.validation.validate import validate
+from lightfield.workflow import job_settings
 
 # What follows, and what the note names.
 BY_NAME = {
@@ -81,7 +82,8 @@ def dataset(path, folder, change=None, **scene):
     inventory = path.with_suffix(".json")
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
-        inventory_file.write_of_datasets(path, written, [made], inventory, False)
+        settings = job_settings.inventory(made)
+        inventory_file.write(path, settings, [made], inventory, False)
     views = lightfield_file.from_settings(LightfieldSettings.of_capture(made), inventory)
     with contextlib.redirect_stderr(io.StringIO()):
         one_shard.render(views, folder, path, inventory=inventory)

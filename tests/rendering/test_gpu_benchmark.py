@@ -29,7 +29,7 @@ CUBE = """
 import sys
 from pathlib import Path
 import bpy
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 blend_file.new_scene()
 bpy.ops.mesh.primitive_cube_add(size=6)
 blend_file.save_scene(Path(sys.argv[1]))

@@ -128,6 +128,33 @@ def test_metres_keep_size_and_place(renders):
     np.testing.assert_allclose(record["box"], [[-1, -0.5, 0], [1, 0.5, 3]], atol=1e-5)
 
 
+@pytest.mark.parametrize("name", ["fbx", "glb", "obj", "stl", "usdc"])
+def test_the_record_says_how_a_model_comes_into_the_unit_box(renders, name):
+    """Points of the model in metres, shifted and then scaled, are its points in the scene."""
+    placement = renders.records[f"shape.{name}"]["placement"]
+    corners = np.array(renders.records["metres"]["box"])
+    placed = (corners + placement["shift"]) * placement["scale"]
+    np.testing.assert_allclose(placed, renders.records[f"shape.{name}"]["box"], atol=1e-5)
+    assert "placement" not in renders.records["metres"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side, is_plausible", [(0.002, False), (0.02, True), (90, True), (500, 0)])
+def test_a_model_of_a_plausible_size_in_metres_is_told_of(tmp_path, capsys, side, is_plausible):
+    from lightfield.rendering.imports import model
+    from lightfield.stages.scene import ImportModel, ImportSettings
+
+    path = written(tmp_path / "a.obj", TRIANGLE.replace("1", str(side), 2))
+    for unit in ("box", "metres"):
+        settings = ImportSettings(model=str(path), unit=unit)
+        output, record = tmp_path / "a.blend", tmp_path / "a.json"
+        model.import_model(ImportModel(settings=settings, output=output, record=record))
+        said = capsys.readouterr().out
+        scaled = f"note: {path}: unit: box: moved by (-"
+        assert (scaled in said, f"scaled by {1 / side:.4g}" in said) == (unit == "box",) * 2
+        assert ("unit: metres keeps" in said) == (unit == "box" and bool(is_plausible))
+
+
 def test_another_axis_points_up(renders):
     """The model's longest side, along the file's z, becomes the depth."""
     low, high = np.array(renders.records["turned"]["box"])
@@ -519,6 +546,10 @@ def test_a_dataset_of_a_model_follows_its_files(renders, tmp_path):
     assert result.returncode == 0, result.stdout + result.stderr
     validation = json.loads((folder / target).read_text())
     assert validation["valid"]
+    placement = json.loads((folder / "work/chair/model.json").read_text())["placement"]
+    lightfield = json.loads((folder / "results/chair/ring/lightfield.json").read_text())
+    assert lightfield["model_placement"] == placement
+    assert "note: models/shape.obj: unit: box: moved by" in result.stdout + result.stderr
 
     def planned():
         result = snakemake(folder, "--dry-run", "--logger", "jobs", *choice)

@@ -162,7 +162,7 @@ GARDEN = """
 import sys
 from pathlib import Path
 import bpy
-from lightfield.rendering import blend_file
+from lightfield.rendering.scenes import blend_file
 from scenes import garden
 blend_file.new_scene()
 garden.build({"seed": 0, "detail": 0.02})

@@ -110,6 +110,19 @@ def test_a_camera_inside_a_closed_mesh_is_refused(blend, folder, run_program):
     assert "1 of 2 cameras are inside box: view_0000f;" in error
 
 
+def test_a_whole_rig_inside_a_closed_dark_object_is_said_before_a_render(folder, run_program):
+    status, (warning,) = checked(folder, run_program, "box", BOTH_INSIDE)
+    assert status == 0
+    assert warning.startswith("warning: 2 of 2 cameras are inside box, a closed object that ")
+    assert "reaches from (-1, -1, -1) to (1, 1, 1) m" in warning
+    assert "no lamp and no glowing surface is in it, so all views may be black" in warning
+
+
+@pytest.mark.parametrize("blend", ["lit_box", "glowing_box", "box_with_glow"])
+def test_a_closed_room_with_light_in_it_is_no_mistake(blend, folder, run_program):
+    assert checked(folder, run_program, blend, BOTH_INSIDE) == (0, [])
+
+
 @pytest.mark.parametrize("blend", ["open_room", "leaves", "floor"])
 def test_cameras_that_see_fronts_or_a_plane_are_not_inside(blend, folder, run_program):
     assert checked(folder, run_program, blend, BOTH_INSIDE) == (0, [])

@@ -392,7 +392,7 @@ def test_a_listed_picture_is_packed_and_helpers_start_anew_for_each_scene(folder
 import sys
 from pathlib import Path
 import bpy
-from lightfield.rendering import blend_file, own_scene
+from lightfield.rendering.scenes import blend_file, own_scene
 for _ in range(2):
     blend_file.new_scene()
     own_scene.fill(Path("scenes/mine.py"), {"seed": 4})

@@ -54,7 +54,7 @@ def test_a_history_continues_after_a_truncated_line(tmp_path):
 HANG = """
 import sys, time
 from pathlib import Path
-from lightfield.rendering import colour_pass, geometry_pass
+from lightfield.rendering.views import colour_pass, geometry_pass
 from lightfield.stages.views import RenderShard
 def hang(*_, **__): time.sleep(60)
 colour_pass.render_colour = geometry_pass.render_geometry = hang

@@ -1,6 +1,6 @@
 """The description of a lightfield.json: a scene, its rendering, and the cameras that see it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -16,7 +16,7 @@ from lightfield.core.names import FILE
 from lightfield.engine.stage import cause
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory
-from lightfield.formats.lightfield import OMNIDIRECTIONAL
+from lightfield.formats.lightfield import MODEL_PLACEMENT, OMNIDIRECTIONAL
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
@@ -38,7 +38,8 @@ class Capture:
 
     ``scene_name`` is the scene YAML's name. ``render`` is the block of lightfield.json.
     ``external_files`` are path and SHA-256 of each file that a .blend reads. `resolved` fills them
-    in. ``model_fingerprint`` is the identity of a model. `of_model` fills it in.
+    in. ``model_fingerprint`` is the identity of a model, and ``model_placement`` how it came into
+    the unit box. `of_model` fills them in.
     """
 
     scene_name: str
@@ -47,11 +48,16 @@ class Capture:
     rig: Rig
     external_files: Sequence[tuple[str, str | None]] = ()
     model_fingerprint: str | None = None
+    model_placement: Mapping[str, Any] | None = None
 
     def of_model(self, record: Path) -> Self:
-        """Return the capture with the identity of its model, from the ``record`` of its import."""
+        """Return the capture with the facts of its model, from the ``record`` of its import."""
         content = read_keys(record, "import_model.py", "fingerprint")
-        return replace(self, model_fingerprint=str(content["fingerprint"]))
+        return replace(
+            self,
+            model_fingerprint=str(content["fingerprint"]),
+            model_placement=content.get("placement"),
+        )
 
     def resolved(self, inventory: Path) -> Self:
         """Return the capture with the values of a user's .blend, which its ``inventory`` lists.
@@ -153,6 +159,8 @@ class Capture:
             **scene,
             "fingerprint": self.fingerprint,
         }
+        if self.model_placement:
+            origin[MODEL_PLACEMENT] = self.model_placement
         origin["render"] = self.render.to_json()
         return origin
 

@@ -15,7 +15,7 @@ from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.exports import Export, Exports
 from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.shown_look import ShownLook, shown_look
-from lightfield.core.names import FILE, PARTS, scene_folder
+from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
 from lightfield.formats import passes
 from lightfield.formats.export_lists import MANIFEST
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
@@ -42,6 +42,8 @@ class Dataset(Capture):
     preset: str
     rig_name: str
     rig_folder: str
+    # The scene YAML, in which `source`, `render` and `rig` are without the preset's limits.
+    written: scene_yaml.Scene
     reprojections: dict[str, Reprojection]
     flow: scene_yaml.Flow | None
     mesh: scene_yaml.MeshFiles | None
@@ -217,21 +219,21 @@ class Dataset(Capture):
         return shard_bounds(self.view_count, self.shard_count(self))
 
     @property
-    def stages(self) -> list[str]:
-        """The stages that make the dataset's images, shard by shard."""
-        stages = ["render", *self.reprojections]
+    def shard_folders(self) -> list[str]:
+        """The folders of receipts of the shards that make the dataset's images."""
+        folders = [RENDERED, *self.reprojections]
         if self.flow:
-            stages.append(passes.FLOW.name)
-        return stages
+            folders.append(passes.FLOW.name)
+        return folders
 
-    def receipts(self, stage: str) -> list[str]:
-        """Return the receipts of all shards at one of the ``stages``."""
-        return [self.paths.receipt(stage, first, end) for first, end in self.shards]
+    def receipts(self, folder: str) -> list[str]:
+        """Return the receipts of all shards in one of the `shard_folders`."""
+        return [self.paths.receipt(folder, first, end) for first, end in self.shards]
 
     @property
     def all_receipts(self) -> list[str]:
-        """The receipts of all stages."""
-        return [file for stage in self.stages for file in self.receipts(stage)]
+        """The receipts of all shards."""
+        return [file for folder in self.shard_folders for file in self.receipts(folder)]
 
     def testing_rigs(self, export: Export) -> tuple[str, ...]:
         """Return the folders of the rigs whose views go into an ``export``, to test with."""

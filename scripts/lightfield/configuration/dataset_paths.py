@@ -105,9 +105,9 @@ class Paths:
     def work(self) -> str:
         return f"{self.work_root}/{self.scene}/{self.rig}"
 
-    def settings(self, stage: str) -> str:
-        """Return the settings file of a stage."""
-        return f"{self.work}/settings/{stage}.json"
+    def settings(self, name: str) -> str:
+        """Return the settings file of a job."""
+        return f"{self.work}/settings/{name}.json"
 
     @property
     def lightfield(self) -> str:
@@ -134,10 +134,10 @@ class Paths:
         return f"{self.work}/probe.json"
 
     def receipt(
-        self, stage: str = "{reprojection}", first: int | str = "{first}", end: int | str = "{end}"
+        self, folder: str = "{reprojection}", first: int | str = "{first}", end: int | str = "{end}"
     ) -> str:
-        """Return the receipt of a shard at one of the stages."""
-        return f"{self.work_root}/{FOLDER}/{self.scene}/{self.rig}/{stage}/{first}-{end}{SUFFIX}"
+        """Return the receipt of a shard, in the folder of the rendered views or a reprojection."""
+        return f"{self.work_root}/{FOLDER}/{self.scene}/{self.rig}/{folder}/{first}-{end}{SUFFIX}"
 
     @property
     def mesh_list(self) -> str:

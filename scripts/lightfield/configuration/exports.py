@@ -17,7 +17,7 @@ from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs import BlendCamera, Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
@@ -45,6 +45,8 @@ class Export(Settings):
     is_of_sequence: ClassVar[bool] = False
     # Whether the export has the times of a rolling shutter's rows.
     has_row_times: ClassVar[bool] = False
+    # Whether the export lifts points from the depth of the rendered views.
+    needs_surfaces: ClassVar[bool] = False
 
     sources: list[str] = Field(
         min_length=1,
@@ -83,6 +85,11 @@ class Export(Settings):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
+        if self.is_of_sequence and isinstance(rig, BlendCamera):
+            return (
+                "is of type blend_camera, whose frames are views of one still scene, and this "
+                "export is for sequences; give it a rig of another type with frames"
+            )
         if self.is_of_sequence and (rig.sequence is None or len(rig.sequence.numbers) < 2):
             return (
                 "has fewer than two frames, and this export is for sequences; give the rig frames"
@@ -119,7 +126,9 @@ class Developed(Export):
 
 
 _PointCount = Annotated[int, Field(ge=1)]
-NO_DEPTH = "holds no depth; give it format: exr"
+# Refusals of views without depth. What to do depends on the source, and scene_yaml.py adds it.
+NO_DEPTH = "holds no depth"
+NOT_EXR = "is not in EXR"
 
 
 class InstantNgp(Export):
@@ -197,6 +206,7 @@ class Colmap(Developed):
     """A COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting."""
 
     is_for_training: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
     points: _PointCount = Field(
@@ -226,6 +236,7 @@ class Nerfstudio(Developed):
 
     is_for_training: ClassVar[bool] = True
     chooses_tests: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
@@ -321,6 +332,7 @@ class ScanNetPP(Developed):
 
     is_for_training: ClassVar[bool] = True
     chooses_tests: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000,
@@ -341,6 +353,7 @@ class NCore(Developed):
 
     is_for_training: ClassVar[bool] = True
     has_row_times: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000, description="Largest number of points, which are computed from depth."
@@ -357,6 +370,7 @@ class LichtFeld(Developed):
 
     is_for_training: ClassVar[bool] = True
     chooses_tests: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     format: Literal["png", "exr"] = Field(
         "png", description="Format of the images. exr keeps linear light, for HDR training."
@@ -391,7 +405,7 @@ class LichtFeld(Developed):
         elif not isinstance(lens, Rectilinear):
             return f"has a lens that LichtFeld lacks; {_TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "exr" and not has_depth:
-            return "is not in EXR; give it format: exr"
+            return NOT_EXR
         return NO_DEPTH if self.depth and not has_depth else None
 
 
@@ -401,6 +415,7 @@ class Dnerf(Developed):
     is_for_training: ClassVar[bool] = True
     chooses_tests: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
@@ -415,6 +430,7 @@ class Neural3dVideo(Developed):
 
     is_for_training: ClassVar[bool] = True
     is_of_sequence: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
@@ -448,6 +464,7 @@ class MultipleView(Developed):
     """The layout of 4DGaussians' own recordings: a folder of frames for each camera."""
 
     is_of_sequence: ClassVar[bool] = True
+    needs_surfaces: ClassVar[bool] = True
 
     points: _PointCount = Field(
         50000, description="Largest number of points in the point cloud of the first frame."
@@ -489,6 +506,8 @@ class PosesCsv(Export):
 
 class PointCloud(Developed):
     """A .ply of all surfaces that the views see."""
+
+    needs_surfaces: ClassVar[bool] = True
 
     voxel: float = Field(
         0.01,

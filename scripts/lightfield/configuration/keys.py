@@ -24,7 +24,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import BUILDERS, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
-from lightfield.formats.lightfield import MACHINE, LightField, View
+from lightfield.formats.lightfield import MACHINE, MODEL_PLACEMENT, LightField, View
 from lightfield.imaging.blender_looks import FILE_LOOK
 
 # The versions of the steps that make views. The keys of the views that a step concerns have its
@@ -50,8 +50,8 @@ VERSIONS = {
     "model": 2,
     # Views of models in softboxes, for the same reason.
     "softboxes": 1,
-    # The import of models, if it refuses other models. Views keep their keys.
-    "import": 3,
+    # The import of models, if it refuses or records something else. Views keep their keys.
+    "import": 4,
     # The choice of spread test views. Views keep their keys.
     "spread": 1,
 }
@@ -135,13 +135,15 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
     return _digest([_model_version(options["light"]), version("bpy"), dict(options), files])
 
 
+# The keys of lightfield.json that change no view. Views are light, whatever look is given to
+# versions of them. A model's fingerprint says how it is placed.
+_NOT_OF_VIEWS = (MACHINE, FILE_LOOK, MODEL_PLACEMENT)
+
+
 def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.world_from_camera.tolist()
-    # Views are light, whatever look is given to versions of them.
-    content = {
-        key: value for key, value in lightfield.content.items() if key not in (MACHINE, FILE_LOOK)
-    }
+    content = {key: value for key, value in lightfield.content.items() if key not in _NOT_OF_VIEWS}
     key = [VERSIONS["render"], version("bpy"), content, view.name, pose]
     if any(view_pass.unless for view_pass in lightfield.passes):
         key.append(VERSIONS["surfaces"])

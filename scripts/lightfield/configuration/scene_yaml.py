@@ -7,7 +7,7 @@ config_file.py. With the schemas, editors complete and check the files.
 import difflib
 import math
 import re
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Sequence, Set
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
-from lightfield.configuration.exports import Export, Exports
+from lightfield.configuration.exports import NO_DEPTH, NOT_EXR, Export, Exports
 from lightfield.configuration.family import Family, stand_in
 from lightfield.configuration.publication import PUBLISHED_FOLDER, SPDX, Publication
 from lightfield.configuration.render_settings import Render
@@ -30,12 +30,12 @@ from lightfield.configuration.reprojections import (
 )
 from lightfield.configuration.scene_source import SceneSource
 from lightfield.core.errors import UserError
-from lightfield.core.names import FILE, MESH, PARTS, ROOT, VIEWS
+from lightfield.core.names import FILE, MESH, PARTS, RENDERED, ROOT, VIEWS
 from lightfield.formats import light_groups, published
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.formats.sensors import Sensor
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
-from lightfield.geometry.lenses import LENSES, Lens
+from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
@@ -62,7 +62,7 @@ _REPROJECTION_NEIGHBOURS = {
     "exports",
     MESH,
     "panorama",
-    "render",
+    RENDERED,
     "report",
     "settings",
     FLOW.name,
@@ -77,6 +77,8 @@ _BLENDER_LIMITS = {
     "fisheye_fov": (0.1745, 31.4159, math.pi / 180, "fov in degrees"),
     "fisheye_lens": (0.01, 100.0, 1.0, "focal length in mm"),
 }
+# Blender makes each side of a smaller image so long.
+SMALLEST_IMAGE = 4
 # Planning more frames or views than these would take hours.
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
@@ -467,21 +469,17 @@ class Scene(Credits):
             for source in export.sources
             if source in allowed_sources
         ):
-            raise ValueError(
-                f"{export_key}.look: is for EXR sources; give look to the reprojection "
-                f"{export.sources[0]}"
-            )
+            source = export.sources[0]
+            of_look = f"the reprojection {source}" if source in self.reprojections else "sensor"
+            raise ValueError(f"{export_key}.look: is for EXR sources; give look to {of_look}")
         for source in export.sources:
             if source not in allowed_sources:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
-            has_depth = self.render is None or self.render.depth != "none"
             reprojection = None if source == VIEWS else developments[source]
             if reprojection and reprojection.relight == light_groups.EACH:
                 raise ValueError(
                     f"{key}: {source} holds one image per light; an export needs one image per view"
                 )
-            if reprojection:
-                has_depth &= reprojection.has_depth
             self._check_passes_of(key, source, export)
             motion = self.render and self.render.camera_motion
             is_resampled = reprojection is not None and reprojection.camera is not None
@@ -490,11 +488,9 @@ class Scene(Credits):
                     f"{key}: {source} mixes the rows of a rolling shutter, whose times the export "
                     f"has; export {VIEWS}"
                 )
-            self._check_exported_rigs(export_key, export, source, has_depth)
+            self._check_exported_rigs(export_key, export, source)
 
-    def _check_exported_rigs(
-        self, export_key: str, export: Export, source: str, has_depth: bool
-    ) -> None:
+    def _check_exported_rigs(self, export_key: str, export: Export, source: str) -> None:
         """Check that an export's consumer can take the views of each chosen rig of a source."""
         reprojection = self.developments.get(source)
         rigs_of_source = (reprojection and reprojection.rigs) or [*self.rigs]
@@ -504,7 +500,7 @@ class Scene(Credits):
                     f"{export_key}.rigs: {name} is not a rig of the reprojection {source}"
                 )
         refusals = {
-            name: _export_refusal(export, self.rigs[name], reprojection, has_depth)
+            name: self._export_refusal(export, self.rigs[name], source)
             for name in export.rigs or rigs_of_source
         }
         accepted = ", ".join(name for name, refusal in refusals.items() if not refusal)
@@ -512,6 +508,37 @@ class Scene(Credits):
             if refusal:
                 hint = f"; or export without it: rigs: [{accepted}]" if accepted else ""
                 raise ValueError(f"{export_key}.sources: {source}: the rig {name} {refusal}{hint}")
+
+    def _export_refusal(self, export: Export, rig: Rig, source: str) -> str | None:
+        """Return why an export's consumer cannot take a rig's views, and what to do. Or None."""
+        if rig.is_omnidirectional:
+            return "has views without a centre, as omnidirectional stereo has"
+        reprojection = self.developments.get(source)
+        camera = (reprojection and reprojection.camera) or rig.camera
+        renders_depth = self._renders_depth(rig)
+        has_depth = renders_depth and (reprojection is None or reprojection.has_depth)
+        lacks_surfaces = export.needs_surfaces and not renders_depth
+        refusal = export.rig_refusal(rig) or (NO_DEPTH if lacks_surfaces else None)
+        refusal = refusal or export.refusal(camera.make(), has_depth)
+        if refusal not in (NO_DEPTH, NOT_EXR):
+            return refusal
+        if not renders_depth:
+            return f"{NO_DEPTH}; {self._depth_remedy}"
+        if source not in self.reprojections:
+            return f"{refusal}; export the sensor's source"
+        return f"{refusal}; give reprojections.{source} format: exr"
+
+    def _renders_depth(self, rig: Rig) -> bool:
+        """Return whether the views of a rig hold depth, before any reprojection."""
+        if self.render:
+            return self.render.depth != "none"
+        return not isinstance(rig, Poses) or published.render(rig).depth != "none"
+
+    @property
+    def _depth_remedy(self) -> str:
+        if self.render:
+            return "leave out render.depth: none"
+        return "its lightfield.json says so; leave out the export"
 
     def _check_passes_of(self, key: str, source: str, export: Export) -> None:
         """Check that the views of a source have the passes that an export needs."""
@@ -557,7 +584,7 @@ class Scene(Credits):
                 f"must be one of {lenses} (reproject for the others)"
             )
         if self.render:
-            _check_blender_limits(f"{key}.camera", lens)
+            _check_blender_limits(f"{key}.camera", camera)
         if self.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
             raise ValueError(
                 f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
@@ -595,24 +622,29 @@ class Scene(Credits):
                 raise ValueError(f"reprojections.{reprojection_name}: {refusal}")
 
 
+def small_image(resolution: Sequence[int]) -> str | None:
+    """Return what is wrong with an image that is smaller than Blender's smallest. Or None."""
+    if min(resolution) >= SMALLEST_IMAGE:
+        return None
+    least = f"{SMALLEST_IMAGE} × {SMALLEST_IMAGE}"
+    return f"is {[*resolution]}; must be at least {least} pixels, the smallest image of Blender"
+
+
 def _look_of(block: Any) -> str | None:
     """Return the look of a reprojection, of an export or of the sensor, if it has one."""
     return getattr(block, "look", None)
 
 
-def _export_refusal(
-    export: Export, rig: Rig, reprojection: Reprojection | None, has_depth: bool
-) -> str | None:
-    """Return why an export's consumer cannot take the views of a rig, and what to do. Or None."""
-    camera = (reprojection and reprojection.camera) or rig.camera
-    if rig.is_omnidirectional:
-        return "has views without a centre, as omnidirectional stereo has"
-    return export.rig_refusal(rig) or export.refusal(camera.make(), has_depth)
-
-
-def _check_blender_limits(key: str, lens: Lens) -> None:
+def _check_blender_limits(key: str, settings: CameraSettings) -> None:
     """Refuse a value outside Blender's limits, which Blender would clamp."""
+    if problem := small_image(settings.resolution):
+        raise ValueError(f"{key}.resolution: {problem}")
+    lens = settings.make()
     camera = lens.to_lightfield()["camera"]
+    fov = getattr(settings, "fov", None)
+    if isinstance(lens, Rectilinear) and lens.focal_length < 1 and fov:
+        widest = math.degrees(2 * math.atan(lens.sensor[0] / 2))
+        raise ValueError(f"{key}.fov: is {fov:g}; must be at most {widest:.4g} in Blender")
     for name, (least, most, unit, title) in _BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:

@@ -5,6 +5,8 @@ from typing import Literal, get_args
 
 # The name of the rendered views among a dataset's reprojections.
 VIEWS = "views"
+# The folder of their shards' receipts, logs and times, beside the folders of the reprojections.
+RENDERED = "render"
 
 # The folder of a dataset with the surface that its cameras can see.
 MESH = "mesh"

@@ -11,8 +11,7 @@ of a run, such as the number of threads. Its settings decide what it writes, and
         output: Path = writes(".blend to write")
 
 The class determines the program with its flags (`lightfield.engine.flags`) and its page of the
-reference. It also determines the settings file that a rule writes, and the stage of a family's
-member.
+reference. It also determines the settings file that a rule writes.
 """
 
 import importlib

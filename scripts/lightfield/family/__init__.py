@@ -1,1 +1,1 @@
-"""Builds the members of families: all stages of one member after another, in one process."""
+"""Builds the members of families: the jobs of one member after another, in one process."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.configuration import scene_yaml
+from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
 from lightfield.configuration.scene_yaml import Scene
@@ -21,13 +22,14 @@ from lightfield.core.errors import LESS_MEMORY, OutsideError, UserError, is_outs
 from lightfield.core.files import DAMAGE, set_aside, sha256, write_json
 from lightfield.engine import receipts
 from lightfield.engine.receipts import OpenReceipt
-from lightfield.family.stages import StageRun, jobs_of
+from lightfield.family.run import MemberRun
 from lightfield.formats.layout import SUMS, read_sums
 from lightfield.geometry.rigs import Poses
 from lightfield.planning.loading import datasets_of
 from lightfield.rendering.models import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device
+from lightfield.workflow.build import Build
 from lightfield.workflow.member_record import read_member
 
 # What a member is made of does not depend on these keys of a scene YAML.
@@ -85,7 +87,7 @@ class MemberBuild:
             return self._build(device, threads)
 
     def _build(self, device: Device, threads: int) -> dict[str, Any]:
-        run = StageRun()
+        run = MemberRun()
         with self._opened_receipt() as receipt, _output_to(self.log):
             # From now on the member is neither valid nor failed.
             self.record.unlink(missing_ok=True)
@@ -97,9 +99,7 @@ class MemberBuild:
                 rigs = written.rigs.values()
                 receipts.note_inputs(rig.file for rig in rigs if isinstance(rig, Poses))
                 datasets = self._datasets(written)
-                scene = f"{self.settings.family}/{self.member.name}"
-                work = self.settings.work
-                run.run(jobs_of(datasets, written, scene, work, device, threads))
+                run.run(self._build_of(datasets), device, threads)
                 write_json(self.work / "cpu_seconds.json", run.seconds)
                 entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
                 receipt.check_inputs()
@@ -178,6 +178,18 @@ class MemberBuild:
         }
         settings = self.settings
         return datasets_of(settings.family, written, settings.preset, settings.limits, fields)
+
+    def _build_of(self, datasets: list[Dataset]) -> Build:
+        """Return the build of the member's ``datasets``."""
+        settings = self.settings
+        config = Configuration(
+            scenes=[settings.family],
+            preset=settings.preset,
+            presets={settings.preset: settings.limits},
+            results=settings.results,
+            work=settings.work,
+        )
+        return Build(config, datasets, {dataset.name: dataset for dataset in datasets}, {})
 
     def _fail(self, receipt: OpenReceipt, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member.

@@ -47,6 +47,8 @@ EXPOSURE = "exposure"
 # The properties of the machine that made the file, as far as they change bytes. Each view names its
 # own machine.
 MACHINE = "machine"
+# How a model came into the unit box: its shift in metres, and then its scale.
+MODEL_PLACEMENT = "model_placement"
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,12 @@ def _directions(world_from_cameras: Floats, box: Floats) -> tuple[Floats, Floats
     return local / np.maximum(distances, 1e-12)[:, None], angles
 
 
+def cuts(lens: Lens, world_from_cameras: Floats, points: Floats) -> Bools:
+    """Return which cameras (n, 4, 4) have one of the ``points`` (m, 3) outside of their image."""
+    local = (points - world_from_cameras[:, None, :3, 3]) @ world_from_cameras[:, :3, :3]
+    return np.asarray(~lens.in_frame(lens.pixels(local)).all(axis=1), np.bool_)
+
+
 def _angles(cosines: Floats) -> Floats:
     angles: Floats = np.arccos(np.clip(cosines, -1, 1))
     return angles
@@ -61,16 +67,21 @@ def _largest_share(lens: Lens, world_from_cameras: Floats, box: Floats) -> float
     return math.pi / 4 * pixels**2 / (lens.width * lens.height)
 
 
+def reach(box: Floats) -> str:
+    """Return in words from where to where a ``box`` (2, 3) in metres reaches."""
+    low, high = (f"({', '.join(f'{side:.4g}' for side in corner)})" for corner in box)
+    return f"reaches from {low} to {high} m"
+
+
 def place(positions: Floats, box: Floats) -> str:
     """Return in words where a scene and the cameras at ``positions`` (n, 3) are.
 
     ``box`` (2, 3) is around the scene.
     """
     distances = np.linalg.norm(positions - box.mean(axis=0), axis=1)
-    low, high = (f"({', '.join(f'{side:.4g}' for side in corner)})" for corner in box)
     nearest, farthest = f"{np.min(distances):.4g}", f"{np.max(distances):.4g}"
     away = nearest if nearest == farthest else f"{nearest} to {farthest}"
-    return f"reaches from {low} to {high} m, and the cameras are {away} m from its middle"
+    return f"{reach(box)}, and the cameras are {away} m from its middle"
 
 
 def warnings(
@@ -82,15 +93,38 @@ def warnings(
     """
     where = "it " + place(world_from_cameras[:, :3, 3], box)
     mend = "move the rig (center), or give the scene another size"
-    missing = [
-        name
-        for name, sees in zip(names, may_see(lens, world_from_cameras, box), strict=True)
-        if not sees
-    ]
+    missing = _chosen(names, ~may_see(lens, world_from_cameras, box))
     if missing:
         yield (
-            f"{len(missing)} of {len(names)} cameras look past the scene: {', '.join(missing[:8])}"
-            f"{' …' if len(missing) > 8 else ''}: {where}; {mend}"
+            f"{len(missing)} of {len(names)} cameras look past the scene: {_listed(missing)}: "
+            f"{where}; {mend}"
         )
     elif (share := _largest_share(lens, world_from_cameras, box)) < _SMALL:
         yield f"the scene covers at most {share:.1g} of each view: {where}; {mend}"
+
+
+def cut_warnings(
+    lens: Lens, names: Sequence[str], world_from_cameras: Floats, points: Floats
+) -> Iterator[str]:
+    """Yield a line if most views cut a model, which has its outermost ``points`` (m, 3) in metres.
+
+    Cameras in the model's box count as right, because they may be in a room. ``names`` are of the
+    views of ``world_from_cameras`` (n, 4, 4).
+    """
+    box = np.array([points.min(axis=0), points.max(axis=0)])
+    places = world_from_cameras[:, :3, 3]
+    is_outside = ((places < box[0]) | (places > box[1])).any(axis=1)
+    cut_views = _chosen(names, is_outside & cuts(lens, world_from_cameras, points))
+    if len(cut_views) > len(names) / 2:
+        yield (
+            f"{len(cut_views)} of {len(names)} views cut the model: {_listed(cut_views)}: it "
+            f"{place(places, box)}; make the rig larger (size: fit), or the field of view"
+        )
+
+
+def _chosen(names: Sequence[str], is_chosen: Bools) -> list[str]:
+    return [name for name, chosen in zip(names, is_chosen.tolist(), strict=True) if chosen]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}"

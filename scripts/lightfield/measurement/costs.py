@@ -14,7 +14,7 @@ from lightfield.configuration.config_file import Energy
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_text, write_json
-from lightfield.core.names import FILE
+from lightfield.core.names import FILE, RENDERED
 from lightfield.core.paths import files_below
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import NAME, LightField
@@ -24,15 +24,16 @@ from lightfield.planning.sampling import standard_error
 from lightfield.stages import measurement
 from lightfield.workflow import history
 
-# The stages that every dataset has, in the order of the work. Other stages come between.
-_FIRST_STAGES = ("scene", "cameras", "render")
-_LAST_STAGES = ("export", "validate", "report")
+# The kinds of jobs that every dataset has, in the order of the work: the folders of their times.
+# Other kinds come between. Each reprojection is one.
+_FIRST_KINDS = ("scene", "cameras", RENDERED)
+_LAST_KINDS = ("export", "validate", "report")
 # The file and the folder that exporters write beside the views.
 _EXPORTED = ("transforms.json", "exports")
-# The files and folders of a stage. Without an entry, the folder has the stage's name.
-_STAGE_PATHS = {
+# The files and folders of a kind. Without an entry, the folder has the kind's name.
+_PATHS_OF_KIND = {
     "cameras": ("lightfield.json",),
-    "render": ("exr", *PASSES, f"{GROUP_PREFIX}*"),
+    RENDERED: ("exr", *PASSES, f"{GROUP_PREFIX}*"),
     # Exports of reprojected views lie in the reprojection's folder.
     "export": (*_EXPORTED, *(f"*/{name}" for name in _EXPORTED)),
     "validate": ("validation.json",),
@@ -42,8 +43,8 @@ _NOT_COUNTED = ("costs.json", "index.html")
 
 
 @dataclass
-class StageCost:
-    """The sums over the jobs of one stage. The peak memory is the largest job's."""
+class KindCost:
+    """The sums over the jobs of one kind. The peak memory is the largest job's."""
 
     jobs: int = 0
     wall_seconds: float = 0.0
@@ -51,7 +52,7 @@ class StageCost:
     peak_memory_bytes: int = 0
 
 
-def _shard_costs(name: str, runs: Sequence[history.Run]) -> dict[str, Any]:
+def _shard_costs(name: str, runs: Sequence[history.ProcessHistory]) -> dict[str, Any]:
     """Add up all processes that worked on one shard."""
     first, end = map(int, name.split("-"))
     views = [view for run in runs for view in run.views]
@@ -82,13 +83,13 @@ def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {k: round(v, 3) if isinstance(v, float) else v for k, v in figures.items()}
 
 
-def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, StageCost]:
-    """Add up the jobs' TSVs by stage: the name of a TSV's folder, or else its own name.
+def _costs_of_kinds(dataset: Path, scene: Iterable[Path]) -> dict[str, KindCost]:
+    """Add up the jobs' TSVs by kind: the name of a TSV's folder, or else its own name.
 
     Leaves out the TSVs of shards, because they hold only a shard's last run. Warns about a TSV that
     cannot be read, and leaves it out.
     """
-    stages: dict[str, StageCost] = {}
+    kinds: dict[str, KindCost] = {}
     tables = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
     tables += [
         (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
@@ -96,19 +97,19 @@ def _job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, StageCost]:
         if path.suffix == ".tsv"
     ]
     for name, path in tables:
-        if name == "render":
+        if name == RENDERED:
             continue
         try:
             wall, cpu, memory = job_times(path)
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
             print(f"{path}: is not a table of a job's time; the job is left out", file=sys.stderr)
             continue
-        stage = stages.setdefault(name, StageCost())
-        stage.jobs += 1
-        stage.wall_seconds += wall
-        stage.cpu_seconds += cpu
-        stage.peak_memory_bytes = max(stage.peak_memory_bytes, memory)
-    return stages
+        kind = kinds.setdefault(name, KindCost())
+        kind.jobs += 1
+        kind.wall_seconds += wall
+        kind.cpu_seconds += cpu
+        kind.peak_memory_bytes = max(kind.peak_memory_bytes, memory)
+    return kinds
 
 
 def job_times(path: Path) -> tuple[float, float, int]:
@@ -120,35 +121,35 @@ def job_times(path: Path) -> tuple[float, float, int]:
     return wall, cpu, memory
 
 
-def _stage_bytes(stages: Iterable[str], dataset: Path, blend: Path | None) -> dict[str, int]:
-    """Return the size of the files of each stage. 0 for a stage without files in the dataset.
+def _bytes_of_kinds(kinds: Iterable[str], dataset: Path, blend: Path | None) -> dict[str, int]:
+    """Return the size of the files of each kind. 0 for a kind without files in the dataset.
 
-    A file that exports link to takes no more space there. It counts in the first of its stages.
+    A file that exports link to takes no more space there. It counts in the first of its kinds.
     """
     sizes = {}
     counted: set[tuple[int, int]] = set()
-    for stage in stages:
-        sizes[stage] = 0
-        for file in _stage_files(stage, dataset, blend):
+    for kind in kinds:
+        sizes[kind] = 0
+        for file in _files_of_kind(kind, dataset, blend):
             status = file.stat()
             if (status.st_dev, status.st_ino) not in counted:
                 counted.add((status.st_dev, status.st_ino))
-                sizes[stage] += status.st_size
+                sizes[kind] += status.st_size
     return sizes
 
 
-def _stage_files(stage: str, dataset: Path, blend: Path | None) -> list[Path]:
-    """Return the files of a stage that count, in the folder ``dataset``."""
-    if stage == "scene":
+def _files_of_kind(kind: str, dataset: Path, blend: Path | None) -> list[Path]:
+    """Return the files of a kind that count, in the folder ``dataset``."""
+    if kind == "scene":
         return [blend] if blend else []
     files = []
-    for name in _STAGE_PATHS.get(stage, (stage,)):
+    for name in _PATHS_OF_KIND.get(kind, (kind,)):
         for path in dataset.glob(name):
             inside = [path] if path.is_file() else files_below(path)
             files += [file for file in inside if file.name not in _NOT_COUNTED]
-    if stage == "export":
+    if kind == "export":
         return files
-    exported = [dataset / stage / name for name in _EXPORTED]
+    exported = [dataset / kind / name for name in _EXPORTED]
     return [file for file in files if not any(file.is_relative_to(path) for path in exported)]
 
 
@@ -167,7 +168,7 @@ class RenderedView:
     first: bool
 
 
-def renderings(run: history.Run) -> Iterator[RenderedView]:
+def renderings(run: history.ProcessHistory) -> Iterator[RenderedView]:
     """Split the time of each view that a process rendered.
 
     While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
@@ -183,17 +184,17 @@ def renderings(run: history.Run) -> Iterator[RenderedView]:
         yield RenderedView(view["view"], view["finished"], traced, rest, first=index == 0)
 
 
-def _on_processor(run: history.Run) -> bool:
+def _on_processor(run: history.ProcessHistory) -> bool:
     """Return whether a process rendered on the processor's cores."""
     return bool(run.start["device"] == "CPU")
 
 
-def on_card(run: history.Run) -> bool:
+def on_card(run: history.ProcessHistory) -> bool:
     """Return whether a process rendered views on a graphics card."""
     return bool(run.views) and not _on_processor(run)
 
 
-def _latest_device(runs: Sequence[history.Run]) -> str | None:
+def _latest_device(runs: Sequence[history.ProcessHistory]) -> str | None:
     """Return the device that rendered the latest view. None without a rendered view."""
     rendered = [run for run in runs if run.views]
     if not rendered:
@@ -228,23 +229,24 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
     runs = [run for runs_of_shard in by_shard.values() for run in runs_of_shard]
     shards = [_shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
-    stages = in_order(
-        _job_stages(job.benchmarks, job.scene_benchmarks) | {"render": _render_stage(shards)}
+    kinds = in_order(
+        _costs_of_kinds(job.benchmarks, job.scene_benchmarks) | {RENDERED: _cost_of_views(shards)}
     )
-    sizes = _stage_bytes(stages, job.dataset, job.blend)
+    sizes = _bytes_of_kinds(kinds, job.dataset, job.blend)
     device = _latest_device(runs)
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
+        # The file has another word for the kinds, so that those who read it need not change.
         "stages": [
-            {"stage": name, **_rounded(asdict(stage)), "bytes": sizes[name]}
-            for name, stage in stages.items()
+            {"stage": name, **_rounded(asdict(kind)), "bytes": sizes[name]}
+            for name, kind in kinds.items()
         ],
         "shards": shards,
         **{name: round(sum(shard[name] for shard in shards), 3) for name in totals},
         "device": device,
         "cores": energy.core_count,
         "watts": energy.watts,
-        "energy_kwh": kwh(_machine_seconds(stages, runs, energy.core_count), energy.watts),
+        "energy_kwh": kwh(_machine_seconds(kinds, runs, energy.core_count), energy.watts),
         "attribution": (
             f"{energy.watts:g} W, the whole machine's, times wall time, times the part of its "
             f"{energy.core_count} cores that was busy"
@@ -252,8 +254,8 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
         ),
         "extrapolation": extrapolation(
             runs,
-            stages,
-            sizes["render"],
+            kinds,
+            sizes[RENDERED],
             LightField.read(job.dataset / NAME),
             energy,
             full,
@@ -262,9 +264,9 @@ def costs(job: measurement.Costs) -> dict[str, Any]:
     }
 
 
-def _render_stage(shards: Sequence[Mapping[str, Any]]) -> StageCost:
+def _cost_of_views(shards: Sequence[Mapping[str, Any]]) -> KindCost:
     """Return the sums over the jobs of all shards."""
-    return StageCost(
+    return KindCost(
         jobs=len(shards),
         wall_seconds=sum(shard["wall_seconds"] for shard in shards),
         cpu_seconds=sum(shard["cpu_seconds"] for shard in shards),
@@ -272,25 +274,23 @@ def _render_stage(shards: Sequence[Mapping[str, Any]]) -> StageCost:
     )
 
 
-def in_order(stages: Mapping[str, StageCost]) -> dict[str, StageCost]:
-    """Return the stages in the order of the work."""
-    between = sorted(stages.keys() - {*_FIRST_STAGES, *_LAST_STAGES})
-    names = [*_FIRST_STAGES, *between, *_LAST_STAGES]
-    return {name: stages[name] for name in names if name in stages}
+def in_order(kinds: Mapping[str, KindCost]) -> dict[str, KindCost]:
+    """Return the kinds of jobs in the order of the work."""
+    between = sorted(kinds.keys() - {*_FIRST_KINDS, *_LAST_KINDS})
+    names = [*_FIRST_KINDS, *between, *_LAST_KINDS]
+    return {name: kinds[name] for name in names if name in kinds}
 
 
 def _machine_seconds(
-    stages: Mapping[str, StageCost], runs: Sequence[history.Run], cores: int
+    kinds: Mapping[str, KindCost], runs: Sequence[history.ProcessHistory], cores: int
 ) -> float:
     """Return the seconds of the whole machine that the work took.
 
     Work on processors takes its part of the ``cores``. A run on a graphics card takes the machine.
     """
-    other_stages = sum(
-        stage.cpu_seconds / cores for name, stage in stages.items() if name != "render"
-    )
+    other_kinds = sum(kind.cpu_seconds / cores for name, kind in kinds.items() if name != RENDERED)
     rendering = sum(run.wall_seconds if on_card(run) else run.cpu_seconds / cores for run in runs)
-    return other_stages + rendering
+    return other_kinds + rendering
 
 
 @dataclass(frozen=True)
@@ -338,8 +338,8 @@ class Scale:
 
 
 def extrapolation(
-    runs: Sequence[history.Run],
-    stages: Mapping[str, StageCost],
+    runs: Sequence[history.ProcessHistory],
+    kinds: Mapping[str, KindCost],
     view_bytes: int,
     lightfield: LightField,
     energy: Energy,
@@ -370,18 +370,16 @@ def extrapolation(
         error = scale.views * a_view * math.sqrt(missing_part)
     # Beside a graphics card, a core's time is only a part of the machine's.
     part = 1 if by_processor else 1 / energy.core_count
-    growing_stages = {"validate", FLOW.name, *reprojections}
+    growing_kinds = {"validate", FLOW.name, *reprojections}
     each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
-        stage.cpu_seconds for name, stage in stages.items() if name in growing_stages
+        kind.cpu_seconds for name, kind in kinds.items() if name in growing_kinds
     )
     start_ups = sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
-    fixed_stages = sum(
-        stage.cpu_seconds
-        for name, stage in stages.items()
-        if name not in {"render", *growing_stages}
+    fixed_kinds = sum(
+        kind.cpu_seconds for name, kind in kinds.items() if name not in {RENDERED, *growing_kinds}
     )
     first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
-    once = first_views + part * (start_ups + fixed_stages)
+    once = first_views + part * (start_ups + fixed_kinds)
     rate = Rate(
         sample_seconds=mean(times) / (scale.pixels_here * scale.cost_here),
         pixel_seconds=each_view / scale.pixels_here,

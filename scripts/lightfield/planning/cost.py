@@ -497,7 +497,7 @@ def _known_content(path: str, _changed: int) -> Any:
     return json.loads(read_bytes(path))
 
 
-# The other stages of a dataset.
+# The other jobs of a dataset.
 
 
 def _checks(dataset: Dataset) -> Cost:

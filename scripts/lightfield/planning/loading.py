@@ -144,6 +144,7 @@ def datasets_of(
                 preset=preset,
                 rig_name=name,
                 rig_folder=folder,
+                written=written,
                 source=source.model_copy(update={"frame": frame}),
                 render=_limited_render(written.render, rig, limits),
                 rig=limited_rig,
@@ -178,6 +179,9 @@ def _rig_of(scene: str, name: str, written: scene_yaml.Scene, preset: str, limit
     except UserError as error:
         problem = f"rigs.{name}: {error}; let the preset have more views"
         raise scene_yaml.mistake(scene, problem) from None
+    if written.render and (too_small := scene_yaml.small_image(rig.camera.resolution)):
+        problem = f"rigs.{name}.camera.resolution: under the preset {preset}, {too_small}"
+        raise scene_yaml.mistake(scene, f"{problem}; let the preset have more pixels")
     if written.flow and rig.is_at_one_place():
         raise scene_yaml.mistake(
             scene,

@@ -8,6 +8,7 @@ import math
 import os
 
 from lightfield.configuration.dataset import Dataset, shard_bounds
+from lightfield.core.names import RENDERED
 from lightfield.engine.receipts import FOLDER, SHARD
 from lightfield.planning import cost
 
@@ -22,7 +23,7 @@ def shard_count(dataset: Dataset) -> int:
     if dataset.views_per_shard != "auto":
         return math.ceil(views / dataset.views_per_shard)
     present_count = cost.shard_count(dataset)
-    begun = _begun_shards(f"{dataset.work_root}/{FOLDER}/{dataset.name}/render")
+    begun = _begun_shards(f"{dataset.work_root}/{FOLDER}/{dataset.name}/{RENDERED}")
     if begun.issubset(shard_bounds(views, present_count)):
         return present_count
     names = {

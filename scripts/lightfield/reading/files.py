@@ -57,7 +57,7 @@ class Folder(Files):
 
 
 @dataclass(frozen=True)
-class Member:
+class PackedFile:
     """The place of a file in a tar, which stores its bytes as they are."""
 
     archive: Path
@@ -76,7 +76,7 @@ class Packed(Files):
     """The files in tars. ``contents`` has the place of each, or its bytes."""
 
     path: Path
-    contents: Mapping[str, Member | bytes] = field(repr=False)
+    contents: Mapping[str, PackedFile | bytes] = field(repr=False)
 
     def has(self, name: str) -> bool:
         return name in self.contents
@@ -93,7 +93,7 @@ class Packed(Files):
         content = self.contents[name]
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / PurePosixPath(name).name
-            file.write_bytes(content.read() if isinstance(content, Member) else content)
+            file.write_bytes(content.read() if isinstance(content, PackedFile) else content)
             try:
                 yield file
             except UserError as error:
@@ -101,11 +101,11 @@ class Packed(Files):
 
     def place(self, name: str) -> Path:
         content = self.contents.get(name)
-        archive = content.archive if isinstance(content, Member) else self.path
+        archive = content.archive if isinstance(content, PackedFile) else self.path
         return archive / name
 
 
-def members_of(archive: Path) -> dict[str, Member]:
+def members_of(archive: Path) -> dict[str, PackedFile]:
     """Return the files in a tar. Raises `UserError` if it is cut short, or no plain tar."""
     check_readable(archive)
     try:
@@ -113,7 +113,7 @@ def members_of(archive: Path) -> dict[str, Member]:
             entries = [entry for entry in tar if entry.isfile()]
     except tarfile.TarError as error:
         raise UserError(f"{archive}: is not a whole, uncompressed tar: {error}") from None
-    members = {entry.name: Member(archive, entry.offset_data, entry.size) for entry in entries}
+    members = {entry.name: PackedFile(archive, entry.offset_data, entry.size) for entry in entries}
     end = max((member.offset + member.size for member in members.values()), default=0)
     # Two blocks of zeros end a tar.
     if archive.stat().st_size < end + 2 * tarfile.BLOCKSIZE:

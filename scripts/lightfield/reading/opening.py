@@ -18,7 +18,7 @@ from lightfield.formats.layout import (
 )
 from lightfield.formats.lightfield import NAME
 from lightfield.reading.dataset import Dataset
-from lightfield.reading.files import Files, Folder, Member, Packed, members_of
+from lightfield.reading.files import Files, Folder, Packed, PackedFile, members_of
 from lightfield.reading.shards import read_shards
 
 # A run of shards: garden_ring-train-{00000..00009}.tar.
@@ -125,7 +125,7 @@ def _in_tars(path: Path, archives: Sequence[Path]) -> list[Dataset]:
     return [dataset for dataset in datasets if dataset]
 
 
-def _package(parts: Sequence[Path], members: Mapping[Path, Mapping[str, Member]]) -> Packed:
+def _package(parts: Sequence[Path], members: Mapping[Path, Mapping[str, PackedFile]]) -> Packed:
     """Return the files of a package of these parts, without the folder that it unpacks to."""
     contents = {
         name.partition("/")[2]: file for part in parts for name, file in members[part].items()

@@ -11,7 +11,7 @@ from lightfield.formats import passes
 from lightfield.formats.layout import IMAGES, OTHER_FILES
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.formats.passes import FLOW
-from lightfield.reading.files import Member, Packed, members_of
+from lightfield.reading.files import Packed, PackedFile, members_of
 
 # The keys of lightfield.json that a sample's JSON has of each picture.
 _OF_LENS = ("camera", "resolution", "sensor_size", "depth", OMNIDIRECTIONAL)
@@ -36,13 +36,13 @@ class _ShownViews:
 class _DatasetInShards:
     """A dataset in shards: its files, its lightfield.jsons by their folders, and its member."""
 
-    contents: dict[str, Member | bytes] = field(default_factory=dict)
+    contents: dict[str, PackedFile | bytes] = field(default_factory=dict)
     shown: dict[str, _ShownViews] = field(default_factory=dict)
     member: dict[str, Any] = field(default_factory=dict)
 
 
 def read_shards(
-    path: Path, shards: Mapping[Path, Mapping[str, Member]]
+    path: Path, shards: Mapping[Path, Mapping[str, PackedFile]]
 ) -> list[tuple[Packed, dict[str, Any]]]:
     """Return the files of each dataset in ``shards``, and what is known of its member of a family.
 
@@ -75,9 +75,9 @@ def read_shards(
     return [(Packed(path, each.contents), each.member) for each in datasets.values()]
 
 
-def _others(archives: Iterable[Path]) -> dict[str, Member]:
+def _others(archives: Iterable[Path]) -> dict[str, PackedFile]:
     """Return the files of no single view, by their names in the dataset."""
-    others: dict[str, Member] = {}
+    others: dict[str, PackedFile] = {}
     for archive in {*archives}:
         if archive.is_file():
             others |= {name.partition("/")[2]: file for name, file in members_of(archive).items()}
@@ -85,7 +85,7 @@ def _others(archives: Iterable[Path]) -> dict[str, Member]:
 
 
 def _add_sample(
-    datasets: dict[str, _DatasetInShards], key: str, members: Mapping[str, Member]
+    datasets: dict[str, _DatasetInShards], key: str, members: Mapping[str, PackedFile]
 ) -> None:
     """Add the pictures of a sample to its dataset."""
     sample = json.loads(members[f"{key}.json"].read())

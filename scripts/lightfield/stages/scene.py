@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -121,18 +121,28 @@ class CheckBlend(Stage[CheckBlendSettings]):
 
 
 class InventorySettings(Settings):
-    """What makes an inventory be listed again: the keys of the scene YAML that the job reads."""
+    """The settings of scripts/inventory.py."""
 
-    scene_name: str | None = cause("As in the scene YAML.")
-    view_layers: Literal["all"] | list[str] | None = cause("As in the scene YAML.")
-    allow_missing: bool | None = cause("As in the scene YAML.")
-    motion_blur: Any = cause("As in the scene YAML.")
-    rendered_frames: Any = cause("Frames that the rigs render.")
-    camera_frames: list[float | None] | None = cause("Frames of rigs of the file's own camera.")
+    scene_name: str | None = Field(None, description="As in the scene YAML.")
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None, description="As in the scene YAML."
+    )
+    allow_missing: bool | None = Field(None, description="As in the scene YAML.")
+    motion_blur: bool | None = Field(None, description="As in the scene YAML.")
+    rendered_frames: list[int | Literal["file"]] = Field(
+        [], description="Frames that the rigs render."
+    )
+    camera_frames: list[float | None] | None = Field(
+        None, description="Frames of rigs of the file's own camera."
+    )
     camera_version: int | None = cause("Version of the choice of cameras.")
     look_version: int | None = cause("Version of what is read of the file's look, if it is used.")
-    followed_camera: str | None = cause("As in the scene YAML.")
-    light_groups: Any = cause("As in the scene YAML.")
+    followed_camera: Literal["file", "view"] | None = Field(
+        None, description="As in the scene YAML."
+    )
+    light_groups: str | list[str] | dict[str, list[str]] | None = Field(
+        None, description="As in the scene YAML."
+    )
 
 
 class Inventory(Stage[InventorySettings]):
@@ -146,6 +156,9 @@ class Inventory(Stage[InventorySettings]):
     scene: str | None = option("name of the file in configs/scenes/ that uses this .blend", None)
     blend: Path = reads("the scene's .blend")
     output: Path = writes("JSON to write")
+    skip_memory: bool = option(
+        "do not measure the memory that the scene takes, in a process of its own", False
+    )
 
     def shared(self) -> Iterator[Path]:
         files = read_inventory(self.output, "external_files")["external_files"]

@@ -57,6 +57,7 @@ class Facts:
     - ``marked``: whether the pixels without a source could be checked.
     - ``compared``: whether a reprojected view was compared with the rendered one.
     - ``colour_compared``: whether its colours were, too.
+    - ``empty``: whether the view is transparent and shows at most a few pixels.
     - ``constant``: whether the view has one colour and one alpha, as sky or a wall may.
     - ``black``: whether this colour is black.
     - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
@@ -75,6 +76,7 @@ class Facts:
     marked: bool = False
     compared: bool = False
     colour_compared: bool = False
+    empty: bool = False
     constant: bool = False
     black: bool = False
     missed: float = 0.0
@@ -205,9 +207,9 @@ class Examiner:
         facts.fault("colour", f"{infinite} values are infinite", infinite)
         if file.path.endswith(".exr"):
             facts.light = clipping.count(colour, image.channels.get("A"), in_circle)
-        shows_nothing = transparent and _shows_nothing(image, in_circle, is_rendered)
+        facts.empty = transparent and _shows_nothing(image, in_circle, is_rendered)
         # A light may be off, or reach nothing that the view shows.
-        if not shows_nothing and not image_set.lightfield.is_relit:
+        if not facts.empty and not image_set.lightfield.is_relit:
             pixels = np.stack([*colour, image.channels["A"]]) if transparent else colour
             facts.constant = _has_one_colour(pixels, in_circle)
             facts.black = facts.constant and not _middle(colour).any()

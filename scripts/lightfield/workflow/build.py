@@ -20,9 +20,9 @@ from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.exports import Export
 from lightfield.configuration.family import RECORD, Family, Member
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_yaml import load_scene, mistake
+from lightfield.configuration.scene_yaml import mistake
 from lightfield.core.errors import UserError
-from lightfield.core.names import CORPUS, VIEWS, scene_folder
+from lightfield.core.names import CORPUS, RENDERED, VIEWS, scene_folder
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.planning.cost import Cost, members_cost
 from lightfield.planning.loading import (
@@ -35,12 +35,10 @@ Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
-RENDERED = "render"
-"""The stage that makes the rendered views. A reprojection's stage has its name."""
 
 
-def stage_of(wildcards: Wildcards) -> str:
-    """Return the stage whose views a job makes or reads."""
+def shards_of(wildcards: Wildcards) -> str:
+    """Return the folder of the shards whose views a job makes or reads: see `Dataset.receipts`."""
     source = wildcards.get("source", "").rstrip("/")
     return wildcards.get("reprojection", source or RENDERED)
 
@@ -102,15 +100,15 @@ class Build:
 
     def reprojection(self, wildcards: Wildcards) -> Reprojection | None:
         """Return the reprojection that a job concerns. None for the rendered views."""
-        stage = stage_of(wildcards)
-        if stage == RENDERED:
+        name = shards_of(wildcards)
+        if name == RENDERED:
             return None
         dataset = self.dataset(wildcards)
-        return _entry(dataset.reprojections, stage, dataset.paths.folder, "reprojection of it")
+        return _entry(dataset.reprojections, name, dataset.paths.folder, "reprojection of it")
 
     def receipts(self, wildcards: Wildcards) -> list[str]:
         """Return the receipts of the shards whose views a job reads."""
-        return self.dataset(wildcards).receipts(stage_of(wildcards))
+        return self.dataset(wildcards).receipts(shards_of(wildcards))
 
     def rendered_receipts(self, wildcards: Wildcards) -> list[str]:
         """Return the receipts of a dataset's rendered views."""
@@ -139,7 +137,7 @@ class Build:
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
-        files = [*dataset.receipts(RENDERED), *dataset.receipts(stage_of(wildcards))]
+        files = [*dataset.receipts(RENDERED), *dataset.receipts(shards_of(wildcards))]
         for test in self.testing(dataset, self.export(wildcards)):
             files += _views_of_source(test, wildcards)
         return list(dict.fromkeys(files))
@@ -229,7 +227,7 @@ class Build:
         return [
             document
             for dataset in self.chosen
-            if load_scene(dataset.scene_name).publish
+            if dataset.written.publish
             for document in dataset.sequence_paths.documents
         ]
 
@@ -399,7 +397,7 @@ def _views_of_source(dataset: Dataset, wildcards: Wildcards) -> list[str]:
     """Return the records and light fields of a dataset's rendered views, and of the source's."""
     return [
         *dataset.receipts(RENDERED),
-        *dataset.receipts(stage_of(wildcards)),
+        *dataset.receipts(shards_of(wildcards)),
         dataset.paths.lightfield,
         dataset.paths.source_lightfield(wildcards["source"]),
     ]

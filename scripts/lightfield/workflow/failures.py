@@ -44,7 +44,7 @@ CLOCKS_DIFFER = 5
 
 
 @dataclass
-class Job:
+class StartedJob:
     """A job that runs or ran: its rule, log and outputs.
 
     ``began`` is in seconds since 1970. ``message`` is the executor's message on its failure.
@@ -78,7 +78,7 @@ class Submission:
     """Jobs that run as one job: a single job, or a ``group`` of them by its name."""
 
     group: str | None = None
-    jobs: list[Job] = field(default_factory=list)
+    jobs: list[StartedJob] = field(default_factory=list)
 
     def causes(self) -> list[tuple[str, str, Path | None]]:
         """Return the rule, cause and log of each of its jobs that failed."""
@@ -87,7 +87,7 @@ class Submission:
         causes = [(job.rule, why, job.log) for job in failed if (why := job.cause())]
         return causes or [self._cause_without_logs(job) for job in failed[:1]]
 
-    def _cause_without_logs(self, job: Job) -> tuple[str, str, Path | None]:
+    def _cause_without_logs(self, job: StartedJob) -> tuple[str, str, Path | None]:
         """Return the rule, cause and log of a job that wrote no log, as if it never began.
 
         The cause is in the batch system's log, or in the executor's message.

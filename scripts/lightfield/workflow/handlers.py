@@ -25,6 +25,7 @@ from lightfield.workflow.jobs import (
     COUNT_MEMBERS,
     ORDER,
     PACK,
+    PAGE,
     RENDER,
     Job,
 )
@@ -190,7 +191,7 @@ class Handlers:
         plan = self._plan
         ends: dict[str, list[str]] = {"valid": [], "not valid": [], "not finished": []}
         for dataset in self._run.build.datasets.values():
-            receipt = plan.receipt_path(f"{dataset.name}/page")
+            receipt = plan.receipt_path(PAGE.name_of(dataset))
             if receipt in plan.asked and is_left(receipt):
                 ends["not finished"].append(plan.shown(dataset.paths.folder))
             elif receipt in plan.asked:

@@ -72,7 +72,7 @@ class History:
 
 
 @dataclass
-class Run:
+class ProcessHistory:
     """What one process did: its start, its images, and its end if it was not killed."""
 
     start: dict[str, Any]
@@ -139,22 +139,22 @@ def shards(folder: Path) -> list[Path]:
     return sorted({path.with_suffix(SUFFIX) for path in files if is_shard(path)})
 
 
-def read(path: Path) -> list[Run]:
+def read(path: Path) -> list[ProcessHistory]:
     """Return the runs in the history of a receipt, in their order."""
     return runs_in(history(path))
 
 
-def runs_in(entries: Iterable[dict[str, Any]]) -> list[Run]:
+def runs_in(entries: Iterable[dict[str, Any]]) -> list[ProcessHistory]:
     """Return the runs in a history, in their order.
 
     Leaves out damaged lines, lines that a kill cut short, and lines before the first start.
     """
-    runs: list[Run] = []
+    runs: list[ProcessHistory] = []
     for entry in entries:
         if not _is_sound(entry):
             continue
         if "started" in entry:
-            runs.append(Run(entry))
+            runs.append(ProcessHistory(entry))
         elif not runs:
             continue
         elif "start_up_seconds" in entry:

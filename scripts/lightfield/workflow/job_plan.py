@@ -29,7 +29,7 @@ from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import FIGURES, PAGE, RENDER, Job
+from lightfield.workflow.jobs import FIGURES, LIGHTFIELD, PAGE, RENDER, Job
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -366,7 +366,7 @@ class JobPlan:
 
     def is_outdated(self, dataset: Dataset) -> bool:
         """Return whether this run makes the light field of a dataset again."""
-        receipt = self.receipt_path(f"{dataset.name}/lightfield")
+        receipt = self.receipt_path(LIGHTFIELD.name_of(dataset))
         return self.check.will_run(receipt)
 
     def is_valid(self, dataset: Dataset) -> bool:

@@ -2,7 +2,7 @@
 
 The record of a job in `lightfield.workflow.jobs` names the function of this module that returns its
 settings, by what the job works on: a scene, a dataset, a reprojection, or something else with
-wildcards of its own. The functions that need no build also serve the stages of a family's members.
+wildcards of its own. The jobs of a family's members have the same settings, but no files of them.
 """
 
 import os
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from lightfield.configuration import keys
 from lightfield.configuration.capture import LightfieldSettings
+from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset import Dataset
 from lightfield.configuration.dataset_paths import prefix_of
 from lightfield.configuration.exports import Export, ExportSettings, InstantNgp, export_settings_of
@@ -29,7 +30,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
-from lightfield.planning.loading import rendered_frames, scene_datasets
+from lightfield.planning.loading import datasets_of, rendered_frames
 from lightfield.settings.base import ReaderSettings, Settings
 from lightfield.stages.checks import SequenceValidationSettings, ValidationSettings
 from lightfield.stages.exports import MeshSettings
@@ -131,22 +132,20 @@ def build_scene(dataset: Dataset) -> BuildSettings:
 
 
 def import_model(dataset: Dataset) -> ImportSettings:
-    source = load_scene(dataset.scene_name).scene
+    source = dataset.written.scene
     if source.model is None:
         raise UserError(f"{dataset.paths.model_blend}: the scene YAML has no model that makes it")
     return ImportSettings.of_source(source)
 
 
 def check_blend(dataset: Dataset) -> CheckBlendSettings:
-    return CheckBlendSettings.of(
-        sha256=load_scene(dataset.scene_name).scene.sha256, bpy=version("bpy")
-    )
+    return CheckBlendSettings.of(sha256=dataset.written.scene.sha256, bpy=version("bpy"))
 
 
 def inventory(dataset: Dataset) -> InventorySettings:
-    """Return what an inventory depends on in the scene YAML."""
-    written = load_scene(dataset.scene_name)
-    datasets = scene_datasets(dataset.scene_name)
+    """Return what an inventory depends on in the scene YAML: the same for all presets."""
+    written = dataset.written
+    datasets = datasets_of(dataset.scene_name, written, "full", Preset(), {})
     source = written.scene
     assert written.render
     # Like the program, leave out rigs without frames.
@@ -189,13 +188,16 @@ def free_places(dataset: Dataset) -> FreePlacesSettings:
 def lightfield(dataset: Dataset) -> LightfieldSettings:
     """Return the settings of a dataset's lightfield.json."""
     file = dataset.rig.file if isinstance(dataset.rig, Poses) else None
-    return LightfieldSettings.of_capture(
+    settings = LightfieldSettings.of_capture(
         dataset,
         flow=bool(dataset.flow),
         file_look=dataset.uses_file_look,
         fingerprint=dataset.builder_fingerprint,
         poses_sha256=sha256(file) if file else None,
     )
+    if dataset.member is None:
+        return settings
+    return settings.model_copy(update={"scene": f"{dataset.scene_name}/{dataset.member}"})
 
 
 def panorama(dataset: Dataset) -> LightfieldSettings:
@@ -430,7 +432,7 @@ def pack(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
         datasets=[dataset.name for dataset in datasets],
         gigabytes=build.config.package_gigabytes,
         rig=datasets[0].rig.type,
-        scene=load_scene(datasets[0].scene_name),
+        scene=datasets[0].written,
         look=datasets[0].shown_look,
     )
     return "pack", settings

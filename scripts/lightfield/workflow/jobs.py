@@ -2,15 +2,19 @@
 
 A rule names its job's record. From the record follow the job's inputs and settings, its receipt,
 bundle, log and times, its phase in the display and the forecast, and its cost. A new job is a
-record here, and a rule that shows its files and its command.
+record here, and a rule that shows its files and its command. A member of a family has no rules: it
+runs the stages of all records that have fields.
 """
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.dataset_paths import Paths
+from lightfield.configuration.dataset_paths import Paths, prefix_of
+from lightfield.core.names import RENDERED, VIEWS
 from lightfield.engine.stage import Stage
+from lightfield.formats import passes
 from lightfield.planning import cost
 from lightfield.planning.cost import BLENDER, JOB, Cost
 from lightfield.planning.phases import Phase
@@ -26,8 +30,10 @@ from lightfield.stages import (
     scene,
     views,
 )
+from lightfield.workflow import job_fields as fields
 from lightfield.workflow import job_settings as settings
 from lightfield.workflow.build import Build, Wildcards
+from lightfield.workflow.job_fields import Fields, FieldsOf
 from lightfield.workflow.job_settings import (
     SettingsOf,
     of_dataset,
@@ -55,6 +61,8 @@ class Job(NamedTuple):
     cost: CostOf | None
     # None for a stage without settings.
     settings: SettingsOf | None = None
+    # None if no member of a family has such a job.
+    fields: FieldsOf | None = None
     # The name of its times, where they have another one.
     times: str = ""
     # The file of a dataset by which readers know the job, if they declare no receipt.
@@ -67,6 +75,18 @@ class Job(NamedTuple):
     is_local: bool = False
     # Whether it renders on the device.
     renders: bool = False
+
+    def name_of(self, dataset: Dataset) -> str:
+        """Return the name of a dataset's job."""
+        return self.name.format(scene=dataset.scene_folder, rig=dataset.rig_folder)
+
+    def stage_of(self, build: Build, wildcards: Wildcards, fields: Fields) -> Stage[Any]:
+        """Return the stage of a job, with its settings."""
+        if self.settings is None:
+            return self.stage(**fields)
+        model = self.stage.settings_model(**fields)
+        content = self.settings(build, wildcards).content
+        return self.stage(settings=model.model_validate(content), **fields)
 
 
 def _costs(known: Cost) -> CostOf:
@@ -102,6 +122,7 @@ BUILD_SCENE = Job(
     "scene",
     _costs(BLENDER),
     of_scene("build_scene", settings.build_scene),
+    fields.build_scene,
 )
 IMPORT_MODEL = Job(
     "{name}/import_model",
@@ -109,6 +130,7 @@ IMPORT_MODEL = Job(
     "scene",
     _costs(BLENDER),
     of_scene("import_model", settings.import_model),
+    fields.import_model,
 )
 CHECK_BLEND = Job(
     "{name}/check_blend",
@@ -124,6 +146,7 @@ INVENTORY = Job(
     "scene",
     _costs(BLENDER),
     of_scene("inventory", settings.inventory),
+    fields.inventory,
     file=lambda paths: paths.inventory,
     has_bundle=True,
 )
@@ -133,6 +156,7 @@ FREE_PLACES = Job(
     "cameras",
     _costs(BLENDER),
     of_dataset("free_places", settings.free_places),
+    fields.free_places,
     times="{scene}/{rig}/cameras/free_places",
 )
 LIGHTFIELD = Job(
@@ -141,6 +165,7 @@ LIGHTFIELD = Job(
     "cameras",
     _costs(JOB),
     of_dataset("lightfield", settings.lightfield),
+    fields.lightfield,
     times="{scene}/{rig}/cameras/lightfield",
     file=lambda paths: paths.lightfield,
     is_local=True,
@@ -150,9 +175,9 @@ CHECK_CAMERAS = Job(
     rig.CheckCameras,
     "cameras",
     _costs(BLENDER),
+    fields=fields.check_cameras,
     times="{scene}/{rig}/cameras/check_cameras",
 )
-SPLITS = Job("{scene}/splits", views.ListSplits, "cameras", _costs(JOB), is_local=True)
 PROBE_CAMERAS = Job(
     "{scene}/probe_cameras",
     rig.MakeLightfield,
@@ -170,15 +195,16 @@ CALIBRATE = Job(
 )
 # Two rules make views: one renders them, and one imports what somebody else has rendered.
 RENDER = Job(
-    "{scene}/{rig}/render/{first}-{end}",
+    f"{{scene}}/{{rig}}/{RENDERED}/{{first}}-{{end}}",
     views.RenderShard,
     "views",
     _of_views(_rendered_or_imported),
+    fields=fields.render,
     has_bundle=True,
     renders=True,
 )
 FLOW = Job(
-    "{scene}/{rig}/flow/{first}-{end}",
+    f"{{scene}}/{{rig}}/{passes.FLOW.name}/{{first}}-{{end}}",
     views.ComputeFlow,
     "flow",
     _of_views(cost.computing_flow),
@@ -191,6 +217,7 @@ REPROJECTED_LIGHTFIELD = Job(
     "reprojections",
     _costs(JOB),
     of_reprojection("reproject", settings.reproject),
+    fields.reprojected_lightfield,
     file=lambda paths: paths.source_lightfield("{reprojection}/"),
     is_local=True,
 )
@@ -208,7 +235,17 @@ REPROJECT = Job(
     "reprojections",
     _reprojected,
     of_reprojection("reproject", settings.reproject),
+    fields.reproject,
     has_bundle=True,
+)
+# After the views, so that a member without views has no list of them.
+SPLITS = Job(
+    "{scene}/splits",
+    views.ListSplits,
+    "cameras",
+    _costs(JOB),
+    fields=fields.splits,
+    is_local=True,
 )
 EXPORT_INSTANT_NGP = Job(
     "{scene}/{rig}/{source}export_instant_ngp",
@@ -216,6 +253,7 @@ EXPORT_INSTANT_NGP = Job(
     "exports",
     _of_dataset(cost.checking),
     of_others(settings.instant_ngp_of),
+    fields.export_instant_ngp,
     times="{scene}/{rig}/export/{source}instant_ngp",
     file=lambda paths: paths.transforms(),
     has_bundle=True,
@@ -227,6 +265,7 @@ EXPORT = Job(
     "exports",
     _of_dataset(cost.checking),
     of_others(settings.export_of),
+    fields.export,
     times="{scene}/{rig}/export/{source}{format}",
     file=lambda paths: paths.export_list(),
     has_bundle=True,
@@ -257,6 +296,7 @@ VALIDATE = Job(
     "validation",
     _of_dataset(cost.checking),
     of_dataset("validate", settings.validate),
+    fields.validate,
     file=lambda paths: paths.validation,
 )
 VALIDATE_SEQUENCE = Job(
@@ -275,6 +315,7 @@ CHECKSUMS = Job(
     "validation",
     _costs(JOB),
     of_dataset("checksums", settings.reader),
+    fields.checksums,
     is_local=True,
 )
 PANORAMA_LIGHTFIELD = Job(
@@ -385,3 +426,32 @@ SYNTHESIS = Job(
 JOBS = [record for record in globals().values() if isinstance(record, Job)]
 """All jobs, in the order of the work."""
 ORDER = {job: place for place, job in enumerate(JOBS)}
+
+
+def jobs_of(build: Build) -> Iterator[tuple[Job, Wildcards, Fields]]:
+    """Yield the jobs of a build whose records have fields, with their wildcards and fields."""
+    # Datasets that test take the scale of those that train.
+    datasets = sorted(build.chosen, key=lambda dataset: dataset.trained_by is not None)
+    for job in JOBS:
+        if job.fields:
+            found = [each for dataset in datasets for each in _wildcards_of(job, dataset)]
+            for wildcards in {job.name.format(**each): each for each in found}.values():
+                job_fields = job.fields(build, wildcards)
+                if job_fields is not None:
+                    yield job, wildcards, job_fields
+
+
+def _wildcards_of(job: Job, dataset: Dataset) -> Iterator[Wildcards]:
+    """Yield the wildcards of all jobs of a kind that a dataset may have."""
+    choices: dict[tuple[str, ...], list[tuple[str, ...]]] = {
+        ("name",): [(dataset.scene_name,)],
+        ("scene",): [(dataset.scene_folder,)],
+        ("rig",): [(dataset.rig_folder,)],
+        ("first", "end"): [(str(first), str(end)) for first, end in dataset.shards],
+        ("reprojection",): [(name,) for name in dataset.reprojections],
+        ("source",): [(prefix_of(source),) for source in (VIEWS, *dataset.reprojections)],
+        ("format",): [(name,) for name in dataset.exports.selected],
+    }
+    used = {keys: values for keys, values in choices.items() if f"{{{keys[0]}}}" in job.name}
+    for values in itertools.product(*used.values()):
+        yield dict(zip(itertools.chain(*used), itertools.chain(*values), strict=True))

@@ -21,6 +21,8 @@ from lightfield.configuration.dataset_paths import Paths
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.core.memory import available
+from lightfield.core.names import RENDERED
+from lightfield.formats.passes import FLOW
 from lightfield.workflow import presence
 from lightfield.workflow.build import Build, Wildcards
 from lightfield.workflow.jobs import Job
@@ -237,7 +239,7 @@ class Run:
             # A sequence's datasets lie a folder deeper, one for each frame.
             "rig": r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
             # The receipts of the views lie beside the receipts of the reprojections.
-            "reprojection": r"(?!f\d{5,7}/|flow/|render/|panorama/)[A-Za-z0-9_.-]+",
+            "reprojection": rf"(?!f\d{{5,7}}/|{FLOW.name}/|{RENDERED}/|panorama/)[A-Za-z0-9_.-]+",
             # Of an export: nothing for the views, or a reprojection's name and a slash.
             "source": r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
             "format": "[a-z0-9_]+",

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from lightfield.core import progress
 from lightfield.core.units import count, duration
 from lightfield.planning.forecast import Request
-from lightfield.workflow.failures import Job, Submission, failure_report, first_sentence
+from lightfield.workflow.failures import StartedJob, Submission, failure_report, first_sentence
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -141,7 +141,7 @@ class RunDisplay:
         self._folder = Path.cwd()
         self._at_close: list[Callable[[], object]] = []
         # The jobs that run or ran, and what belongs to them, by Snakemake's numbers.
-        self._jobs: dict[int, Job] = {}
+        self._jobs: dict[int, StartedJob] = {}
         self._submissions: dict[int, Submission] = {}
         self._started: dict[int, Task] = {}
         self._running: set[int] = set()
@@ -210,7 +210,7 @@ class RunDisplay:
         with self._lock:
             now = time.time()
             path = self._find_log(logs[0]) if logs else None
-            self._jobs[number] = Job(rule, path, [Path(output) for output in outputs], now)
+            self._jobs[number] = StartedJob(rule, path, [Path(output) for output in outputs], now)
             submission.jobs.append(self._jobs[number])
             self._submissions[number] = submission
             self._running.add(number)

@@ -17,6 +17,7 @@ from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
+from lightfield.core.names import RENDERED
 from lightfield.core.units import duration
 from lightfield.engine import receipts
 from lightfield.engine.receipts import FOLDER, Output
@@ -24,7 +25,6 @@ from lightfield.formats.layout import IMAGES, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
-from lightfield.workflow.build import RENDERED
 from lightfield.workflow.member_record import read_member
 
 # The rate is measured over this many seconds.
@@ -136,7 +136,11 @@ def _images(outputs_of_shards: Iterable[Mapping[str, Output]], folder: Path) -> 
 
 
 def _add_shard(
-    rendering: RenderProgress, name: str, runs: Sequence[history.Run], missing: bool, now: float
+    rendering: RenderProgress,
+    name: str,
+    runs: Sequence[history.ProcessHistory],
+    missing: bool,
+    now: float,
 ) -> None:
     """Add the state of a shard's processes. ``missing`` says whether it lacks views."""
     last = runs[-1]

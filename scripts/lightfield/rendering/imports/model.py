@@ -60,6 +60,10 @@ _AXES = {
 # If a model's largest side is beyond these, it is a mistake, and Blender's 32 bits cannot hold it.
 _SIDES = (1e-9, 1e12)
 
+# Models of things, from a ring to a building, have a largest side within these, in metres. In most
+# other units, as in millimetres, their numbers are beyond.
+_PLAUSIBLE = (0.01, 100.0)
+
 # The largest side of a scaled model may differ from 1 by this, because Blender computes in 32 bits.
 _TOLERANCE = 0.01
 
@@ -82,6 +86,8 @@ def import_model(job: ImportModel) -> None:
         print(f"note: {model}: left out: {'; '.join(content['left_out'])}")
     if "unjudged" in content:
         print(f"note: {model}: not compared with the file: {'; '.join(content['unjudged'])}")
+    if "placement" in content:
+        print(f"note: {model}: unit: box: {_placed(**content['placement'])}")
     print(f"{model}: {summary(content)}")
 
 
@@ -92,7 +98,8 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
 
     The record has the ``fingerprint``, the files that the model was read from as
     ``external_files``, the parts that are ``left_out``, its ``box`` in metres, and what the second
-    reader of the format cannot judge as ``unjudged``.
+    reader of the format cannot judge as ``unjudged``. With unit: box, ``placement`` is how its
+    points came into this box: they were moved by ``shift``, and then multiplied by ``scale``.
 
     Raises `UserError` for a model that is broken, empty, lacks files or parts, or names files
     outside its folder.
@@ -154,8 +161,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         if not settings.allow_missing:
             _refuse_without(path, lost)
         left_out += [*lost, *facts.unused]
+    placement = None
     if settings.unit == "box":
-        _scale_to_box(path, box)
+        placement = _scale_to_box(path, box)
         box = _box(path, in_render(compare.shown_boxes))
         if abs((box[1] - box[0]).max() - 1) > _TOLERANCE:
             raise UserError(
@@ -193,7 +201,9 @@ def make_scene(settings: ImportSettings, folder: Path) -> dict[str, Any]:
         "box": box.round(6).tolist(),
         "external_files": entries,
         "left_out": left_out,
-    } | ({"unjudged": unjudged} if unjudged else {})
+        **({"unjudged": unjudged} if unjudged else {}),
+        **({"placement": placement} if placement else {}),
+    }
 
 
 def _import(path: Path, up: str, frame: int) -> tuple[list[str], bool]:
@@ -450,8 +460,11 @@ def _box(path: Path, boxes: Sequence[Box]) -> Box:
     return np.array([corners[:, 0].min(0), corners[:, 1].max(0)])
 
 
-def _scale_to_box(path: Path, box: Box) -> None:
-    """Scale the scene, so that the largest side of ``box`` is 1 and its middle the origin."""
+def _scale_to_box(path: Path, box: Box) -> dict[str, Any]:
+    """Scale the scene, so that the largest side of ``box`` is 1 and its middle the origin.
+
+    Return the scene's shift in metres, and its scale.
+    """
     side = float((box[1] - box[0]).max())
     if not side:
         raise UserError(f"{path}: all its vertices are at one place; must have a size")
@@ -469,6 +482,19 @@ def _scale_to_box(path: Path, box: Box) -> None:
     model.matrix_world = Matrix.Scale(1 / side, 4) @ Matrix.Translation(-box.mean(0))
     model_volumes.scale(1 / side)
     bpy.context.view_layer.update()
+    return {"shift": (-box.mean(0) + 0.0).tolist(), "scale": 1 / side}
+
+
+def _placed(shift: Sequence[float], scale: float) -> str:
+    """Return how a model came into the unit box, in words, and whether metres fit, too."""
+    said = f"moved by ({', '.join(f'{each:.4g}' for each in shift)}), scaled by {scale:.4g}"
+    side = 1 / scale
+    if _PLAUSIBLE[0] <= side <= _PLAUSIBLE[1]:
+        said += (
+            f"; its largest side, {side:.4g} in the file, is plausible in metres: unit: metres "
+            "keeps its size and place"
+        )
+    return said
 
 
 def summary(record: dict[str, Any]) -> str:

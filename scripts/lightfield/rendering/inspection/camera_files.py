@@ -13,7 +13,7 @@ from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import framing
 from lightfield.geometry.rotations import Floats
-from lightfield.rendering.inspection import clearance
+from lightfield.rendering.inspection import clearance, light
 from lightfield.rendering.inspection.clearance import REACH
 from lightfield.rendering.inspection.limits import warnings
 from lightfield.rendering.scenes import blend_file, frames
@@ -80,6 +80,7 @@ def write_clearance(job: CheckCameras) -> None:
     for warning in (
         *_framing_warnings(lightfield, shown.box),
         *clearance.open_mesh_warnings(enclosures),
+        *clearance.dark_room_warnings(enclosures, light.emitters),
         *warnings(positions, distances),
         *drawings.warnings(camera_type),
     ):
@@ -94,7 +95,11 @@ def _framing_warnings(lightfield: LightField, box: Floats | None) -> Iterator[st
     # Otherwise objects may follow each camera.
     if box is not None and not lightfield.follows_views:
         names = [view.name for view in lightfield.views]
-        yield from framing.warnings(lightfield.lens, names, lightfield.world_from_cameras, box)
+        cameras = (lightfield.lens, names, lightfield.world_from_cameras)
+        yield from framing.warnings(*cameras, box)
+        # Views of other scenes may cut a floor or a wall.
+        if "unit" in lightfield.content.get("scene", {}):
+            yield from framing.cut_warnings(*cameras, clearance.outermost_points())
 
 
 def _contents(inventory: Path | None) -> dict[str, Any] | None:

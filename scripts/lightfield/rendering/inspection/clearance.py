@@ -6,7 +6,7 @@ is rendered.
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import bpy
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
+from lightfield.geometry import framing
 from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.sphere import icosphere
 
@@ -30,6 +31,8 @@ TOUCHING = 0.001
 _TRIES = 100
 # This many samples in the rig's box find the objects that enclose most of it.
 _SAMPLES = 64
+# Subdivisions of an icosphere: its 162 vertices are directions in which a scene ends.
+_DIRECTIONS = 3
 # The number of rays from a camera that find the object around it.
 _RAYS = len(icosphere(1))
 # Types of objects that views show without depth, and types that views do not show.
@@ -93,6 +96,33 @@ def _box(world_from_object: Any, corners: Iterable[Any]) -> Floats:
     """Return the box (2, 3) in the world around an object's own ``corners``."""
     places = np.array([world_from_object @ Vector(corner) for corner in corners])
     return np.array([places.min(axis=0), places.max(axis=0)])
+
+
+def outermost_points() -> Floats:
+    """Return points (n, 3) of the open scene's meshes, without shadow catchers.
+
+    Each is the farthest in a direction, in metres. So about all of the scene is between them.
+    """
+    directions = icosphere(_DIRECTIONS)
+    farthest = np.full(len(directions), -np.inf)
+    points = np.zeros(directions.shape)
+    for obj, world_from_object in _rendered():
+        if obj.type != "MESH" or obj.is_shadow_catcher or not len(obj.data.vertices):
+            continue
+        matrix = np.array(world_from_object)
+        corners = np.array(obj.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]
+        is_farther = (corners @ directions.T).max(axis=0) > farthest
+        if not is_farther.any():
+            continue
+        local = np.empty(3 * len(obj.data.vertices), np.float32)
+        obj.data.vertices.foreach_get("co", local)
+        places = local.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+        for index in np.flatnonzero(is_farther):
+            along = places @ directions[index]
+            nearest = int(along.argmax())
+            if along[nearest] > farthest[index]:
+                farthest[index], points[index] = along[nearest], places[nearest]
+    return np.unique(points[np.isfinite(farthest)], axis=0)
 
 
 class Contents(NamedTuple):
@@ -161,7 +191,7 @@ def are_inside(enclosing: Sequence[str | None], distances: Floats) -> NDArray[np
 
     ``enclosing`` comes from `enclosing_objects`, and ``distances`` (n,) from `surroundings`.
     """
-    are_enclosed = np.array([name is not None for name in enclosing])
+    are_enclosed = np.array([name is not None for name in enclosing], np.bool_)
     return np.asarray(are_enclosed | (distances < TOUCHING))
 
 
@@ -177,6 +207,43 @@ def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
         "which may be a room or an obstacle; if it is a room, turn its normals inwards, and if "
         "not, move the rig"
     )
+
+
+def dark_room_warnings(
+    enclosures: Sequence[Enclosure | None], emitters: Callable[[], Sequence[str]]
+) -> Iterator[str]:
+    """Yield a line if one closed object is around all cameras, and no light is in its box.
+
+    ``emitters`` returns the full names of all objects that may emit light.
+    """
+    names = {enclosure.name if enclosure else None for enclosure in enclosures}
+    if len(names) > 1 or any(each is None or each.is_open for each in enclosures):
+        return
+    (name,) = names
+    sources = {*emitters()}
+    boxes: dict[str, list[Floats]] = {}
+    for obj, world_from_object in _rendered():
+        full_name = str(obj.name_full)
+        # A sun is at no place. Other lamps are at a point, and have no box.
+        if full_name == name or (full_name in sources and not _is_sun(obj)):
+            is_lamp = obj.type == "LIGHT"
+            corners = [(0, 0, 0)] if is_lamp else obj.bound_box
+            boxes.setdefault(full_name, []).append(_box(world_from_object, corners))
+    room = np.array(boxes[str(name)])
+    low, high = room[:, 0].min(axis=0), room[:, 1].max(axis=0)
+    lit_boxes = [box for each in sources & boxes.keys() for box in boxes[each]]
+    if any(((box[0] <= high) & (box[1] >= low)).all() for box in lit_boxes):
+        return
+    count = len(enclosures)
+    yield (
+        f"{count} of {count} cameras are inside {name}, a closed object that "
+        f"{framing.reach(np.array([low, high]))}: no lamp and no glowing surface is in it, so all "
+        "views may be black; move the rig or change its size, or put a lamp inside"
+    )
+
+
+def _is_sun(obj: Any) -> bool:
+    return bool(obj.type == "LIGHT" and obj.data.type == "SUN")
 
 
 def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:

@@ -19,7 +19,7 @@ from lightfield.engine.read_files import changed_since_plan
 from lightfield.formats import blend
 from lightfield.formats.light_groups import resolved
 from lightfield.geometry.rigs import BlendCamera
-from lightfield.planning.loading import rendered_frames, scene_datasets
+from lightfield.planning.loading import scene_datasets
 from lightfield.rendering.inspection import (
     blend_facts,
     external_files,
@@ -31,7 +31,7 @@ from lightfield.rendering.inspection import (
 from lightfield.rendering.inspection.inventory import FEATURES, inventory
 from lightfield.rendering.scenes import blend_file, frames
 from lightfield.rendering.setup import followed_camera, motion_blur, pruning
-from lightfield.stages.scene import Inventory
+from lightfield.stages.scene import Inventory, InventorySettings
 from lightfield.workflow import job_settings
 
 
@@ -40,57 +40,60 @@ def make(job: Inventory) -> None:
 
     Raises `UserError` for a scene that cannot be rendered.
     """
-    written = scene_yaml.load_scene(job.scene) if job.scene else None
     datasets = scene_datasets(job.scene) if job.scene else []
+    settings = job_settings.inventory(datasets[0]) if datasets else job.settings
     # By hand, there was no plan.
-    if job.receipt and job_settings.inventory(datasets[0]).as_json() != job.settings.as_json():
+    if job.receipt and settings.as_json() != job.settings.as_json():
         raise changed_since_plan(scene_yaml.scene_path(str(job.scene)))
-    write_of_datasets(job.blend, written, datasets, job.output)
+    write(job.blend, settings, datasets, job.output, measures_memory=not job.skip_memory)
 
 
-def write_of_datasets(
+def write(
     path: Path,
-    written: scene_yaml.Scene | None,
+    settings: InventorySettings,
     datasets: Sequence[Dataset],
     output: Path,
     measures_memory: bool = True,
 ) -> None:
-    """Write the inventory of the .blend of some ``datasets``, as `make` does.
+    """Write the inventory of a .blend, as `make` does.
 
-    ``written`` is their scene YAML. The measurement of memory starts a process of its own. Without
-    it, the inventory does not say how much the scene takes.
+    ``datasets`` are the datasets of a user's own .blend, of which the inventory says more. The
+    measurement of memory starts a process of its own. Without it, the inventory does not say how
+    much the scene takes.
     """
-    scene_block = written.scene.model_dump() if written else {}
+    is_own = bool(datasets and datasets[0].source.blend)
+    scene_block = settings.as_json({"scene_name", "view_layers"})
     external_files.refuse_damaged_alembic(path)
     with tempfile.NamedTemporaryFile() as printed:
         layers = blend_file.open_scene(path, scene_block, printed=Path(printed.name))
         unknown = unknown_colours.named_in(printed.read().decode(errors="replace"))
     external_files.refuse_special(path)
     saved_frame = frames.current()
-    chosen_frames = rendered_frames(datasets)
-    shown_frames = sorted({f if isinstance(f, int) else saved_frame for f in chosen_frames})
+    frame_choices = settings.rendered_frames
+    shown_frames = sorted({f if isinstance(f, int) else saved_frame for f in frame_choices})
     shown_frames = shown_frames or [saved_frame]
     contents: dict[str, Any] = {}
-    if scene_block.get("blend"):
-        camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
+    if is_own:
         unknown_to_blender = unknown_colours.of_scene(unknown)
         try:
-            contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+            contents = {
+                "blend": blend_facts.facts(settings.camera_frames or []) | {"layers": layers}
+            }
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         if unknown_to_blender:
             contents["blend"]["unknown"] = unknown_to_blender
-    if written and written.render and written.render.motion_blur is not None:
-        motion_blur.turn(written.render.motion_blur)
+    if settings.motion_blur is not None:
+        motion_blur.turn(settings.motion_blur)
     _refuse_fluids(path)
-    refuse = None if scene_block.get("allow_missing") else partial(_refuse_missing, path)
+    refuse = None if settings.allow_missing else partial(_refuse_missing, path)
     try:
         contents |= inventory(shown_frames, refuse)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     unknown_textures = unknown_colours.textures(unknown, contents["textures"])
     wrong_colours = unknown_colours.refusal(path, unknown_textures, unknown)
-    if wrong_colours and not scene_block.get("allow_missing"):
+    if wrong_colours and not settings.allow_missing:
         raise UserError(wrong_colours)
     contents["missing"] += unknown_textures
     if not light.may_be_lit():
@@ -98,10 +101,10 @@ def write_of_datasets(
             f"{path}: has no light, so all views would be black; add a lamp, a material that "
             "emits, or a world with a colour"
         )
-    if written and written.render and written.render.light_groups:
+    if settings.light_groups:
         contents["emitters"] = light.emitters()
         # A wrong name is known before anything is rendered.
-        resolved(written.render.light_groups, contents["emitters"])
+        resolved(settings.light_groups, contents["emitters"])
     if bundles.are_used():
         external_files.check_reachable(path, contents["external_files"])
     if receipt := receipts.current():
@@ -110,10 +113,10 @@ def write_of_datasets(
     warnings = list(simulations.warnings(shown_frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
-    if scene_block.get("blend"):
+    if is_own:
         frames.go_to(shown_frames[0])
         try:
-            followers = followed_camera.followers(scene_block.get("followed_camera") or FILE)
+            followers = followed_camera.followers(settings.followed_camera or FILE)
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         contents["blend"]["followers"] = followers
@@ -124,7 +127,7 @@ def write_of_datasets(
     write_json(output, contents)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    if scene_block.get("blend"):
+    if is_own:
         _print_notes(path, contents, datasets, output)
     print(
         f"{contents['objects']} objects, {contents['triangles']} triangles, with instances "

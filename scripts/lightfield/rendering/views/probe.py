@@ -58,7 +58,7 @@ def _measured(job: Probe) -> dict[str, Any]:
 
 def rendered(
     lightfield: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
-) -> history.Run:
+) -> history.ProcessHistory:
     """Render a dataset into a new ``folder``. Return its run."""
     path = folder / "lightfield.json"
     lightfield.write(path)

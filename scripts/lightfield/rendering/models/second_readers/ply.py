@@ -81,7 +81,7 @@ class _Element:
 
 
 @dataclass
-class Header:
+class PlyHeader:
     """What the header of a PLY says. It has ``size`` bytes in ``lines``."""
 
     order: str = ""
@@ -126,12 +126,12 @@ def read(path: Path) -> ModelFacts:
     return ModelFacts(meshes, lost=lost, unused=content.unused)
 
 
-def read_header(path: Path) -> Header:
+def read_header(path: Path) -> PlyHeader:
     """Return the header of a PLY.
 
     Raises `UserError` if it has no end, a line that Blender cannot read, or an unknown type.
     """
-    header = Header()
+    header = PlyHeader()
     with path.open("rb") as file:
         number = 0
         while line := file.readline(_LONGEST_LINE + 2):
@@ -156,7 +156,7 @@ def read_header(path: Path) -> Header:
     raise UserError(f"{path}: is cut short: its header has no end; export it again")
 
 
-def _read_line(header: Header, words: list[str], line: str) -> None:
+def _read_line(header: PlyHeader, words: list[str], line: str) -> None:
     match words:
         case ["format", order, _]:
             header.order = _ORDERS[order]
@@ -213,7 +213,7 @@ def read_content(path: Path) -> Content:
 _Values = tuple[NDArray[Any], NDArray[np.int64] | None]
 
 
-def _columns(path: Path, header: Header) -> dict[str, _Columns]:
+def _columns(path: Path, header: PlyHeader) -> dict[str, _Columns]:
     """Return the properties of each element by their names."""
     rows = _TextRows(path, header) if header.order == _TEXT else _BinaryRows(path, header)
     columns = {}
@@ -235,7 +235,7 @@ def _columns(path: Path, header: Header) -> dict[str, _Columns]:
 class _TextRows:
     """The rows of a text: a line each. More values than the header promises are passed over."""
 
-    def __init__(self, path: Path, header: Header) -> None:
+    def __init__(self, path: Path, header: PlyHeader) -> None:
         parts = [
             lines.all_numbers() for lines in read_lines(path, header.size, header.lines + 1)
         ] or [(np.zeros(0), np.zeros(0, np.int64))]
@@ -268,7 +268,7 @@ class _TextRows:
 class _BinaryRows:
     """The rows of a binary file."""
 
-    def __init__(self, path: Path, header: Header) -> None:
+    def __init__(self, path: Path, header: PlyHeader) -> None:
         self._data = np.fromfile(path, np.uint8, offset=header.size)
         self._order = header.order
         self._place = 0
@@ -421,7 +421,7 @@ def _uvs(vertices: _Columns, faces: _Columns, corners: NDArray[np.int64]) -> Any
     return np.stack([column.values.astype(np.float64) for column in found], axis=1)[corners]
 
 
-def _unused(header: Header, columns: dict[str, _Columns]) -> Iterator[str]:
+def _unused(header: PlyHeader, columns: dict[str, _Columns]) -> Iterator[str]:
     """Yield what no view shows."""
     for element in header.elements:
         if element.name not in _KNOWN_ELEMENTS and element.count:
