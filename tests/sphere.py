@@ -90,6 +90,13 @@ def look_at_ball(lens, matrix):
     return np.where(hit[..., None], RED, colour), np.where(hit, nearest, distance)
 
 
+def look_at_ball_alone(lens, matrix):
+    """Return what a camera sees of the ball before an empty background."""
+    colour, distance = look_at_ball(lens, matrix)
+    ball = (colour == RED).all(axis=-1)
+    return np.where(ball[..., None], colour, 0), np.where(ball, distance, np.inf)
+
+
 def write_views(folder, camera, rig, suffix=".exr", see=look):
     lens = lenses.from_camera(camera)
     depth = "z" if lens.has_z_depth else "distance"

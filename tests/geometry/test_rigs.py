@@ -419,15 +419,35 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, keys: Any) -> None:
     assert rig.is_round == (kind in ("cylinder", *round_ones))
     # A sphere's or a random rig's cameras need not be at its outermost points.
     tolerance = {"sphere": 0.03, "hemisphere": 0.06, "random": 0.02, "path": 0.02}.get(kind, 1e-9)
-    axes = [0, 1] if kind == "ring" else [0, 1, 2]
-    np.testing.assert_allclose(corners.min(0)[axes], places.min(0)[axes], atol=tolerance)
-    np.testing.assert_allclose(corners.max(0)[axes], places.max(0)[axes], atol=tolerance)
+    np.testing.assert_allclose(corners.min(0), places.min(0), atol=tolerance)
+    np.testing.assert_allclose(corners.max(0), places.max(0), atol=tolerance)
     if kind != "path":
         once = np.unique(corners.round(9), axis=0)
         np.testing.assert_allclose(once.mean(0), 1, atol=1e-6)
     if kind in round_ones:
         np.testing.assert_allclose(np.linalg.norm(corners - 1, axis=1), 1)
-        np.testing.assert_allclose([corners.min(0), corners.max(0)], [[0] * 3, [2] * 3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "elevation", "lowest", "highest"),
+    [
+        ("hemisphere", [0, 90], 0.0, 1.0),
+        ("hemisphere", [-30, 45], -0.5, math.sqrt(0.5)),
+        ("spiral", [30, 60], 0.5, math.sqrt(0.75)),
+        ("ring", 30, 0.5, 0.5),
+    ],
+)
+def test_a_dome_has_the_outline_of_a_dome(
+    kind: str, elevation: Any, lowest: float, highest: float
+) -> None:
+    rig = from_settings({"type": kind, "count": 200, "size": 2, "elevation": elevation})
+    corners = np.concatenate(rig.outline())
+    assert corners[:, 2].min() == pytest.approx(lowest, abs=1e-9)
+    assert corners[:, 2].max() == pytest.approx(highest, abs=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(corners, axis=1), 1)
+    # Its outline has the widest circle on which cameras are.
+    widest = max(np.hypot(pose.position[0], pose.position[1]) for pose in rig.poses())
+    assert np.hypot(*corners[:, :2].T).max() == pytest.approx(widest, abs=0.03)
 
 
 @pytest.mark.parametrize("name", PRINTED)

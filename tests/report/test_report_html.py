@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import re
 from types import SimpleNamespace
 
 import accessibility
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import SMALL_WALK
 from PIL import Image
-from sphere import RADIUS, colour_of, look
+from sphere import BALL, BALL_RADIUS, RADIUS, colour_of, look, look_at_ball_alone
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -59,7 +60,7 @@ YAML = "render: {samples: 4}  # <b>\n"
 HOSTILE = "<img src=x onerror=\"document.title='broken'\"></script><script>document.title='broken'"
 
 
-def write_dataset(folder, rig, depth="z", names=()):
+def write_dataset(folder, rig, depth="z", names=(), see=look):
     """Write the views of a rig in a sphere, as the renderer does."""
     lens = lenses.from_camera(rig["camera"])
     keys = {"depth": depth, "frame": 7, "scene": {"name": "ball"}}
@@ -70,9 +71,9 @@ def write_dataset(folder, rig, depth="z", names=()):
     ]
     lightfield = lightfield.changed(views=renamed or lightfield.views)
     for view in lightfield.views:
-        colour, distance = look(lens, view.world_from_camera)
+        colour, distance = see(lens, view.world_from_camera)
         z = z_from_distance(distance, lens.pixel_rays())
-        channels = channels_of(colour.astype(np.float16), Z=np.nan_to_num(z, nan=np.inf))
+        channels = channels_of(colour.astype(np.float16), Z=np.where(np.isnan(z), np.inf, z))
         images.write_exr(folder / "exr" / f"{view.name}.exr", channels)
     lightfield.write(folder / "lightfield.json")
     return lightfield
@@ -656,6 +657,7 @@ FISHEYE, NARROW, PANORAMA = (
     {"lens": "rectilinear", "fov": 90, "resolution": [8, 8]},
     {"lens": "equirectangular", "resolution": [8, 4]},
 )
+WIDEST = {"lens": "equidistant", "fov": 359, "resolution": [8, 8]}
 LATTICE = {"type": "lattice", "cameras": [2, 2, 2]}
 KEYS = [{"position": [0, 0, 0]}, {"position": [0, 3, 0.5]}]
 
@@ -670,6 +672,12 @@ KEYS = [{"position": [0, 0, 0]}, {"position": [0, 3, 0.5]}]
         ({**SPHERE, "look_at": [0, 0, 0]}, NARROW, False),
         ({"type": "hemisphere", "count": 20}, FISHEYE, False),
         ({"type": "ring", "count": 20}, NARROW, False),
+        # The panorama would lie inside the object that they look at.
+        ({"type": "hemisphere", "count": 20}, WIDEST, False),
+        ({"type": "ring", "count": 20}, WIDEST, False),
+        ({**SPHERE, "face_inside": True}, WIDEST, False),
+        ({**SPHERE, "look_at": [1, 2, 3]}, PANORAMA, False),
+        (SPHERE, WIDEST, True),
         (LINE, FISHEYE, False),
         (LATTICE, FISHEYE, False),
         (LATTICE, PANORAMA, True),
@@ -704,6 +712,86 @@ def test_a_rig_in_words_has_no_size_unless_it_is_given():
     assert dataset_page.rig_text(path, places) == "path, 0 × 3 × 0.5 m"
     assert dataset_page.rig_text(rigs.from_settings(SPHERE), places) == "sphere, ⌀ 2 m"
     assert dataset_page.rig_text(rigs.from_settings(LINE), places) == "plane 5 × 3, 2 × 1 × 1 m"
+
+
+def test_a_rig_at_one_place_has_no_size_in_words():
+    one = rigs.from_settings({"type": "plane", "cameras": [1, 1]})
+    assert dataset_page.rig_text(one, np.zeros((1, 3))) == "plane 1 × 1"
+    poses = rigs.from_settings({"type": "poses", "file": "unused.csv"})
+    assert dataset_page.rig_text(poses, np.ones((1, 3))) == "poses"
+    assert dataset_page.rig_text(poses, np.ones((4, 3))) == "poses, all at one place"
+
+
+def test_a_page_of_one_view_speaks_of_one_camera(tmp_path, show):
+    rig = {"type": "plane", "cameras": [1, 1], "camera": LINE["camera"]}
+    write_dataset(tmp_path, rig)
+    text = show(make_page(tmp_path, rig)).locator("main").inner_text()
+    for wrong in ("0 × 0", "between the cameras", "Every camera", "cameras enclose"):
+        assert wrong not in text
+
+
+def test_numbers_on_a_page_have_few_digits(tmp_path, show):
+    field = write_dataset(tmp_path, LINE)
+    # Blender keeps numbers in 32 bits.
+    render = {"samples": 64, "adaptive_threshold": 0.009999999776482582, "denoise": False}
+    field.changed(render=render).write(tmp_path / "lightfield.json")
+    text = show(make_page(tmp_path, LINE)).locator("main").inner_text()
+    assert "below 0.01." in text
+    assert re.findall(r"\d\.\d{6,}", text) == []
+
+
+def test_the_contact_sheet_of_a_plane_has_its_rows_and_columns(tmp_path):
+    write_dataset(tmp_path, LINE)
+    draw(tmp_path, LINE, tmp_path / "report")
+    sheet = images.read_image(tmp_path / "report/contact_sheet.png").srgb
+    step = contact_sheet.GAP + 96
+    assert sheet.shape[1] == contact_sheet.GAP + 5 * step
+    page = make_page(tmp_path, LINE).read_text()
+    assert "in the rows and columns of the rig" in page
+
+
+@pytest.mark.parametrize(
+    ("rig", "count", "columns"),
+    [
+        ({"type": "plane", "cameras": [9, 9]}, 81, 9),
+        ({"type": "plane", "cameras": [21, 21]}, 49, 7),
+        ({"type": "plane", "cameras": [40, 3]}, 14, 14),
+        ({"type": "plane", "cameras": [3, 2], "stereo": {"distance": 0.1}}, 12, 6),
+        ({"type": "cylinder", "cameras": [8, 3]}, 24, 8),
+        ({"type": "plane", "cameras": [30, 1]}, 30, None),
+        ({"type": "ring", "count": 150}, 75, None),
+    ],
+)
+def test_a_contact_sheet_of_many_views_keeps_whole_rows_and_columns(rig, count, columns):
+    rig = rigs.from_settings(rig)
+    layout = contact_sheet.layout(rig, rig.view_count)
+    assert len(layout.views) == count
+    assert layout.columns == columns
+    if columns and not rig.stereo:
+        places = np.array([pose.position for pose in rig.poses()])[layout.views]
+        rows = places.reshape(-1, columns, 3)
+        # A row is at one height, and all rows have the same columns.
+        np.testing.assert_allclose(np.ptp(rows[..., 2], axis=1), 0, atol=1e-9)
+        np.testing.assert_allclose(np.ptp(rows[..., :2], axis=0), 0, atol=1e-9)
+
+
+def test_the_drawing_of_a_rig_shows_the_box_of_what_its_cameras_see(tmp_path):
+    around = {"type": "hemisphere", "count": 6, "size": 3, "center": BALL.tolist()}
+    around |= {"camera": {"lens": "rectilinear", "fov": 50, "resolution": [48, 48]}}
+    write_dataset(tmp_path, around, see=look_at_ball_alone)
+    draw(tmp_path, around, tmp_path / "report")
+    assert 'id="scene"' in (tmp_path / "report/rig.svg").read_text()
+    field = LightField.read(tmp_path / "lightfield.json")
+    low, high = figures.scene_box(tmp_path / "exr", field)
+    np.testing.assert_allclose(high[:2] - BALL[:2], [BALL_RADIUS] * 2, atol=0.05)
+    np.testing.assert_allclose(BALL[:2] - low[:2], [BALL_RADIUS] * 2, atol=0.05)
+
+
+def test_the_drawing_of_a_rig_in_a_large_scene_has_no_box(tmp_path):
+    small = {**LINE, "size": 0.1}
+    write_dataset(tmp_path, small)
+    draw(tmp_path, small, tmp_path / "report")
+    assert 'id="scene"' not in (tmp_path / "report/rig.svg").read_text()
 
 
 @pytest.mark.slow

@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 from conftest import SMALL_WALK, error_listeners
 from PIL import Image
-from sphere import BALL, BALL_RADIUS, RADIUS, RED, look, look_at_ball, write_views
+from sphere import (
+    BALL,
+    BALL_RADIUS,
+    RADIUS,
+    look,
+    look_at_ball,
+    look_at_ball_alone,
+    write_views,
+)
 
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
@@ -133,13 +141,6 @@ def make_page(folder, rig, name, output):
     settings = PageSettings(rig=rig, yaml="", command="snakemake")
     ReportHtml(settings=settings, dataset=folder, dataset_name=name, output=output).run()
     return output
-
-
-def look_at_ball_alone(lens, matrix):
-    """Return what a camera sees of the ball before an empty background."""
-    colour, distance = look_at_ball(lens, matrix)
-    ball = (colour == RED).all(axis=-1)
-    return np.where(ball[..., None], colour, 0), np.where(ball, distance, np.inf)
 
 
 def points_of_sphere(lens, matrix, radius):

@@ -11,6 +11,8 @@ from lightfield.geometry.rotations import euler_to_matrix
 DIRECTIONS = 200
 # The cameras must see at least this part of the directions.
 _SEEN_PART = 0.75
+# Cameras look inward if the mean cosine between their directions and the way outward is below this.
+_INWARD = -0.5
 # More cameras than this would not change the answer.
 MOST_CAMERAS = 200
 
@@ -19,9 +21,9 @@ def sees_all_round(rig: Rig) -> bool:
     """Return whether the views show what a panorama from the rig's centre would.
 
     They do if for most directions a camera on that side of the centre sees the direction. The
-    cameras of a plane see at most half of the directions. Cameras that look at an object see none,
-    and the panorama would lie inside the object. Loose poses, paths and random places have no
-    meaningful centre.
+    cameras of a plane see at most half of the directions. Cameras that look at an object show what
+    is around it only from the other side, and the panorama would lie inside the object. Loose
+    poses, paths and random places have no meaningful centre.
     """
     if isinstance(rig, Poses | Path | Random | BlendCamera):
         return False
@@ -32,7 +34,12 @@ def sees_all_round(rig: Rig) -> bool:
     places = np.array([pose.position for pose in poses])
     turns = euler_to_matrix(np.array([pose.rotation for pose in poses]))
     x, y = np.moveaxis(lens.pixels(directions @ turns), -1, 0)
-    side = (places - rig.middle) @ directions.T
+    outward = places - rig.middle
+    lengths = np.linalg.norm(outward, axis=1)
+    cosines = (outward * -turns[:, :, 2]).sum(axis=1) / np.where(lengths > 0, lengths, 1)
+    if cosines.mean() < _INWARD:
+        return False
+    side = outward @ directions.T
     seen = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height) & (side >= -1e-9)
     return bool(seen.any(axis=0).mean() >= _SEEN_PART)
 

@@ -4,12 +4,14 @@ import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib
 import numpy as np
 import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
+from lightfield.geometry.rigs import Cylinder, Plane, Rig
 from lightfield.imaging import images, pictures
 from lightfield.imaging.look import Look
 from lightfield.imaging.pictures import Array
@@ -17,6 +19,7 @@ from lightfield.imaging.pictures import Array
 _SHEET_WIDTH = 1600
 # Narrower cells have no room for a view's name.
 _LEAST_CELL = 96
+_MOST_COLUMNS = 16
 GAP = 4
 _CAPTION = 14
 _BACKGROUND = 24
@@ -25,13 +28,48 @@ INK = (0.8, 0.8, 0.8)
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
 
 
-def sheet(views: Sequence[Path], width: int, height: int, look: Look | None = None) -> Array:
+class Layout(NamedTuple):
+    """The numbers of the ``views`` on a sheet, and its number of ``columns``, or None for any."""
+
+    views: list[int]
+    columns: int | None
+
+
+def layout(rig: Rig, count: int, most: int = pictures.MOST_VIEWS) -> Layout:
+    """Return which of the ``count`` views of a ``rig`` a sheet of at most ``most`` views shows.
+
+    A plane or a cylinder keeps its rows and columns. Every n-th of them is left if there are many.
+    """
+    is_whole = count == rig.view_count
+    if not (isinstance(rig, Plane | Cylinder) and rig.cameras[1] > 1 and is_whole):
+        return Layout([*range(0, count, math.ceil(count / most))], None)
+    across, down = rig.cameras
+    each = rig.views_a_position
+    step = 1
+    while True:
+        rows = len(range(0, down, step))
+        columns = each * len(range(0, across, step))
+        if step >= across or (columns <= _MOST_COLUMNS and rows * columns <= most):
+            break
+        step += 1
+    numbers = np.arange(count).reshape(down, across, each)[::step, ::step]
+    return Layout(numbers.ravel().tolist(), columns)
+
+
+def sheet(
+    views: Sequence[Path],
+    width: int,
+    height: int,
+    look: Look | None = None,
+    columns: int | None = None,
+) -> Array:
     """Return the sheet's 8-bit pixels (height, width, 3). Each view has its name beneath.
 
     The views are EXRs, which are developed here, with a ``look`` if there is one, or PNGs. Their
-    size is ``width`` × ``height``.
+    size is ``width`` × ``height``. Without ``columns``, the sheet is about as wide as a page.
     """
-    columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
+    if columns is None:
+        columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
     rows = math.ceil(len(views) / columns)
     cell_width = min(max(width, _LEAST_CELL), (_SHEET_WIDTH - GAP) // columns - GAP)
     # Limit the height too: a single tall view would exceed the largest WebP.

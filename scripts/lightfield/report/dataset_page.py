@@ -20,6 +20,7 @@ from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, is_group
 from lightfield.formats.sensors import settings_in
 from lightfield.geometry import rigs
+from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import FILE_LOOK, title
@@ -58,6 +59,7 @@ def write(job: ReportHtml) -> None:
         look,
     )
     middle = dataset.views[middle_view(rig)]
+    layout = contact_sheet.layout(rig, len(lightfield.views))
     lights = pass_pictures.light_groups(middle, packed.data["exposure"])
     if lights:
         packed.data["lights"] = lights
@@ -75,11 +77,13 @@ def write(job: ReportHtml) -> None:
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(job, lightfield),
         packed=packed,
+        layout=layout,
+        is_one_place=is_at_one_place(lightfield.world_from_cameras[:, :3, 3]),
         lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
         passes=list(pass_pictures.collect(middle, packed.data["exposure"], look)),
-        reprojected=list(_reprojected(folder, lightfield)),
+        reprojected=list(_reprojected(folder, lightfield, rig)),
         render=lightfield.render,
         python=snippet.reading(name, lightfield),
         validation=validation,
@@ -207,6 +211,11 @@ def facts(
     return [(title, text) for title, text in texts.items() if text]
 
 
+def is_at_one_place(places: views.Array) -> bool:
+    """Return whether the places (n, 3) of a rig's cameras are one place."""
+    return bool(np.ptp(places, axis=0).max() < ONE_PLACE)
+
+
 def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     """Describe a rig: its type, its cameras along each axis, and its size.
 
@@ -215,13 +224,19 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     kind = rig.type
     if isinstance(rig, rigs.Grid):
         kind += " " + " × ".join(map(str, rig.cameras))
+    if len(places) == 1:
+        return kind
+    if is_at_one_place(places):
+        return f"{kind}, all at one place"
     size = tuple(np.ptp(places, axis=0).tolist()) if rig.is_loose else rig.extent
     if isinstance(size, tuple):
         return f"{kind}, {' × '.join(f'{side:.4g}' for side in size)} m"
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"
 
 
-def _reprojected(folder: Path, rendered: LightField) -> Iterator[tuple[str, str, int, int, str]]:
+def _reprojected(
+    folder: Path, rendered: LightField, rig: rigs.Rig
+) -> Iterator[tuple[str, str, int, int, str]]:
     """Yield the name of each reprojection of the ``rendered`` views, and what it changes.
 
     Then yield the numbers of its views and of the shown views, and a sheet of the latter.
@@ -230,10 +245,14 @@ def _reprojected(folder: Path, rendered: LightField) -> Iterator[tuple[str, str,
         lightfield = LightField.read(path)
         lens = lightfield.lens
         count = len(lightfield.views)
-        shown = lightfield.views[:: math.ceil(count / _MOST_REPROJECTED)]
+        layout = contact_sheet.layout(rig, count, _MOST_REPROJECTED)
+        shown = [lightfield.views[number] for number in layout.views]
         suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
-        sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), _SHEET_QUALITY)
+        sheet = webp(
+            contact_sheet.sheet(paths, lens.width, lens.height, columns=layout.columns),
+            _SHEET_QUALITY,
+        )
         yield path.parent.name, _change(rendered, lightfield), count, len(shown), sheet
 
 

@@ -18,8 +18,10 @@ from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.errors import UserError
 from lightfield.export.trainer_splits import splits
+from lightfield.geometry.depth import converted
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs.grid import box_outline
 from lightfield.imaging import images, noise, pictures
 from lightfield.imaging.pictures import Array
 from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
@@ -33,6 +35,13 @@ _ELEVATION = 24.0
 MISS = "#b0b0b0"
 # The noise map has about this many blocks across.
 _NOISE_BLOCKS = 128
+# The box of a scene follows from so many views, with so many points across each. This part in
+# percent of the points may lie outside on each side.
+_BOX_VIEWS = 8
+_BOX_POINTS = 96
+_OUTSIDE = 0.1
+# A scene is drawn if it is at most so many times as long as the rig.
+_LARGEST_SCENE = 4.0
 _PART_COLOURS = {None: BLUE, "train": BLUE, "validation": ORANGE, "test": PURPLE}
 DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no depth"}
 
@@ -57,15 +66,17 @@ def draw(job: ReportFigures) -> None:
     lightfield.require_rig(rig)
     views = [view.path for view in opened.views]
     lens = lightfield.lens
-    thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]
+    layout = contact_sheet.layout(rig, len(views))
+    shown = [views[number] for number in layout.views]
     look = job.settings.look.resolved(lightfield) if job.settings.look else None
-    sheet = contact_sheet.sheet(thinned, lens.width, lens.height, look)
+    sheet = contact_sheet.sheet(shown, lens.width, lens.height, look, layout.columns)
     images.write_png(output / "contact_sheet.png", sheet)
     parts = [view.split for view in lightfield.views]
     if job.settings.chooses_tests:
         tests = {view.name for view in splits(lightfield).test}
         parts = ["test" if view.name in tests else "train" for view in lightfield.views]
-    draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts)
+    box = scene_box(opened)
+    draw_rig(output / "rig", rig, lightfield.world_from_cameras, parts, box)
     if job.panorama:
         overview = _read_panorama(job.panorama)
     else:
@@ -98,10 +109,42 @@ def read_view(view: OpenView) -> Overview:
     return Overview(colour, np.where(view.has_ray, depth, np.nan).astype(np.float32), False, label)
 
 
-def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) -> None:
+def scene_box(dataset: OpenDataset) -> Array | None:
+    """Return the lowest and the highest corner (2, 3) of what some views show, in metres.
+
+    None if they have no depth, or hit nothing.
+    """
+    if dataset.depth is None:
+        return None
+    step = math.ceil(len(dataset.views) / _BOX_VIEWS)
+    seen = np.concatenate([_points_of(view) for view in dataset.views[::step]])
+    return np.percentile(seen, [_OUTSIDE, 100 - _OUTSIDE], axis=0) if len(seen) else None
+
+
+def _points_of(view: OpenView) -> Array:
+    """Return points (n, 3) of the world that a view shows. None of them if it cannot be read."""
+    assert view.dataset.depth
+    overview = read_view(view)
+    every = math.ceil(overview.depth.shape[1] / _BOX_POINTS)
+    rays = view.lens.pixel_rays()[::every, ::every]
+    depth = overview.depth[::every, ::every]
+    distance = converted(depth, rays, view.dataset.depth, "distance")
+    is_hit = np.isfinite(distance) & (distance > 0)
+    points: Array = (rays * distance[..., None])[is_hit] @ view.world_from_camera[:3, :3].T
+    return points + view.world_from_camera[:3, 3]
+
+
+def draw_rig(
+    stem: Path,
+    rig: Rig,
+    poses: Array,
+    parts: Sequence[str | None],
+    scene: Array | None = None,
+) -> None:
     """Draw each camera as a dot with an arrow along its view, as Figure 2 of the SILVR paper does.
 
     ``poses`` are (n, 4, 4). ``parts`` (n,) of the split, such as train and test, have colours.
+    ``scene`` (2, 3) is the scene's box. It is drawn only if the rig does not look lost in it.
     """
     turn = np.radians(_AZIMUTH)
     rise = np.radians(_ELEVATION)
@@ -118,8 +161,17 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
     near = np.linspace(0.35, 1.0, len(poses))
     ends = places[order] + arrow * forwards[order]
     lines = [line @ screen for line in rig.outline()]
+    box = []
+    if scene is not None and np.linalg.norm(scene[1] - scene[0]) <= _LARGEST_SCENE * extent:
+        sides = [line + 0.5 for line in box_outline()]
+        box = [(scene[0] + side * (scene[1] - scene[0])) @ screen for side in sides]
     with plot(stem, size=(7, 6)) as axes:
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
+        if box:
+            edges = LineCollection(box, colors=ORANGE, linewidths=0.8, linestyles="dashed")
+            edges.set_gid("scene")
+            axes.add_collection(edges)
+            axes.plot([], [], color=ORANGE, linewidth=0.8, linestyle="dashed", label="scene")
         start = places[order] @ screen
         end = ends @ screen
         axes.quiver(
@@ -146,9 +198,9 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
             axes.scatter(
                 [], [], s=20, color=_PART_COLOURS[part], label=f"{part} {parts.count(part)}"
             )
-        if any(parts):
+        if any(parts) or box:
             axes.legend(loc="upper right")
-        _draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
+        _draw_axes(axes, screen, np.concatenate([start, end, *lines, *box]), extent)
         axes.set_aspect("equal")
         axes.set_axis_off()
 

@@ -29,6 +29,7 @@ class ReportFigures(Stage[FiguresSettings]):
 
     name = "report_figures"
     function = "lightfield.report.figures:draw"
+    version = 1
 
     dataset: Path = reads("folder of the dataset")
     panorama: Path | None = reads(

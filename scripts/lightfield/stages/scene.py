@@ -7,7 +7,6 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from lightfield.configuration.exports import Exports
 from lightfield.configuration.keys import import_version
 from lightfield.configuration.scene_source import (
     BUILDER,
@@ -22,6 +21,7 @@ from lightfield.configuration.scene_source import (
     check_model,
 )
 from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
+from lightfield.exporters import Exports
 from lightfield.formats.inventory import read_inventory
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Name, Settings

@@ -30,8 +30,10 @@ from lightfield.settings.base import checked
 __all__ = [
     "AnyRig",
     "BlendCamera",
+    "Cylinder",
     "Grid",
     "Path",
+    "Plane",
     "Pose",
     "Poses",
     "Random",

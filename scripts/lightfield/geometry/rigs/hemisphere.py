@@ -28,6 +28,10 @@ class Hemisphere(Orbit):
         "cameras. rings: rings with equal distances.",
     )
 
+    @property
+    def elevations(self) -> tuple[float, float]:
+        return self.elevation
+
     def directions(self) -> Floats:
         if self.pattern == "fibonacci":
             low, high = (math.sin(math.radians(angle)) for angle in self.elevation)

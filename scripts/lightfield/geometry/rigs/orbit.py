@@ -6,7 +6,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, ball_outline, stack
+from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, stack
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 from lightfield.settings.base import as_list
 
@@ -40,6 +40,11 @@ class Orbit(CountedRig):
             )
         return self
 
+    @property
+    @abstractmethod
+    def elevations(self) -> tuple[float, float]:
+        """The elevations of the lowest and the highest camera, in degrees."""
+
     @abstractmethod
     def directions(self) -> Floats:
         """Return the cameras' places on the sphere of radius 1, (count, 3)."""
@@ -56,7 +61,17 @@ class Orbit(CountedRig):
         return UnitPoses.of_sides(("", places, turns))
 
     def unit_outline(self) -> list[Floats]:
-        return ball_outline()
+        """Return the circles at the lowest and highest elevation, and four arcs between them."""
+        low, high = np.radians(self.elevations)
+        around = np.linspace(0, 2 * np.pi, 73)
+        # The widest circle is the equator, if cameras are below and above it.
+        heights = sorted({low, high, min(max(low, 0.0), high)})
+        circles = [on_sphere(around, np.full(73, np.sin(height))) / 2 for height in heights]
+        if low == high:
+            return circles
+        rising = np.sin(np.linspace(low, high, 37))
+        arcs = [on_sphere(np.full(37, azimuth), rising) / 2 for azimuth in around[:72:18]]
+        return circles + arcs
 
 
 def on_sphere(azimuth: Floats, height: Floats) -> Floats:

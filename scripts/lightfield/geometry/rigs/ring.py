@@ -20,6 +20,10 @@ class Ring(Orbit):
         json_schema_extra={"unit": "degrees"},
     )
 
+    @property
+    def elevations(self) -> tuple[float, float]:
+        return (self.elevation, self.elevation)
+
     def directions(self) -> Floats:
         azimuth = 2 * np.pi * np.arange(self.count) / self.count
         return on_sphere(azimuth, np.full(self.count, math.sin(math.radians(self.elevation))))

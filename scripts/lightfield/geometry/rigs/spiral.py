@@ -27,6 +27,10 @@ class Spiral(Orbit):
         json_schema_extra={"unit": "degrees"},
     )
 
+    @property
+    def elevations(self) -> tuple[float, float]:
+        return self.elevation
+
     def directions(self) -> Floats:
         along = np.linspace(0, 1, self.count)
         low, high = np.radians(self.elevation)

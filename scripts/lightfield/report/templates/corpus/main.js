@@ -17,12 +17,17 @@ function element(name, content, properties = {}) {
   return created;
 }
 
+// Return a drawn value as text. A number has six digits, without the last ones that computing leaves.
+function shownValue(value) {
+  return typeof value === "number" ? String(Number(value.toPrecision(6))) : (value ?? "–");
+}
+
 function card(member) {
   const parts = [];
   if (member.thumbnail) {
     parts.push(element("img", [], { src: member.thumbnail, loading: "lazy", alt: "" }));
   }
-  const values = keys.map((key, index) => `${key.title} ${member.values[index] ?? "–"}`);
+  const values = keys.map((key, index) => `${key.title} ${shownValue(member.values[index])}`);
   const badge = member.state === "valid" ? "badge good" : "badge bad";
   parts.push(
     element("div", [
