@@ -781,8 +781,7 @@ def test_the_drawing_of_a_rig_shows_the_box_of_what_its_cameras_see(tmp_path):
     write_dataset(tmp_path, around, see=look_at_ball_alone)
     draw(tmp_path, around, tmp_path / "report")
     assert 'id="scene"' in (tmp_path / "report/rig.svg").read_text()
-    field = LightField.read(tmp_path / "lightfield.json")
-    low, high = figures.scene_box(tmp_path / "exr", field)
+    low, high = figures.scene_box(OpenDataset.in_folder(tmp_path))
     np.testing.assert_allclose(high[:2] - BALL[:2], [BALL_RADIUS] * 2, atol=0.05)
     np.testing.assert_allclose(BALL[:2] - low[:2], [BALL_RADIUS] * 2, atol=0.05)
 
