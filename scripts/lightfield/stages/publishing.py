@@ -85,6 +85,7 @@ class Package(Stage[PackSettings]):
 
     name = "package"
     function = "lightfield.publishing.package:write"
+    version = 1
     by_hand = PackageByHand
 
     folder: Path = reads(FOLDER)
