@@ -7,6 +7,7 @@ rule pack:
         PLAN.reads(
             PACK,
             sums=RUN.of_build(RUN.build.packed_sums),
+            page=RUN.of_build(RUN.build.packed_page),
             files=PLAN.only_stored(RUN.of_build(RUN.build.packed_lists)),
         ),
     output:

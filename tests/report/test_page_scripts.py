@@ -10,7 +10,7 @@ from lightfield.report import page
 
 MODULES = sorted(page.TEMPLATES.glob("*/*.js"))
 # The scripts of a dataset's page share a scope. Other pages have one of their own.
-OF_DATASET = ("page", "walk", "relight")
+OF_DATASET = ("page", "walk", "relight", "walk_alone")
 OTHERS = ("index", "corpus")
 DECLARED = re.compile(r"^(export )?(?:async function|function|const|let) (\w+)", re.MULTILINE)
 IMPORTED = re.compile(r'^import {(.+)} from "(.+)";', re.MULTILINE)
@@ -49,3 +49,10 @@ def test_a_module_follows_what_it_imports_and_holds_its_shaders(tmp_path: Path):
     assert script.splitlines()[1:3] == [r'const text = "say \"this\";\n";', "const one = 1;"]
     assert "say(one, text);" in script.splitlines()[-1]
     assert "import" not in script
+
+
+def test_a_module_may_import_another_one_only_to_run_it(tmp_path: Path):
+    (tmp_path / "main.js").write_text('import "./one.js";\nsay(2);\n')
+    (tmp_path / "one.js").write_text("say(1);\n")
+    script = page.joined_script(page.script_modules(tmp_path / "main.js"))
+    assert script.splitlines()[1:] == ["say(1);", "", "say(2);"]

@@ -29,6 +29,7 @@ from lightfield.reading.dataset import OpenDataset
 from lightfield.report import dataset_page
 from lightfield.stages.report import FiguresSettings, PageSettings, ReportFigures, ReportHtml
 from lightfield.synthesis.view import Sources, reader
+from lightfield.validation.verification import faults
 
 PUNCHY = ShownLook(name="AgX - Punchy", exposure=0.5)
 SMALL = {**RIG, "subdivisions": 1, "camera": {**RIG["camera"], "resolution": [64, 64]}}
@@ -51,7 +52,7 @@ def write_reprojection(folder, lens=None, **keys):
 
 def finish(folder):
     """Make a dataset valid, so that it can be published."""
-    write_json(folder / "validation.json", {"valid": True})
+    write_json(folder / "validation.json", {"valid": True, "checks": []})
     files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
     sums = [f"{sha256(path)}  {path.relative_to(folder)}\n" for path in files]
     (folder / "sha256sums.txt").write_text("".join(sums))
@@ -181,6 +182,21 @@ def test_card_and_croissant_name_the_look_of_each_folder(tmp_path):
     assert "AgX - Punchy" in described["files-pictures.png"]
     assert "sRGB" in described["files-plain.png"]
     assert "AgX" not in described["files-plain.png"]
+
+
+def test_a_package_has_the_walk_of_its_page(tmp_path):
+    folder = write_dataset(tmp_path / "dataset", SMALL)
+    finish(folder)
+    make_page(folder, SMALL)
+    card = package.card(folder, "ball", published_scene())
+    (archive,) = package.pack(folder, card, tmp_path / "ball.tar", None)
+    with tarfile.open(archive) as tar:
+        names = tar.getnames()
+        tar.extractall(tmp_path / "unpacked", filter="data")
+    assert "ball/walk.html" in names
+    assert not [name for name in names if "report/" in name]
+    # It belongs to the package, and is no stray file of the dataset.
+    assert faults(tmp_path / "unpacked") == {}
 
 
 def test_a_card_without_looks_says_nothing_of_them(tmp_path):

@@ -22,12 +22,13 @@ from sphere import (
     write_views,
 )
 
+from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import pictures
 from lightfield.reading.dataset import OpenDataset
-from lightfield.stages.report import PageSettings, ReportHtml
+from lightfield.stages.report import PageSettings, ReportHtml, ReportWalk
 from lightfield.synthesis.view import Sources, reader
 
 RIG = {
@@ -238,6 +239,52 @@ def test_the_canvas_shows_what_is_in_a_mirror(tmp_path, show):
     # A reflection that stays where its glass is gives 26 dB.
     assert psnr(shown, expected) >= 35
     assert psnr(shown, truth) >= 30
+
+
+@pytest.fixture
+def alone(small, tmp_path):
+    """The walk of the small page as a file of its own."""
+    output = tmp_path / "walk.html"
+    ReportWalk(page=small / "index.html", output=output).run()
+    return output
+
+
+def test_the_walk_alone_shows_what_the_page_shows(small, alone, show, shared_tab):
+    assert alone.stat().st_size < (small / "index.html").stat().st_size
+    place, yaw, pitch = [0.1, -0.05, 0.1], 0.3, -0.1
+    on_page = look_from(shared_tab(), place, yaw, pitch)
+    opened = show(alone)
+    wait(opened)
+    assert opened.title() == "ball/sphere"
+    assert (look_from(opened, place, yaw, pitch) == on_page).all()
+    # The exposure changes the picture, as on the page.
+    opened.evaluate(
+        "element('exposure').value = 1; element('exposure').dispatchEvent(new Event('input'))"
+    )
+    assert look_from(opened, place, yaw, pitch).mean() > 1.2 * on_page.mean()
+    opened.locator("#walk-overlay").focus()
+    opened.keyboard.press("w")
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_the_walk_alone(alone, show, width):
+    opened = show(alone, width=width)
+    wait(opened)
+    assert accessibility.faults(opened) == []
+    assert opened.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_only_a_page_with_a_walk_has_a_walk_of_its_own(tmp_path):
+    other = tmp_path / "other.html"
+    other.write_text("<title>another page</title>")
+    with pytest.raises(UserError, match="is no page of a dataset"):
+        ReportWalk(page=other, output=tmp_path / "walk.html").run()
+    other.write_text(
+        '<title>a/b</title><script type="application/json" id="data">{"walk": null}</script>'
+    )
+    with pytest.raises(UserError, match="no depth"):
+        ReportWalk(page=other, output=tmp_path / "walk.html").run()
+    assert not (tmp_path / "walk.html").exists()
 
 
 def test_the_eye_moves_by_keys_mouse_and_touch(tab):

@@ -38,7 +38,8 @@ REPORT = "report"
 
 README = "README.md"
 CARD = "card.json"
-PACKAGED = (README, CARD, READER)
+WALK = "walk.html"
+PACKAGED = (README, CARD, READER, WALK)
 """The files that a package adds to a dataset."""
 
 DEPTH_PICTURE = "{view}_depth.png"

@@ -28,13 +28,13 @@ from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, lists_beside_views
 from lightfield.formats.export_lists import MANIFEST
-from lightfield.formats.layout import CARD, IMAGES, README, REPORT, further_parts
+from lightfield.formats.layout import CARD, IMAGES, README, REPORT, WALK, further_parts
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import PASSES, group_pass
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import title
 from lightfield.publishing.markdown import markdown
-from lightfield.report import snippet
+from lightfield.report import snippet, walk_page
 from lightfield.stages.publishing import Package
 
 SILVR = (
@@ -172,11 +172,15 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     Further parts are named <target's stem>.2.tar and so on. Removes the parts of an earlier
     package.
     """
-    readme = markdown("card.md.j2", **{"frames": None, "looks": None, **content})
+    walk = _walk(folder)
+    readme = markdown(
+        "card.md.j2", **{"frames": None, "looks": None, **content}, walk=walk is not None
+    )
     texts = {
         CARD: json.dumps(content, indent=1) + "\n",
         README: readme,
         READER: read_text(READER_SOURCE),
+        **({WALK: walk} if walk else {}),
     }
     paths = [
         path for path in files_below(folder) if REPORT not in path.relative_to(folder).parts[:2]
@@ -197,6 +201,13 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
                 progress.done()
         written.append(name)
     return written
+
+
+def _walk(folder: Path) -> str | None:
+    """Return the walk of a rig's dataset, or of a sequence's first one. None without any."""
+    frames = _frames(folder)
+    page = (frames[0] if frames else folder) / REPORT / "index.html"
+    return walk_page.of_page(page) if page.is_file() else None
 
 
 def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:

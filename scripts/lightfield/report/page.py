@@ -25,8 +25,8 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 # A plot stays sharp as SVG. A plot of thousands of points is smaller as PNG.
 _LARGEST_SVG = 300_000
 _PHOTO_QUALITY = 84
-# import { a, b } from "./module.js";   import shader from "./shaders/name.glsl";
-_IMPORT = re.compile(r'^import (?P<names>[^;]+) from "(?P<path>[^"]+)";\n', re.MULTILINE)
+# import { a, b } from "./module.js";   import "./module.js";   import shader from "./name.glsl";
+_IMPORT = re.compile(r'^import (?:(?P<names>[^;"]+) from )?"(?P<path>[^"]+)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=async|const|function)", re.MULTILINE)
 
 
@@ -60,6 +60,7 @@ def environment() -> jinja2.Environment:
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
         "page_js": Markup(joined_script(page_modules)),
         "walk_js": Markup(joined_script(only_of_walk)),
+        "only_walk_js": Markup(joined_script(script_modules(TEMPLATES / "walk_alone/main.js"))),
         "relight_js": Markup(joined_script(only_of_relight)),
     }
     return environment

@@ -87,6 +87,7 @@ class Package(Stage[PackSettings]):
     name = "package"
     version = 2
     function = "lightfield.publishing.package:write"
+    version = 1
     by_hand = PackageByHand
 
     folder: Path = reads(FOLDER)

@@ -80,6 +80,16 @@ class ReportHtml(Stage[PageSettings]):
     output: Path = writes("HTML file to write")
 
 
+class ReportWalk(PlainStage):
+    """Writes the walk of a dataset's page as one file, for a site."""
+
+    name = "report_walk"
+    function = "lightfield.report.walk_page:write"
+
+    page: Path = reads("page of a dataset: its report/index.html", positional=True)
+    output: Path = writes("HTML file to write")
+
+
 class ReportIndex(PlainStage):
     """Makes the page with links to the pages of all datasets in a results folder."""
 

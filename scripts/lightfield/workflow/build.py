@@ -251,6 +251,10 @@ class Build:
             sums.append(sequence_sums)
         return sums
 
+    def packed_page(self, wildcards: Wildcards) -> str:
+        """Return the page whose walk is in an archive: of the first frame, if there are several."""
+        return self.rig(wildcards)[0].paths.page
+
     def packed_lists(self, wildcards: Wildcards) -> list[str]:
         """Return the validations and lists that name all files in an archive."""
         datasets = self.rig(wildcards)
