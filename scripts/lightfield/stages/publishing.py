@@ -87,7 +87,6 @@ class Package(Stage[PackSettings]):
     name = "package"
     version = 2
     function = "lightfield.publishing.package:write"
-    version = 1
     by_hand = PackageByHand
 
     folder: Path = reads(FOLDER)
