@@ -339,18 +339,23 @@ def followers(jobs, first):
 
 
 def identifying_arguments(command):
-    """Return a command's arguments except for those that say how to run it."""
-    arguments = iter(command)
-    return [word for word in arguments if word not in MACHINE or not next(arguments)]
+    """Return a command's arguments except for those that say how to run it, or what exists."""
+    kept = []
+    flag = ""
+    for word in command:
+        flag = word if word.startswith("--") else flag
+        if flag not in {*MACHINE, "--finished"}:
+            kept.append(word)
+    return kept
 
 
 def assert_made_from_present_inputs(build, jobs):
     """Check that each output was made by its job's present command from its present inputs.
 
-    A page shows the measurements that existed when it was planned.
+    A page shows the measurements that existed when it was planned. A package has the page's walk.
     """
     shown_later = build.plan().keys()
-    assert {jobs[output]["rule"] for output in shown_later} <= {"page", "index"}
+    assert {jobs[output]["rule"] for output in shown_later} <= {"page", "index", "pack"}
     noted = bookkeeping.noted(build.folder)
     for first_output, job in jobs.items():
         if first_output in shown_later:
@@ -569,7 +574,8 @@ ROUNDS = {
         "built": (
             "format: png\n    exposure: -1\n  cubes",
             "format: png\n    exposure: -1\n    look: AgX - Punchy\n  cubes",
-            {"perspective reproject", "perspective reprojected_lightfield"},
+            # Drawings have the look of the scene's pictures.
+            {"perspective reproject", "perspective reprojected_lightfield", "figures"},
         ),
         "brought": (
             "depth: true}",

@@ -438,8 +438,12 @@ SYNTHESIS = Job(
     of_dataset_in("synthesis", settings.synthesis),
 )
 
-JOBS = [record for record in globals().values() if isinstance(record, Job)]
-JOBS += [record for record in EXPORT_RULES.values() if record is not EXPORT]
+JOBS = [
+    job
+    for record in globals().values()
+    if isinstance(record, Job)
+    for job in (EXPORT_RULES.values() if record is EXPORT else [record])
+]
 """All jobs, in the order of the work."""
 ORDER = {job: place for place, job in enumerate(JOBS)}
 
