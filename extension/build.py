@@ -26,6 +26,9 @@ PARTS = (
     "geometry",
     "imaging",
     "formats",
+    "reading",
+    "export",
+    "exporters",
     "configuration",
     "rendering/inspection/clearance.py",
 )
