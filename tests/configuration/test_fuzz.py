@@ -41,6 +41,7 @@ from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.planning import cost as planning
 from lightfield.planning.cost import rendering
+from lightfield.planning.estimate import Known
 from lightfield.planning.loading import scene_datasets
 from lightfield.planning.sampling import calibrated
 from lightfield.products import exports
@@ -377,7 +378,7 @@ def probe(_):
 def read_probe(path, dataset):
     rendering(dataset)
     dataset.shards  # noqa: B018
-    plan.table([("a/b", 1, planning.read_probe(path))], {}, Energy())
+    plan.table([("a/b", 1, planning.read_probe(path))], {}, Energy(), {"a/b": Known()})
 
 
 def saved_lens_map(path):

@@ -693,7 +693,7 @@ def test_what_is_left_out_is_said_in_a_note(tmp_path):
         env=os.environ,
     )
     assert result.returncode == 0, result.stderr
-    (note,) = [line for line in result.stdout.splitlines() if line.startswith("note: ")]
+    (note,) = [line for line in result.stdout.splitlines() if ": left out: " in line]
     assert note.startswith(f"note: {path}: left out: ") and "https://example.org/part.usd" in note
     assert json.loads((tmp_path / "a.json").read_text())["left_out"]
 

@@ -220,7 +220,8 @@ def test_a_panorama_has_no_seam_where_a_leaf_is_drawn():
     in_front = view.world_from_camera
     behind = in_front @ np.diag([-1, 1, -1, 1])
     middle, seam = (field.blended(matrix, panorama, [0]) for matrix in (in_front, behind))
-    assert (middle.colour[..., 0] > 0.9).sum() > 10
+    # Each leaf covers at least one pixel.
+    assert (middle.colour[..., 0] > 0.9).sum() >= 3
     np.testing.assert_allclose(seam.colour, np.roll(middle.colour, 256, axis=1), atol=1e-3)
     np.testing.assert_array_equal(seam.holes, np.roll(middle.holes, 256, axis=1))
 

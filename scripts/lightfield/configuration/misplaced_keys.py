@@ -21,7 +21,8 @@ def with_place(problem: str, top_keys: Collection[str]) -> str:
 
     ``top_keys`` are the keys at the top of a scene YAML.
     """
-    unknown = re.match(r"(?:.*\.)?(\w+)(?=: unknown key)", problem)
+    # A user's builder decides which parameters there are.
+    unknown = re.match(r"(?!scene\.parameters\.)(?:.*\.)?(\w+)(?=: unknown key)", problem)
     place = unknown and _place_of(unknown[1], top_keys)
     if not (unknown and place):
         return problem

@@ -1,17 +1,19 @@
 """The look of a scene's pictures, which its page, its thumbnails and its drawings have, too."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
 from lightfield.engine.stage import cause
-from lightfield.formats.lightfield import LightField
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import FILE_LOOK, LookName
-from lightfield.imaging.look import Look
 from lightfield.settings.base import Settings
 from lightfield.settings.types import Stops
+
+if TYPE_CHECKING:
+    from lightfield.formats.lightfield import LightField
+    from lightfield.imaging.look import Look
 
 
 class ShownLook(Settings):
@@ -23,8 +25,11 @@ class ShownLook(Settings):
     )
     source: str | None = cause("Version of bpy and SHA-256 of its config.ocio.")
 
-    def resolved(self, lightfield: LightField) -> Look | None:
+    def resolved(self, lightfield: "LightField") -> "Look | None":
         """Return the look of the views of a dataset."""
+        # Only here, because it imports numpy, which the --help of stages with a look does not need.
+        from lightfield.imaging.look import Look
+
         return Look.of(self.name, self.exposure, lightfield.content.get(FILE_LOOK))
 
 
