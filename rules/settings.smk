@@ -1,4 +1,4 @@
-# Settings as files of a storage. Without one, the check writes them.
+# Settings as files of a storage. Without one, the plan writes them.
 from lightfield.core.files import write_text
 
 

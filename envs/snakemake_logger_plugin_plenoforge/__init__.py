@@ -1,7 +1,7 @@
 """Snakemake's logger `plenoforge`: tells the display of the workflow what Snakemake does.
 
-The display is `lightfield.workflow.run_display`. The Snakefile sets it. `make` copies this folder
-into the environment, because Snakemake finds logger plugins only there.
+The display is `lightfield.workflow.run_display`. `lightfield.workflow.handlers` sets it.
+`make` copies this folder into the environment, because Snakemake finds logger plugins only there.
 """
 
 import builtins

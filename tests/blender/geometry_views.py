@@ -25,6 +25,8 @@ from lightfield.rendering.views import shard
 from lightfield.rendering.views.colour_pass import render_colour
 from lightfield.rendering.views.geometry_pass import render_geometry
 
+PASSES = ["normal", "object", "material"]
+
 
 def material(name, alpha=1.0):
     created = bpy.data.materials.new(name)
@@ -177,9 +179,10 @@ def main(folder: Path, cases: Path) -> None:
         opened = cycles.set_up(path, None, lightfield, "cpu", 1)
         results[f"{name}.alone"] = render_colour(opened, pose, 1).pixels
         # The first geometry follows a new session, the second a colour render. Both must be equal.
-        opened = cycles.set_up(path, None, lightfield, "cpu", 1)
+        with_passes = LightField.from_json(content | {"passes": PASSES})
+        opened = cycles.set_up(path, None, with_passes, "cpu", 1)
         for _ in range(2):
-            geometry = render_geometry(opened, pose, ["normal", "object", "material"])
+            geometry = render_geometry(opened, pose, PASSES)
             colour = render_colour(opened, pose, 1)
         rays = shard.depth_rays(lightfield)
         results[f"{name}.z"] = shard.depth_channel(geometry.depth, lightfield, rays)

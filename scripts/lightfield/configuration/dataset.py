@@ -310,7 +310,7 @@ class Dataset(Capture):
 
     @property
     def published(self) -> list[str]:
-        """The files that one job each makes: all files except views and reports."""
+        """The light fields, and the lists of exports and of the mesh. One job makes each."""
         return [*self.lightfields, *self.exported, *_present(self.mesh_list)]
 
     @property

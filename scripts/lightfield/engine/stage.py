@@ -11,7 +11,7 @@ of a run, such as the number of threads. Its settings decide what it writes, and
         output: Path = writes(".blend to write")
 
 The class determines the program with its flags (`lightfield.engine.flags`) and its page of the
-reference. It also determines the settings file that a rule writes.
+reference. It also determines the settings file that the plan writes.
 """
 
 import importlib
@@ -56,8 +56,8 @@ class Stage(BaseModel, Generic[StageSettings]):
     # The function that does the work, as "module:function". It takes the stage. `run` imports it,
     # so that --help does not wait for the import.
     function: ClassVar[str]
-    # Part of the keys of what the stage writes. Raise it if equal settings give other results:
-    # everybody's jobs then run again.
+    # The receipt has it. Raise it if equal settings give other results: everybody's jobs then run
+    # again.
     version: ClassVar[int]
     # Whether what it makes depends on more than its receipt lists, such as times. It then works at
     # each start.

@@ -30,7 +30,8 @@ EXPORTERS: dict[str, "type[Export]"] = {}
 """All exporters by their names."""
 
 PointCount = Annotated[int, Field(ge=1)]
-# Refusals of views without depth. What to do depends on the source, and scene_yaml.py adds it.
+# Refusals of views without depth. What to do depends on the source, so scene_checks/exports.py
+# adds it.
 NO_DEPTH = "holds no depth"
 NOT_EXR = "is not in EXR"
 TO_RECTILINEAR = "reproject to rectilinear"

@@ -31,7 +31,7 @@ SUMS = "sha256sums.txt"
 
 VALIDATION = "validation.json"
 OUTPUTS = (VALIDATION, SUMS)
-"""The files in a dataset that its validation writes."""
+"""The files in a dataset that say whether it is valid, and of which bytes."""
 
 REPORT = "report"
 """The folder in a dataset that is not published with it."""

@@ -1,7 +1,7 @@
 """Converts between depth along the optical axis (Z-depth) and distance from the camera.
 
-A view stores one of them, and `LightField.depth` says which. `Lens.usual_depth` is the default.
-`conventional_depth` is the one that other programs expect.
+A view stores one of them. Its header says which, or else `LightField.depth`. `Lens.usual_depth` is
+the default. `conventional_depth` is the one that other programs expect.
 """
 
 import numpy as np

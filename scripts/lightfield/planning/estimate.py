@@ -1,7 +1,7 @@
 """How long a dataset's views take to render: one estimate, from the sharpest known measurement.
 
-`snakemake -n`, the target `plan`, a dataset's page and a GPU check all ask `estimate`. So they give
-the same figure for the same views on the same device. The order of preference:
+`snakemake -n`, the target `plan`, a dataset's page and a GPU check all ask `Known.estimate`. So
+they give the same figure for the same views on the same device. The order of preference:
 
 1. finished views of the same size and samples, at least as many as a probe has;
 2. a probe of these views;

@@ -185,7 +185,8 @@ class OpenView:
     @property
     def has_ray(self) -> Bools:
         """Which pixels (height, width) have a ray."""
-        return np.isfinite(_unit_rays(self.lens)[..., 0])
+        has_ray: Bools = np.isfinite(_unit_rays(self.lens)[..., 0])
+        return has_ray
 
     @property
     def path(self) -> Path:

@@ -130,8 +130,9 @@ def _points_of(view: OpenView) -> Array:
     depth = overview.depth[::every, ::every]
     distance = converted(depth, rays, view.dataset.depth, "distance")
     is_hit = np.isfinite(distance) & (distance > 0)
-    points: Array = (rays * distance[..., None])[is_hit] @ view.world_from_camera[:3, :3].T
-    return points + view.world_from_camera[:3, 3]
+    points = (rays * distance[..., None])[is_hit] @ view.world_from_camera[:3, :3].T
+    in_world: Array = points + view.world_from_camera[:3, 3]
+    return in_world
 
 
 def draw_rig(

@@ -1,4 +1,7 @@
-"""Checks a dataset, or the exports of a sequence, and writes validation.json and checksums."""
+"""Checks a dataset, or the exports of a sequence, and writes validation.json.
+
+The checksums of a sequence are written here, too; `publish_checksums` writes those of a dataset.
+"""
 
 import sys
 from os.path import normpath

@@ -1,4 +1,4 @@
-"""The files of all jobs that make a dataset: the fields of their stages, by name.
+"""The files of the jobs that members of families have, too: their stages' fields, by name.
 
 The record of a job in `lightfield.workflow.jobs` names the function of this module that returns its
 fields. Rules show the same files in their commands. The members of a family have no rules: their

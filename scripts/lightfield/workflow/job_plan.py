@@ -72,7 +72,7 @@ class JobPlan:
     # Where Snakemake puts its copies of stored files.
     copies = ""
     is_stored = False
-    # The settings files that jobs write. Without a storage, the check writes them.
+    # The settings files that jobs write. Without a storage, the plan writes them.
     settings_paths = one_of([])
 
     def __init__(self, run: Run) -> None:

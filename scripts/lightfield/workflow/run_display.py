@@ -117,7 +117,7 @@ class Task:
 class RunDisplay:
     """Shows the progress of a run's tasks.
 
-    The Snakefile calls `begin` and `at_close`. Snakemake's logger plugin calls what says what
+    `Handlers` calls `begin` and `at_close`. Snakemake's logger plugin calls what says what
     Snakemake does. ``forecast`` prints the end of a dry run. ``find_log`` returns the file of a log
     that Snakemake names.
     """
@@ -300,7 +300,7 @@ class RunDisplay:
             while self._at_close:
                 self._at_close.pop(0)()
 
-    # What the Snakefile prints at the end.
+    # What `Handlers` prints at the end.
 
     def failures(self) -> str:
         """Return why the jobs of this run failed."""

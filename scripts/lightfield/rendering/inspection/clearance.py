@@ -158,7 +158,8 @@ def outermost_points() -> Floats:
             nearest = int(along.argmax())
             if along[nearest] > farthest[index]:
                 farthest[index], points[index] = along[nearest], places[nearest]
-    return np.unique(points[np.isfinite(farthest)], axis=0)
+    outermost: Floats = np.unique(points[np.isfinite(farthest)], axis=0)
+    return outermost
 
 
 class Contents(NamedTuple):
