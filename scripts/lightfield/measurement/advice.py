@@ -247,7 +247,7 @@ def verdict(change: Change, saving: Saving | None, own: Mapping[str, Any]) -> st
     if reason := _without_effect(change.change, own):
         return f"no: {reason}"
     if "clamp_indirect" in change.change:
-        return "no: a clamp takes light away"
+        return "no: a clamp is only reported"
     if saving is None:
         return "no: the renders have no noise"
     if not change.keeps_picture(saving):
@@ -490,7 +490,7 @@ def _savings_table(content: Mapping[str, Any]) -> list[str]:
         if whole_views:
             details = [
                 f"{whole_views['times_of_all_pixels']:.2f}",
-                f"{whole_views['bias'] / whole_views['noise']:.2g}",
+                f"{whole_views['bias'] / whole_views['noise']:.3g}",
                 f"{whole_views['light']:+.2%}",
             ]
         cells = [
