@@ -28,6 +28,8 @@ from lightfield.settings.base import Settings, as_list, pattern
 _MOST_MEMBERS = 100_000
 # The record of a member, in its folder.
 RECORD = "member.json"
+# The name of its receipt, without a suffix.
+RECEIPT = "member"
 FORMAT = "plenoforge member"
 
 _Bounds = Annotated[tuple[float, float], as_list(2)]

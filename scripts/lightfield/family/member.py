@@ -14,7 +14,7 @@ from typing import Any
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
+from lightfield.configuration.family import FORMAT, RECEIPT, RECORD, Member, drawn, member_content
 from lightfield.configuration.scene_checks.rigs import MOST_VIEWS
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core import leftovers
@@ -53,7 +53,7 @@ class MemberBuild:
         place = settings.folder_of(member)
         self.folder = Path(settings.results, place)
         self.work = Path(settings.work, place)
-        self.receipt = Path(settings.work, receipts.FOLDER, place, f"member{receipts.SUFFIX}")
+        self.receipt = Path(settings.work, receipts.FOLDER, place, f"{RECEIPT}{receipts.SUFFIX}")
         self.record = self.folder / RECORD
         self.log = self.work / "member.log"
         self.values = drawn(settings.values, member)

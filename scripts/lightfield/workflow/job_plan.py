@@ -386,6 +386,13 @@ class JobPlan:
         folders = shlex.join(self.run.build.verified_folders)
         return f"python {self.run.scripts}/verify.py {folders} --work {self.run.work}"
 
+    def prune_command(self, wildcards: HasWildcards) -> str:
+        """Return the command that removes former members of the chosen families."""
+        run = self.run
+        families = [w for names in run.build.family_names.items() for w in ("--family", *names)]
+        folders = f"--results {run.results} --work {run.work}"
+        return f"python {run.scripts}/prune.py {folders} {shlex.join(families)}"
+
     def check_provider(self, path: str) -> None:
         """End the run if Snakemake has a storage, as its ``path`` of an output tells."""
         if self.run.is_main and is_in_storage(path):
