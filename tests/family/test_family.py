@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 from conftest import largest_file
+from pydantic import ValidationError
 
 from lightfield.configuration.family import Family, Member, drawn, member_content, stand_in
 from lightfield.configuration.scene_yaml import check_member
@@ -123,8 +124,46 @@ def test_models_get_names_that_stay_theirs(tmp_path, monkeypatch):
 
 def test_a_family_without_models_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match=r"family\.models: is 'models/\*\.glb'"):
-        family(models="models/*.glb").members()
+    Path("face.obj").touch()
+    for models in ("models/*.glb", ["*.obj", "models/*.glb"]):
+        with pytest.raises(UserError, match=r"family\.models: is 'models/\*\.glb'"):
+            family(models=models).members()
+    for models in ([], [""], "", 3, [["*.obj"]]):
+        with pytest.raises(ValidationError, match="models"):
+            family(models=models)
+
+
+def test_a_family_takes_models_of_several_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path in ("chairs/a.glb", "chairs/old/b.glb", "tables/c.obj", "tables/d.ply"):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        Path(path).touch()
+    chairs = by_name(family(models="chairs/**/*.glb").members())
+    assert by_name(family(models=["chairs/**/*.glb"]).members()) == chairs
+    both = by_name(family(models=["chairs/**/*.glb", "tables/*.obj"]).members())
+    # A further path changes no member.
+    assert both == chairs | {"c_obj": Member(name="c_obj", model="tables/c.obj")}
+    assert len(chairs) == 2
+
+
+@pytest.mark.parametrize(
+    ("models", "said"),
+    [
+        (["a/*.glb", "a/**/*.glb"], "a/chair.glb matches 'a/*.glb' and 'a/**/*.glb'"),
+        (["a/*.glb", "./a/*.glb"], "./a/chair.glb matches 'a/*.glb' and './a/*.glb'"),
+        (["a/*.glb", "a/*.glb"], "a/chair.glb matches 'a/*.glb' and 'a/*.glb'"),
+        (["a/*.glb", "b/*.glb"], "a/chair.glb and b/chair.glb would both be the member chair_glb"),
+    ],
+)
+def test_a_file_or_name_of_two_members_is_refused(tmp_path, monkeypatch, models, said):
+    monkeypatch.chdir(tmp_path)
+    for path in ("a/chair.glb", "b/chair.glb"):
+        Path(path).parent.mkdir()
+        Path(path).touch()
+    with pytest.raises(UserError) as caught:
+        family(models=models).members()
+    assert str(caught.value).startswith(f"family.models: {said}")
+    assert len(family(models="*/*.glb").members()) == 2
 
 
 def test_a_new_seed_changes_one_batch_and_a_new_model_too(tmp_path, monkeypatch):
@@ -168,7 +207,9 @@ OF_MODELS = {"render": {"samples": 1}, "rigs": {"ring": {"type": "ring", "count"
 OF_MODELS["rigs"]["ring"]["camera"] = {"lens": "rectilinear", "fov": 50, "resolution": [8, 8]}
 
 
-@pytest.mark.parametrize("models", ["models/*.obj", "models/*.PLY", "models/**/*"])
+@pytest.mark.parametrize(
+    "models", ["models/*.obj", "models/*.PLY", "models/**/*", ["a/*.obj"], ["a/*.glb", "b/*.obj"]]
+)
 def test_a_family_of_models_takes_the_keys_of_its_format(models):
     scene = {"up": "z", "unit": "metres"}
     content = {"scene": scene, "family": {"models": models}, **OF_MODELS}
@@ -266,6 +307,18 @@ rigs:
     camera: {{lens: rectilinear, fov: 50, resolution: [8, 8]}}
 family: {{models: models/*.obj, values: {values}}}
 """
+
+
+@pytest.mark.slow
+def test_wrong_models_are_refused_in_one_line(tmp_path):
+    models = MODELS.replace("models/*.obj", '["*.obj", "none/*.obj"]')
+    folder = checkout(tmp_path / "plenoforge", faces=models.format(light="city", values="{}"))
+    (folder / "face.obj").write_text(FACE)
+    run = snakemake(folder, "--dry-run", "--config", "scenes=[faces]", "rigs=all")
+    assert run.returncode == 1
+    said = [line for line in run.stderr.splitlines() if not line.startswith("Using workflow")]
+    assert len(said) == 1
+    assert re.match(r"error: configs/scenes/faces\.yaml:\d+: family\.models: is 'none/", said[0])
 
 
 @pytest.mark.slow

@@ -190,7 +190,7 @@ class MemberBuild:
             results=settings.results,
             work=settings.work,
         )
-        return Build(config, datasets, {dataset.name: dataset for dataset in datasets}, {})
+        return Build(config, datasets, {dataset.name: dataset for dataset in datasets}, {}, {})
 
     def _fail(self, receipt: OpenReceipt, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member.
