@@ -206,6 +206,23 @@ def test_shares_above_one_are_refused():
         Shares(validation=0.6, test=0.6)
 
 
+# ---- what members took -----------------------------------------------------------------------
+
+KEYS = "name state split seed model views bytes built seconds cpu_seconds stage_cpu_seconds"
+KEYS = [*KEYS.split(), "failed_stage", "error", "log"]
+
+
+def test_each_member_has_a_line_of_json_with_all_keys(built):
+    rows = [json.loads(line) for line in (built / "report/members.jsonl").read_text().splitlines()]
+    assert [row["name"] for row in rows] == [*(f"{n:04d}" for n in range(6)), "broken"]
+    assert all([*row] == KEYS for row in rows)
+    assert (rows[2]["state"], rows[2]["seed"], rows[2]["views"]) == ("valid", 2, 3)
+    assert rows[2]["error"] is None
+    assert (rows[-1]["state"], rows[-1]["model"]) == ("failed", "models/broken.glb")
+    assert (rows[-1]["failed_stage"], rows[-1]["error"]) == ("import_model", CAUSE)
+    assert rows[-1]["log"] == "work/chairs/broken/log"
+
+
 # ---- equal bytes -----------------------------------------------------------------------------
 
 
@@ -356,7 +373,7 @@ def test_the_sums_hold_and_cover_everything(built):
         for path in built.glob("*/*/sha256sums.txt")
         for line in path.read_text().splitlines()
     }
-    assert listed | beneath | {"sha256sums.txt"} == files(built).keys()
+    assert listed | beneath | {"sha256sums.txt", "report/members.jsonl"} == files(built).keys()
     assert faults(built) == {}
 
 

@@ -8,6 +8,7 @@ import re
 import resource
 import shutil
 import subprocess
+import time
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from lightfield.family import batch as family_batch
 from lightfield.family.batch import deadly_members, member_at_hand
 from lightfield.family.member import MemberBuild
 from lightfield.imaging.images import write_exr, write_png
-from lightfield.stages.family import BatchSettings, BuildMembers
+from lightfield.stages.family import BatchSettings, BuildMembers, Corpus, CorpusSettings
 from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import RenderShard
 from lightfield.validation.verification import faults
@@ -578,6 +579,56 @@ def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
     assert record["failure"]["cause"] == "out of memory"
     assert [path.name for path in build.folder.iterdir()] == ["member.json"]
     assert (tmp_path / "disk/mine.txt").read_text() == "mine"
+
+
+# ---- what members took -------------------------------------------------------------------------
+
+
+def listed_members(build):
+    """Collect the family of a member. Return the lines of its members by their names."""
+    settings = CorpusSettings(family="faces", inputs=[str(build.record)])
+    receipt = build.receipt.parents[1] / "corpus.jsonl"
+    Corpus(
+        settings=settings,
+        folder=build.folder.parent,
+        cache=build.work.parent / "looks.json",
+        receipt=receipt,
+    ).run()
+    lines = (build.folder.parent / "report/members.jsonl").read_text().splitlines()
+    return {row["name"]: row for row in map(json.loads, lines)}
+
+
+@pytest.mark.slow
+def test_the_list_of_members_has_what_the_last_build_of_each_took(face, tmp_path):
+    build = build_of(face())
+    began, cpu_began = time.time(), time.process_time()
+    build.build("cpu", 1)
+    seconds, cpu_seconds = time.time() - began, time.process_time() - cpu_began
+    row = listed_members(build)["face"]
+    assert 0 < row["seconds"] <= seconds + 0.001
+    assert row["seconds"] == pytest.approx(seconds, abs=0.5)
+    assert row["cpu_seconds"] == pytest.approx(cpu_seconds, abs=0.5)
+    assert began <= row["built"] <= time.time()
+    assert row["stage_cpu_seconds"].keys() >= {"import_model", "render_shard", "validate"}
+    assert sum(row["stage_cpu_seconds"].values()) <= row["cpu_seconds"] + 0.01
+
+    # A failed member has its cause, and the time until it failed.
+    (tmp_path / "face.obj").write_text("nothing")
+    build.build("cpu", 1)
+    failed = listed_members(build)["face"]
+    assert (failed["state"], failed["failed_stage"]) == ("failed", "import_model")
+    assert "face.obj" in failed["error"]
+    assert failed["built"] > row["built"]
+    assert failed["stage_cpu_seconds"].keys() == {"import_model"}
+
+    # Nobody knows what a process took that died.
+    build.note_death("killed by SIGSEGV")
+    died = listed_members(build)["face"]
+    assert (died["error"], died["seconds"], died["cpu_seconds"]) == (
+        "killed by SIGSEGV",
+        None,
+        None,
+    )
 
 
 # ---- batches, as a run finds them --------------------------------------------------------------

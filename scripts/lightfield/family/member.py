@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import sys
+import time
 import traceback
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -31,7 +32,7 @@ from lightfield.rendering.models import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device
 from lightfield.workflow.build import Build
-from lightfield.workflow.member_record import read_member
+from lightfield.workflow.member_record import BUILT, read_member
 
 # What a member is made of does not depend on these keys of a scene YAML.
 _DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
@@ -89,6 +90,7 @@ class MemberBuild:
 
     def _build(self, device: Device, threads: int) -> dict[str, Any]:
         run = MemberRun()
+        began, cpu_began = time.time(), time.process_time()
         with self._opened_receipt() as receipt, _output_to(self.log):
             # From now on the member is neither valid nor failed.
             self.record.unlink(missing_ok=True)
@@ -101,7 +103,6 @@ class MemberBuild:
                 receipts.note_inputs(rig.file for rig in rigs if isinstance(rig, Poses))
                 datasets = self._datasets(written)
                 run.run(self._build_of(datasets), device, threads)
-                write_json(self.work / "cpu_seconds.json", run.seconds)
                 entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
                 receipt.check_inputs()
                 record = self._write({"state": "valid", "datasets": entries})
@@ -109,6 +110,15 @@ class MemberBuild:
                 traceback.print_exc()
                 self._raise_outside_cause(error, receipt)
                 record = self._fail(receipt, run.stage, cause_of(error))
+            now = time.time()
+            receipt.log(
+                {
+                    BUILT: round(now, 3),
+                    "seconds": round(now - began, 3),
+                    "cpu_seconds": round(time.process_time() - cpu_began, 3),
+                    "stage_cpu_seconds": run.seconds,
+                }
+            )
             receipt.seal()
         return record
 
@@ -141,6 +151,8 @@ class MemberBuild:
                     references = model_files.survey(model).references
                     receipts.note_inputs(reference.path for reference in references)
             self._fail(receipt, self._last_stage(), cause)
+            # What it took died with the process.
+            receipt.log({BUILT: round(time.time(), 3)})
             receipt.seal()
 
     def _opened_receipt(self) -> AbstractContextManager[OpenReceipt]:

@@ -12,6 +12,9 @@ from lightfield.core.files import read_json
 from lightfield.core.paths import leads_inside
 from lightfield.settings.base import checked
 
+# The key of the line of a member's history that says when it was built, and what that took.
+BUILT = "built"
+
 
 class _Record(BaseModel):
     """A part of a member.json. Unlike settings, it may have keys that the corpus does not read."""
