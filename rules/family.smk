@@ -33,7 +33,7 @@ rule build_members:
 
 rule corpus:
     input:
-        PLAN.reads(CORPUS, batches=RUN.of_build(RUN.build.batch_receipts)),
+        PLAN.reads(CORPUS, batches=RUN.of_build(PLAN.batch_receipts)),
     output:
         [update(f"{RUN.results}/{{family}}/{name}") for name in CORPUS_FILES],
         receipt=PLAN.receipt_of(CORPUS),

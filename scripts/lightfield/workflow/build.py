@@ -22,7 +22,6 @@ from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import CORPUS, RENDERED, VIEWS, scene_folder
-from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters.base import Export
 from lightfield.planning.cost import Cost, members_cost
 from lightfield.planning.loading import (
@@ -312,14 +311,6 @@ class Build:
         """The number of batches of all families."""
         return sum(map(len, self.batches.values()))
 
-    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
-        """Return the receipts of all batches of a family."""
-        return self._batch_receipts(wildcards["family"])
-
-    def _batch_receipts(self, folder: str) -> list[str]:
-        receipts = f"{self.config.work}/{FOLDER}/{folder}/batches"
-        return [f"{receipts}/{batch}{SUFFIX}" for batch in self.batches[folder]]
-
     def members(self, wildcards: Wildcards) -> list[Member]:
         """Return the members of the batch that a job builds."""
         batches = self.batches[wildcards["family"]]
@@ -380,10 +371,8 @@ class Build:
     @property
     def family_targets(self) -> list[str]:
         """The files that a run with families makes."""
-        files = self.corpora
-        for folder in self.family_names:
-            files += [f"{self.config.work}/{folder}/members.json", *self._batch_receipts(folder)]
-        return files
+        counts = [f"{self.config.work}/{folder}/members.json" for folder in self.family_names]
+        return self.corpora + counts
 
 
 def _batches(config: Configuration, families: Mapping[str, Family]) -> Batches:

@@ -29,7 +29,7 @@ from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import FIGURES, LIGHTFIELD, PAGE, RENDER, Job
+from lightfield.workflow.jobs import BUILD_MEMBERS, FIGURES, LIGHTFIELD, PAGE, RENDER, Job
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -272,6 +272,15 @@ class JobPlan:
         for planned in self.planned_jobs():
             paths |= dict.fromkeys(flat(wanted[planned.job](planned.names).files.values()))
         return [path for path in paths if not self.check.is_made(path)]
+
+    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of all batches of a family."""
+        family = wildcards["family"]
+        batches = self.run.build.batches[family]
+        return [
+            self.receipt_path(BUILD_MEMBERS.name.format(family=family, batch=batch))
+            for batch in batches
+        ]
 
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
