@@ -29,7 +29,6 @@ from lightfield.planning.loading import (
     load_datasets,
     scene_datasets,
 )
-from lightfield.workflow.member_record import former_members
 
 Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
@@ -321,12 +320,6 @@ class Build:
         folder = Path(self.config.results, wildcards["family"])
         names = [member.name for member in self.members(wildcards)]
         return sum(not (folder / name / RECORD).exists() for name in names)
-
-    def former_members(self, folder: str) -> list[str]:
-        """Return the members that the family of a ``folder`` has built, but no longer has."""
-        results, work = Path(self.config.results), Path(self.config.work)
-        names = {member.name for batch in self.batches[folder].values() for member in batch}
-        return former_members(results / folder, work / FOLDER / folder, names)
 
     @cached_property
     def member_datasets(self) -> dict[str, list[Dataset]]:

@@ -263,8 +263,8 @@ class Handlers:
 
     def _print_former_members(self) -> None:
         """Print the members that the chosen families no longer have, but that are still there."""
-        for folder in () if self._plan.is_stored else self._run.build.family_names:
-            if names := self._run.build.former_members(folder):
+        for folder in self._run.build.family_names:
+            if names := self._plan.former_members(folder):
                 more = f" and {len(names) - MOST_NAMES:,} more" if names[MOST_NAMES:] else ""
                 print(
                     f"note: {self._run.results}/{folder} still has "
@@ -321,8 +321,8 @@ class Handlers:
 
     def _print_removals(self) -> None:
         """Print the folder of each member that a run with `prune` would remove."""
-        for folder in () if self._plan.is_stored else self._run.build.family_names:
-            for name in self._run.build.former_members(folder):
+        for folder in self._run.build.family_names:
+            for name in self._plan.former_members(folder):
                 print(f"would be removed: {self._run.results}/{folder}/{name}", file=sys.stderr)
 
     def _print_requests(self, jobs: list[PlannedJob]) -> None:

@@ -30,6 +30,7 @@ from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
 from lightfield.workflow.jobs import BUILD_MEMBERS, FIGURES, LIGHTFIELD, PAGE, RENDER, Job
+from lightfield.workflow.member_record import former_members
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -281,6 +282,12 @@ class JobPlan:
             self.receipt_path(BUILD_MEMBERS.name.format(family=family, batch=batch))
             for batch in batches
         ]
+
+    def former_members(self, family: str) -> list[str]:
+        """Return the members that a family has built, but no longer has."""
+        members = itertools.chain.from_iterable(self.run.build.batches[family].values())
+        names = {member.name for member in members}
+        return former_members(Path(self.run.results, family), Path(self.receipts, family), names)
 
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
