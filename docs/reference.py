@@ -230,7 +230,7 @@ PROGRAM_GROUPS = {
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
         "make_lightfield", "free_places", "check_cameras", "import_views",
     ],
-    "Build a family": ["build_members", "corpus", "count_members"],
+    "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
     "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],

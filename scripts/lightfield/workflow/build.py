@@ -32,6 +32,8 @@ from lightfield.planning.loading import (
 
 Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
+Batches = Mapping[str, Mapping[str, list[Member]]]
+"""The members of each batch of each family, by the folder of the family."""
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
 
@@ -53,13 +55,14 @@ class Build:
 
     The run makes the ``chosen`` datasets. ``datasets`` maps names to all datasets. Some of them
     only test models that were trained on chosen ones. ``families`` maps the names of scene YAMLs to
-    the chosen families.
+    the chosen families. ``batches`` has their members.
     """
 
     config: Configuration
     chosen: list[Dataset]
     datasets: dict[str, Dataset]
     families: dict[str, Family]
+    batches: Batches
 
     @classmethod
     def load(cls, config: Configuration, cluster: Cluster | None = None) -> "Build":
@@ -71,7 +74,8 @@ class Build:
         with suppress(UserError):
             smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
         datasets = {dataset.name: dataset for dataset in [*smoke, *every_rig]}
-        return cls(config, chosen, datasets, chosen_families(config))
+        families = chosen_families(config)
+        return cls(config, chosen, datasets, families, _batches(config, families))
 
     @cached_property
     def smoke(self) -> list[Dataset]:
@@ -301,20 +305,6 @@ class Build:
         """The names of the chosen families, by their folders."""
         return {scene_folder(name, self.config.preset): name for name in self.families}
 
-    @cached_property
-    def batches(self) -> dict[str, dict[str, list[Member]]]:
-        """The members of each batch of each family, by the folder of the family.
-
-        Raises `UserError` for a family without members.
-        """
-        batches = {}
-        for folder, name in self.family_names.items():
-            try:
-                batches[folder] = self.families[name].batches()
-            except UserError as error:
-                raise mistake(name, str(error)) from None
-        return batches
-
     @property
     def batch_count(self) -> int:
         """The number of batches of all families."""
@@ -376,6 +366,17 @@ class Build:
         """The files that a run with families makes."""
         counts = [f"{self.config.work}/{folder}/members.json" for folder in self.family_names]
         return self.corpora + counts
+
+
+def _batches(config: Configuration, families: Mapping[str, Family]) -> Batches:
+    """Return the batches of families. Raises `UserError` for a family without members."""
+    batches = {}
+    for name, family in families.items():
+        try:
+            batches[scene_folder(name, config.preset)] = family.batches()
+        except UserError as error:
+            raise mistake(name, str(error)) from None
+    return batches
 
 
 @cache
