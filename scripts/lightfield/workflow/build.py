@@ -129,20 +129,20 @@ class Build:
         folder = f"{dataset.paths.folder}/exports"
         return _entry(dataset.exports.selected, wildcards["format"], folder, "export of it")
 
-    def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
-        """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
-        rigs = dataset.testing_rigs(export)
+    def beside(self, dataset: Dataset, export: Export) -> list[Dataset]:
+        """Return the other datasets whose views go into an ``export`` of a dataset."""
+        rigs = dataset.rigs_beside(export)
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
-        """Return the inputs of an export: the views of its dataset, and of its test datasets.
+        """Return the inputs of an export: the views of its dataset, and of other rigs.
 
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
         files = [*dataset.receipts(RENDERED), *dataset.receipts(shards_of(wildcards))]
-        for test in self.testing(dataset, self.export(wildcards)):
-            files += _views_of_source(test, wildcards)
+        for other in self.beside(dataset, self.export(wildcards)):
+            files += _views_of_source(other, wildcards)
         return list(dict.fromkeys(files))
 
     def training_lists(self, wildcards: Wildcards) -> list[str]:
@@ -184,22 +184,22 @@ class Build:
         files = []
         for frame in self.frames(wildcards):
             export = frame.exports.selected[wildcards["format"]]
-            for dataset in (frame, *self.testing(frame, export)):
+            for dataset in (frame, *self.beside(frame, export)):
                 files += _views_of_source(dataset, wildcards)
         return list(dict.fromkeys(files))
 
     def validated_frames(self, wildcards: Wildcards) -> list[str]:
         """Return the files with which exports of a sequence are compared: the views of all frames.
 
-        Views of other rigs may test what these train. Their lightfield.json has their poses.
+        Exports may have views of other rigs. Their lightfield.json has their poses.
         """
         files = []
         for frame in self.frames(wildcards):
             files += [*frame.all_receipts, *frame.lightfields]
             for export in frame.exports.selected.values():
                 if export.is_of_sequence:
-                    for test in self.testing(frame, export):
-                        files += test.lightfields
+                    for other in self.beside(frame, export):
+                        files += other.lightfields
         return list(dict.fromkeys(files))
 
     def sequence_exports(self, wildcards: Wildcards) -> list[str]:
