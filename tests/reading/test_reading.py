@@ -452,6 +452,24 @@ def cut(path, beyond):
     return path
 
 
+def removed(folder, *names):
+    """Remove files from a folder. Returns the folder."""
+    for name in names:
+        (folder / name).unlink()
+    return folder
+
+
+def damaged(path):
+    path.write_bytes(b"\xff\xfe")
+    return path
+
+
+def further_parts(home):
+    """Return the names of the package's parts after the first, in their order."""
+    names = [path.name for path in home.glob("parts/room_rig.*.tar")]
+    return sorted(names, key=lambda name: int(name.split(".")[1]))
+
+
 # What is opened, and what the message names beside it.
 MISTAKES = {
     "no path": (lambda home: home / "missing", "is not there"),
@@ -463,7 +481,53 @@ MISTAKES = {
     "compressed": (lambda home: home / "zipped.tar", "whole, uncompressed tar"),
     "cut in a file": (lambda home: cut(home / "room_rig.tar", 600), "tar"),
     "cut between files": (lambda home: cut(home / "room_rig.tar", 0), "cut short"),
-    "missing shard": (lambda home: home / "shards/room_rig-train-{00000..00099}.tar", "-000"),
+    "shards beyond the last": (
+        lambda home: home / "shards/room_rig-train-{00000..00099}.tar",
+        "room_rig-train-00098.tar, room_rig-train-00099.tar",
+    ),
+    "missing shard": (
+        lambda home: removed(home / "shards", "room_rig-train-00001.tar"),
+        "misses room_rig-train-00001.tar",
+    ),
+    "missing part of the split": (
+        lambda home: removed(home / "shards", "room_rig-test-00000.tar"),
+        "misses room_rig-test-00000.tar",
+    ),
+    "missing shard, without a list": (
+        lambda home: removed(home / "shards", "room_rig-train-00001.tar", "sha256sums.txt"),
+        "misses room_rig-train-00001.tar",
+    ),
+    "missing shard of a run": (
+        lambda home: (
+            removed(home / "shards", "room_rig-train-00001.tar")
+            / "room_rig-train-{00000..00002}.tar"
+        ),
+        "misses room_rig-train-00001.tar",
+    ),
+    "damaged sums of shards": (
+        lambda home: damaged(home / "shards/sha256sums.txt").parent,
+        "sha256sums.txt: is not a valid list of checksums",
+    ),
+    "missing part of a package": (
+        lambda home: removed(home / "parts", "room_rig.2.tar") / "room_rig.tar",
+        "misses room_rig.2.tar",
+    ),
+    "missing parts at the end of a package": (
+        lambda home: removed(home / "parts", *further_parts(home)) / "room_rig.tar",
+        "of its files are in none of its parts, such as sha256sums.txt",
+    ),
+    "missing last part of a package": (
+        lambda home: removed(home / "parts", further_parts(home)[-1]) / "room_rig.tar",
+        "of its files are in none of its parts, such as sha256sums.txt",
+    ),
+    "missing first part of a package": (
+        lambda home: removed(home / "parts", "room_rig.tar") / further_parts(home)[4],
+        "open the first .tar of the package, room_rig.tar",
+    ),
+    "further part with a lightfield.json": (
+        lambda home: home / "parts" / further_parts(home)[3],
+        "open the first .tar of the package, room_rig.tar",
+    ),
     "broken lightfield.json": (lambda home: home / "broken", "lightfield.json"),
 }
 
