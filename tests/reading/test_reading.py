@@ -514,11 +514,11 @@ MISTAKES = {
     ),
     "missing parts at the end of a package": (
         lambda home: removed(home / "parts", *further_parts(home)) / "room_rig.tar",
-        "of its files are in none of its parts, such as sha256sums.txt",
+        "misses 1 file, such as sha256sums.txt; copy all parts",
     ),
     "missing last part of a package": (
         lambda home: removed(home / "parts", further_parts(home)[-1]) / "room_rig.tar",
-        "of its files are in none of its parts, such as sha256sums.txt",
+        "misses 1 file, such as sha256sums.txt; copy all parts",
     ),
     "missing first part of a package": (
         lambda home: removed(home / "parts", "room_rig.tar") / further_parts(home)[4],

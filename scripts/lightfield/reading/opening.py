@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
+from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading
 from lightfield.core.names import CORPUS, PARTS
@@ -169,8 +170,8 @@ def _check_parts(parts: Sequence[Path], package: Packed) -> None:
     lost_files = sorted(_listed_files(package) - package.contents.keys())
     if lost_files:
         raise UserError(
-            f"{first}: {len(lost_files)} of its files are in none of its parts, such as "
-            f"{lost_files[0]}; copy all parts to {first.parent}"
+            f"{first}: misses {units.count(len(lost_files), 'file')}, such as {lost_files[0]}; "
+            f"copy all parts of the package to {first.parent}"
         )
 
 
