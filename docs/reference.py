@@ -283,7 +283,7 @@ API = [
     Part(
         "geometry/lenses/base.py",
         "Lens",
-        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays"),
+        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays", "K"),
     ),
     Part("core/errors.py", "UserError"),
 ]
