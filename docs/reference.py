@@ -249,7 +249,10 @@ PROGRAM_GROUPS = {
     "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
-    "Report": ["report_figures", "report_html", "report_walk", "report_index", "costs", "schema"],
+    "Report": [
+        "report_figures", "report_html", "report_sequence", "report_walk", "report_index", "costs",
+        "schema",
+    ],
     "Measure": [
         "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
     ],

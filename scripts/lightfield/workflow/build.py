@@ -171,12 +171,14 @@ class Build:
         """
         frames = [dataset for dataset in self.rig(wildcards) if dataset.rig.sequence]
         export_format = wildcards.get("format")
-        if not frames or (export_format and export_format not in frames[0].exports.selected):
-            name = f"{wildcards['scene']}/{wildcards['rig']}"
+        folder = f"{self.config.results}/{wildcards['scene']}/{wildcards['rig']}"
+        if export_format and not (frames and export_format in frames[0].exports.selected):
             raise UserError(
-                f"{self.config.results}/{name}/exports/{export_format}: the scene YAML asks for "
-                "no such export of a sequence"
+                f"{folder}/exports/{export_format}: the scene YAML asks for no such export of a "
+                "sequence"
             )
+        if not frames:
+            raise UserError(f"{folder}: is no sequence; its rig in the scene YAML has no frames")
         return frames
 
     def exported_frames(self, wildcards: Wildcards) -> list[str]:
@@ -201,6 +203,24 @@ class Build:
                     for other in self.beside(frame, export):
                         files += other.lightfields
         return list(dict.fromkeys(files))
+
+    def shown_frames(self, wildcards: Wildcards) -> list[str]:
+        """Return the files that the page of a sequence shows: the views of all frames."""
+        files = []
+        for frame in self.frames(wildcards):
+            paths = frame.paths
+            files += [*frame.receipts(RENDERED), paths.lightfield, paths.validation]
+        return files
+
+    @property
+    def pages(self) -> list[str]:
+        """The pages of the chosen datasets and sequences."""
+        pages = []
+        for dataset in self.chosen:
+            pages.append(dataset.paths.page)
+            if dataset.sequence_page:
+                pages.append(dataset.sequence_page)
+        return list(dict.fromkeys(pages))
 
     def sequence_exports(self, wildcards: Wildcards) -> list[str]:
         """Return the lists of the exports of a sequence."""

@@ -29,7 +29,15 @@ from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import BUILD_MEMBERS, FIGURES, LIGHTFIELD, PAGE, RENDER, Job
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    FIGURES,
+    LIGHTFIELD,
+    PAGE,
+    RENDER,
+    SEQUENCE_PAGE,
+    Job,
+)
 from lightfield.workflow.member_record import former_members
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
@@ -186,6 +194,8 @@ class JobPlan:
             written.append(f"{paths.views}/{{first}}")
         elif job in (FIGURES, PAGE):
             written.append(paths.page)
+        elif job is SEQUENCE_PAGE:
+            written.append(paths.sequence_page)
         return [os.path.dirname(path.format(**names)) for path in written]  # noqa: PTH120
 
     def _end_unless_writable(self, folder: str) -> None:
