@@ -243,13 +243,16 @@ PROGRAM_GROUPS = {
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
         "make_lightfield", "free_places", "check_cameras", "import_views",
     ],
-    "Build a family": ["build_members", "corpus", "count_members"],
+    "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
     "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
-    "Report": ["report_figures", "report_html", "report_walk", "report_index", "costs", "schema"],
+    "Report": [
+        "report_figures", "report_html", "report_sequence", "report_walk", "report_index", "costs",
+        "schema",
+    ],
     "Measure": [
         "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
     ],
@@ -283,7 +286,7 @@ API = [
     Part(
         "geometry/lenses/base.py",
         "Lens",
-        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays"),
+        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays", "K"),
     ),
     Part("core/errors.py", "UserError"),
 ]

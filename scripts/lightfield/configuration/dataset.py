@@ -220,6 +220,11 @@ class Dataset(Capture):
         """The checksums of the exports of the whole sequence, if it has any."""
         return self.sequence_paths.sums if self.sequence_exports else None
 
+    @property
+    def sequence_page(self) -> str | None:
+        """The page of the whole sequence, if this is a frame of one."""
+        return self.sequence_paths.sequence_page if self.rig.sequence else None
+
     def training_list(self, export: Export, source: str) -> str | None:
         """Return the list of the ``export`` of the views that train what this dataset tests.
 
@@ -337,6 +342,7 @@ class Dataset(Capture):
             *paths.pictures,
             paths.costs,
             paths.page,
+            *_present(self.sequence_page),
             *self.all_receipts,
         ]
 

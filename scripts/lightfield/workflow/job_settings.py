@@ -42,7 +42,12 @@ from lightfield.stages.measurement import (
     SynthesisSettings,
 )
 from lightfield.stages.publishing import PackSettings
-from lightfield.stages.report import FiguresSettings, MeasurementFile, PageSettings
+from lightfield.stages.report import (
+    FiguresSettings,
+    MeasurementFile,
+    PageSettings,
+    SequenceSettings,
+)
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import (
     BuildSettings,
@@ -397,6 +402,16 @@ def validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings
         exports=frames[0].sequence_exports,
     )
     return "validate", settings
+
+
+def sequence_page(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    frames = build.frames(wildcards)
+    settings = SequenceSettings.of(
+        frames=[Path(frame.paths.folder).name for frame in frames],
+        rig=frames[0].placed_rig,
+        look=frames[0].shown_look,
+    )
+    return "sequence_page", settings
 
 
 def probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
