@@ -22,7 +22,6 @@ from lightfield.configuration.reprojections import Reprojection
 from lightfield.configuration.scene_yaml import mistake
 from lightfield.core.errors import UserError
 from lightfield.core.names import CORPUS, RENDERED, VIEWS, scene_folder
-from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters.base import Export
 from lightfield.planning.cost import Cost, members_cost
 from lightfield.planning.loading import (
@@ -33,6 +32,8 @@ from lightfield.planning.loading import (
 
 Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
+Batches = Mapping[str, Mapping[str, list[Member]]]
+"""The members of each batch of each family, by the folder of the family."""
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
 
@@ -54,13 +55,14 @@ class Build:
 
     The run makes the ``chosen`` datasets. ``datasets`` maps names to all datasets. Some of them
     only test models that were trained on chosen ones. ``families`` maps the names of scene YAMLs to
-    the chosen families.
+    the chosen families. ``batches`` has their members.
     """
 
     config: Configuration
     chosen: list[Dataset]
     datasets: dict[str, Dataset]
     families: dict[str, Family]
+    batches: Batches
 
     @classmethod
     def load(cls, config: Configuration, cluster: Cluster | None = None) -> "Build":
@@ -72,7 +74,8 @@ class Build:
         with suppress(UserError):
             smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
         datasets = {dataset.name: dataset for dataset in [*smoke, *every_rig]}
-        return cls(config, chosen, datasets, chosen_families(config))
+        families = chosen_families(config)
+        return cls(config, chosen, datasets, families, _batches(config, families))
 
     @cached_property
     def smoke(self) -> list[Dataset]:
@@ -126,20 +129,20 @@ class Build:
         folder = f"{dataset.paths.folder}/exports"
         return _entry(dataset.exports.selected, wildcards["format"], folder, "export of it")
 
-    def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
-        """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
-        rigs = dataset.testing_rigs(export)
+    def beside(self, dataset: Dataset, export: Export) -> list[Dataset]:
+        """Return the other datasets whose views go into an ``export`` of a dataset."""
+        rigs = dataset.rigs_beside(export)
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
-        """Return the inputs of an export: the views of its dataset, and of its test datasets.
+        """Return the inputs of an export: the views of its dataset, and of other rigs.
 
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
         files = [*dataset.receipts(RENDERED), *dataset.receipts(shards_of(wildcards))]
-        for test in self.testing(dataset, self.export(wildcards)):
-            files += _views_of_source(test, wildcards)
+        for other in self.beside(dataset, self.export(wildcards)):
+            files += _views_of_source(other, wildcards)
         return list(dict.fromkeys(files))
 
     def training_lists(self, wildcards: Wildcards) -> list[str]:
@@ -183,22 +186,22 @@ class Build:
         files = []
         for frame in self.frames(wildcards):
             export = frame.exports.selected[wildcards["format"]]
-            for dataset in (frame, *self.testing(frame, export)):
+            for dataset in (frame, *self.beside(frame, export)):
                 files += _views_of_source(dataset, wildcards)
         return list(dict.fromkeys(files))
 
     def validated_frames(self, wildcards: Wildcards) -> list[str]:
         """Return the files with which exports of a sequence are compared: the views of all frames.
 
-        Views of other rigs may test what these train. Their lightfield.json has their poses.
+        Exports may have views of other rigs. Their lightfield.json has their poses.
         """
         files = []
         for frame in self.frames(wildcards):
             files += [*frame.all_receipts, *frame.lightfields]
             for export in frame.exports.selected.values():
                 if export.is_of_sequence:
-                    for test in self.testing(frame, export):
-                        files += test.lightfields
+                    for other in self.beside(frame, export):
+                        files += other.lightfields
         return list(dict.fromkeys(files))
 
     def shown_frames(self, wildcards: Wildcards) -> list[str]:
@@ -322,32 +325,10 @@ class Build:
         """The names of the chosen families, by their folders."""
         return {scene_folder(name, self.config.preset): name for name in self.families}
 
-    @cached_property
-    def batches(self) -> dict[str, dict[str, list[Member]]]:
-        """The members of each batch of each family, by the folder of the family.
-
-        Raises `UserError` for a family without members.
-        """
-        batches = {}
-        for folder, name in self.family_names.items():
-            try:
-                batches[folder] = self.families[name].batches()
-            except UserError as error:
-                raise mistake(name, str(error)) from None
-        return batches
-
     @property
     def batch_count(self) -> int:
         """The number of batches of all families."""
         return sum(map(len, self.batches.values()))
-
-    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
-        """Return the receipts of all batches of a family."""
-        return self._batch_receipts(wildcards["family"])
-
-    def _batch_receipts(self, folder: str) -> list[str]:
-        receipts = f"{self.config.work}/{FOLDER}/{folder}/batches"
-        return [f"{receipts}/{batch}{SUFFIX}" for batch in self.batches[folder]]
 
     def members(self, wildcards: Wildcards) -> list[Member]:
         """Return the members of the batch that a job builds."""
@@ -403,10 +384,19 @@ class Build:
     @property
     def family_targets(self) -> list[str]:
         """The files that a run with families makes."""
-        files = self.corpora
-        for folder in self.family_names:
-            files += [f"{self.config.work}/{folder}/members.json", *self._batch_receipts(folder)]
-        return files
+        counts = [f"{self.config.work}/{folder}/members.json" for folder in self.family_names]
+        return self.corpora + counts
+
+
+def _batches(config: Configuration, families: Mapping[str, Family]) -> Batches:
+    """Return the batches of families. Raises `UserError` for a family without members."""
+    batches = {}
+    for name, family in families.items():
+        try:
+            batches[scene_folder(name, config.preset)] = family.batches()
+        except UserError as error:
+            raise mistake(name, str(error)) from None
+    return batches
 
 
 @cache

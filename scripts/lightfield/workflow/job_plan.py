@@ -29,7 +29,16 @@ from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import FIGURES, LIGHTFIELD, PAGE, RENDER, SEQUENCE_PAGE, Job
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    FIGURES,
+    LIGHTFIELD,
+    PAGE,
+    RENDER,
+    SEQUENCE_PAGE,
+    Job,
+)
+from lightfield.workflow.member_record import former_members
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -275,6 +284,21 @@ class JobPlan:
             paths |= dict.fromkeys(flat(wanted[planned.job](planned.names).files.values()))
         return [path for path in paths if not self.check.is_made(path)]
 
+    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of all batches of a family."""
+        family = wildcards["family"]
+        batches = self.run.build.batches[family]
+        return [
+            self.receipt_path(BUILD_MEMBERS.name.format(family=family, batch=batch))
+            for batch in batches
+        ]
+
+    def former_members(self, family: str) -> list[str]:
+        """Return the members that a family has built, but no longer has."""
+        members = itertools.chain.from_iterable(self.run.build.batches[family].values())
+        names = {member.name for member in members}
+        return former_members(Path(self.run.results, family), Path(self.receipts, family), names)
+
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
 
@@ -387,6 +411,13 @@ class JobPlan:
         """Return the command that verifies all folders. Without any, it does nothing."""
         folders = shlex.join(self.run.build.verified_folders)
         return f"python {self.run.scripts}/verify.py {folders} --work {self.run.work}"
+
+    def prune_command(self, wildcards: HasWildcards) -> str:
+        """Return the command that removes former members of the chosen families."""
+        run = self.run
+        families = [w for names in run.build.family_names.items() for w in ("--family", *names)]
+        folders = f"--results {run.results} --work {run.work}"
+        return f"python {run.scripts}/prune.py {folders} {shlex.join(families)}"
 
     def check_provider(self, path: str) -> None:
         """End the run if Snakemake has a storage, as its ``path`` of an output tells."""

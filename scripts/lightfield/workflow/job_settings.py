@@ -352,7 +352,7 @@ def export(dataset: Dataset, options: Export, source: str) -> ExportSettings[Exp
     # In a sequence the frame's folder follows the rig's name.
     folders = {
         rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder
-        for rig in dataset.testing_rigs(options)
+        for rig in dataset.rigs_beside(options)
     }
     training_list = dataset.training_list(options, source)
     return _export_settings(dataset, options, source, tested_by=folders, trained_by=training_list)
@@ -384,12 +384,12 @@ def export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     frames = build.frames(wildcards)
     first = frames[0]
     options = first.exports.selected[name]
-    tests = build.testing(first, options)
+    others = build.beside(first, options)
     settings = _export_settings(
         first,
         options,
         source,
-        tested_by={test.rig_name: test.sequence_paths.folder for test in tests},
+        tested_by={other.rig_name: other.sequence_paths.folder for other in others},
         frames=[Path(frame.paths.folder).name for frame in frames],
     )
     return f"exports/{source}/{name}", settings
