@@ -29,6 +29,7 @@ from lightfield.workflow.jobs import (
     PACK,
     PAGE,
     RENDER,
+    SEQUENCE_PAGE,
     Job,
 )
 from lightfield.workflow.known_times import time_files
@@ -235,14 +236,24 @@ class Handlers:
             if receipt in plan.asked and is_left(receipt):
                 ends["not finished"].append(plan.shown(dataset.paths.folder))
             elif receipt in plan.asked:
-                ends[self._validity(dataset)].append(plan.shown(dataset.paths.page))
-        for state, paths in ends.items():
+                ends[self._validity(dataset)].append(plan.shown(self._page_of(dataset, is_left)))
+        for state, pages in ends.items():
+            paths = list(dict.fromkeys(pages))
             if len(paths) > MOST_PAGES:
                 index = "" if is_left(plan.receipt_path(INDEX.name)) else "/index.html"
                 all_of_them = plan.shown(f"{self._run.results}{index}")
                 paths = [f"{count(len(paths), 'dataset')}: {all_of_them}"]
             for path in paths:
                 print(f"{state}: {path}", file=sys.stderr)
+
+    def _page_of(self, dataset: Dataset, is_left: IsLeft) -> str:
+        """Return the page of a dataset. For a valid frame, this is the page of its sequence."""
+        sequence = {"scene": dataset.scene_folder, "rig": dataset.rig_name}
+        receipt = self._plan.receipt_path(SEQUENCE_PAGE.name.format(**sequence))
+        is_made = receipt in self._plan.asked and not is_left(receipt)
+        if dataset.sequence_page and is_made and self._plan.is_valid(dataset):
+            return dataset.sequence_page
+        return dataset.paths.page
 
     def _validity(self, dataset: Dataset) -> str:
         return "valid" if self._plan.is_valid(dataset) else "not valid"
