@@ -574,6 +574,22 @@ def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
     assert faults(folder).keys() == {str(sums)}
 
 
+def test_what_a_corpus_no_longer_has_is_named_once(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001", folder / "0009")
+    shutil.copytree(folder / "0001/plane", folder / "0002/ring")
+    found = faults(folder)
+    assert found.keys() == {str(folder / "0009"), str(folder / "0002/ring")}
+    assert all("prune" in problem for problem in found.values())
+
+
+def test_the_whole_files_of_a_failed_member_are_no_fault(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001/plane", folder / "broken/plane")
+    (folder / "broken/plane/sha256sums.txt").unlink()
+    assert faults(folder) == {}
+
+
 def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, tmp_path):
     folder = shutil.copytree(built, tmp_path / "chairs")
     assert "no fault" in run_program("verify.py", folder).stdout
