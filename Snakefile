@@ -103,7 +103,7 @@ rule all:
 
 rule report_html:
     input:
-        [dataset.paths.page for dataset in RUN.chosen],
+        RUN.build.pages,
         f"{RUN.results}/index.html",
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 import tarfile
@@ -105,6 +106,30 @@ def test_a_corpus_opens_as_a_list_of_its_valid_members(built):
     assert [len(data.views) for data in of_part] == [3] * len(of_part)
     with pytest.raises(UserError, match="has 6 datasets; open_corpus"):
         open_dataset(built)
+
+
+def test_the_shards_of_all_parts_open_as_the_corpus(built, tmp_path):
+    """Also where only they were copied."""
+    shards = shutil.copytree(built / "shards", tmp_path / "shards")
+    data = {each.member["name"]: each for each in open_corpus(shards)}
+    assert {name: each.member["split"] for name, each in data.items()} == {
+        each.member["name"]: each.member["split"] for each in open_corpus(built)
+    }
+    assert [len(each.views) for each in data.values()] == [3] * 6
+
+
+def test_missing_shards_of_a_corpus_are_named(built, tmp_path):
+    family = shutil.copytree(built, tmp_path / "chairs")
+    *_, last = sorted(family.glob("shards/train/*.tar"))
+    shards = shutil.copytree(family / "shards", tmp_path / "shards")
+    # The family's checksums list the last shard. Without them, there must be no gap.
+    last.unlink()
+    (shards / "train/chairs-train-00000.tar").unlink()
+    for folder, missing in ((family / "shards", last.name), (shards, "chairs-train-00000.tar")):
+        for place in (folder, folder / "train"):
+            with pytest.raises(UserError, match=f"shards/train: misses {re.escape(missing)}"):
+                open_corpus(place)
+    assert open_corpus(family / "shards/train/chairs-train-00000.tar")
 
 
 def part_of(family, data):

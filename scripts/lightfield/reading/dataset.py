@@ -89,8 +89,14 @@ class OpenView:
 
     @property
     def alpha(self) -> Floats:
-        """The part of each pixel (height, width) that the scene covers, from 0 to 1."""
-        return self.image(["A"]).alpha.astype(np.float32)
+        """The part of each pixel (height, width) that the scene covers, from 0 to 1.
+
+        1 in a view without transparency, whose file has no alpha.
+        """
+        image = self.image()
+        if "A" not in image.channels:
+            return np.ones((self.lens.height, self.lens.width), np.float32)
+        return image.alpha.astype(np.float32)
 
     @property
     def depth(self) -> Floats:
@@ -120,13 +126,8 @@ class OpenView:
 
         Numbers of objects are whole. All other passes are float32.
         """
-        names = self.dataset.passes
-        if name not in names:
-            raise UserError(
-                f"{self.dataset.lightfield.path}: passes: has no {name!r}; it has "
-                f"{', '.join(names) or 'none'}"
-            )
-        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
+        self.dataset.require_pass(name)
+        view_pass = _pass_named(name)
         image = self._read(self._file_of_pass(view_pass), view_pass.channels)
         pixels: Array = np.stack(
             [image.channels[channel] for channel in view_pass.channels], axis=-1
@@ -137,8 +138,7 @@ class OpenView:
 
     def pass_path(self, name: str) -> Path:
         """Return the file of a pass. It may be missing."""
-        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
-        return self.dataset.files.place(self._file_of_pass(view_pass))
+        return self.dataset.files.place(self._file_of_pass(_pass_named(name)))
 
     def _file_of_pass(self, view_pass: Pass) -> str:
         view = (self.camera.flow or "") if view_pass == FLOW else self.name
@@ -170,11 +170,13 @@ class OpenView:
     def depth_as(self, meaning: str | None) -> Doubles:
         """Return the depth (height, width) in metres, as "z" or "distance", with all its digits.
 
-        inf for a miss, NaN for a pixel without depth. Raises `UserError` if ``meaning`` is None.
+        inf for a miss, NaN for a pixel without depth. Raises `UserError` for another ``meaning``.
         """
         lightfield = self.dataset.lightfield
         if meaning is None:
             raise UserError(f"{lightfield.path}: depth: is null; these views have no depth")
+        if meaning not in ("z", "distance"):
+            raise UserError(f"depth: is {meaning!r}; must be z or distance")
         with self.dataset.files.on_disk(self._picture) as file:
             return depth_of(file, lightfield, _unit_rays(self.lens), meaning)
 
@@ -232,7 +234,16 @@ class OpenViews(Sequence[OpenView]):
     def __getitem__(self, key: int | str | slice) -> "OpenView | OpenViews":
         if isinstance(key, slice):
             return OpenViews(self._views[key])
-        return self._named(key) if isinstance(key, str) else self._views[key]
+        return self._named(key) if isinstance(key, str) else self._numbered(key)
+
+    def _numbered(self, number: int) -> OpenView:
+        try:
+            return self._views[number]
+        except IndexError:
+            # Python's own exception, by which loops over a sequence end.
+            count = len(self)
+            among = f"; they are 0 to {count - 1}" if count else ""
+            raise IndexError(f"{number}: is none of the {count} views{among}") from None
 
     @cached_property
     def _by_name(self) -> dict[str, list[OpenView]]:
@@ -250,6 +261,18 @@ class OpenViews(Sequence[OpenView]):
         names = [*self._by_name]
         among = f"; they are {names[0]} to {names[-1]}" if names else ""
         raise UserError(f"{name}: is none of the {len(self)} views{among}")
+
+
+class Reprojections(dict[str, "OpenDataset"]):
+    """The reprojections of a dataset by their names. An unknown name is a `UserError`."""
+
+    def __init__(self, place: Path, datasets: Mapping[str, "OpenDataset"]) -> None:
+        super().__init__(datasets)
+        self._place = place
+
+    def __missing__(self, name: str) -> "OpenDataset":
+        among = ", ".join(self) or "none"
+        raise UserError(f"{self._place}: reprojections: has no {name!r}; it has {among}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,8 +324,17 @@ class OpenDataset:
         has_flow = any(view.flow for view in self.lightfield.views)
         return [*names, FLOW.name] if has_flow else names
 
+    def require_pass(self, name: str) -> None:
+        """Raise `UserError` if the views do not have this pass."""
+        if name not in self.passes:
+            raise UserError(
+                f"{self.lightfield.path}: passes: has no {name!r}; it has "
+                f"{', '.join(self.passes) or 'none'}"
+            )
+
     def names(self, name: str) -> dict[str, int]:
         """Return the numbers in a pass of ids by the names that they stand for."""
+        self.require_pass(name)
         with self.files.on_disk(str(PurePosixPath(self.folders[0], name, NAMES))) as file:
             names: dict[str, int] = read_json(file)
         return names
@@ -331,12 +363,11 @@ class OpenDataset:
         return OpenViews(view for view in self.views if (view.split or "train") == part)
 
     @cached_property
-    def reprojections(self) -> "dict[str, OpenDataset]":
+    def reprojections(self) -> Reprojections:
         """The same views through other lenses, by the reprojections' names."""
-        if self.reprojection:
-            return {}
-        names = self.files.datasets_in(self.folders[0])
-        return {name: replace(self, reprojection=name) for name in names}
+        names = [] if self.reprojection else self.files.datasets_in(self.folders[0])
+        place = self.files.place(str(self.folder))
+        return Reprojections(place, {name: replace(self, reprojection=name) for name in names})
 
     @property
     def folder(self) -> PurePosixPath:
@@ -349,6 +380,14 @@ class OpenDataset:
         folder = PurePosixPath(self.folders[0], images.folder)
         suffixes = (self.suffix,) if self.suffix else images.suffixes
         return [f"{folder / view}{suffix}" for suffix in suffixes]
+
+
+def _pass_named(name: str) -> Pass:
+    try:
+        return FLOW if name == FLOW.name else passes.by_name(name)
+    except KeyError:
+        names = ", ".join([*passes.PASSES, FLOW.name])
+        raise UserError(f"passes: has no {name!r}; there are {names}") from None
 
 
 # Every view of a dataset has the same lens, and its rays take as much memory as six pictures.

@@ -129,20 +129,20 @@ class Build:
         folder = f"{dataset.paths.folder}/exports"
         return _entry(dataset.exports.selected, wildcards["format"], folder, "export of it")
 
-    def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
-        """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
-        rigs = dataset.testing_rigs(export)
+    def beside(self, dataset: Dataset, export: Export) -> list[Dataset]:
+        """Return the other datasets whose views go into an ``export`` of a dataset."""
+        rigs = dataset.rigs_beside(export)
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
-        """Return the inputs of an export: the views of its dataset, and of its test datasets.
+        """Return the inputs of an export: the views of its dataset, and of other rigs.
 
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
         files = [*dataset.receipts(RENDERED), *dataset.receipts(shards_of(wildcards))]
-        for test in self.testing(dataset, self.export(wildcards)):
-            files += _views_of_source(test, wildcards)
+        for other in self.beside(dataset, self.export(wildcards)):
+            files += _views_of_source(other, wildcards)
         return list(dict.fromkeys(files))
 
     def training_lists(self, wildcards: Wildcards) -> list[str]:
@@ -171,12 +171,14 @@ class Build:
         """
         frames = [dataset for dataset in self.rig(wildcards) if dataset.rig.sequence]
         export_format = wildcards.get("format")
-        if not frames or (export_format and export_format not in frames[0].exports.selected):
-            name = f"{wildcards['scene']}/{wildcards['rig']}"
+        folder = f"{self.config.results}/{wildcards['scene']}/{wildcards['rig']}"
+        if export_format and not (frames and export_format in frames[0].exports.selected):
             raise UserError(
-                f"{self.config.results}/{name}/exports/{export_format}: the scene YAML asks for "
-                "no such export of a sequence"
+                f"{folder}/exports/{export_format}: the scene YAML asks for no such export of a "
+                "sequence"
             )
+        if not frames:
+            raise UserError(f"{folder}: is no sequence; its rig in the scene YAML has no frames")
         return frames
 
     def exported_frames(self, wildcards: Wildcards) -> list[str]:
@@ -184,23 +186,41 @@ class Build:
         files = []
         for frame in self.frames(wildcards):
             export = frame.exports.selected[wildcards["format"]]
-            for dataset in (frame, *self.testing(frame, export)):
+            for dataset in (frame, *self.beside(frame, export)):
                 files += _views_of_source(dataset, wildcards)
         return list(dict.fromkeys(files))
 
     def validated_frames(self, wildcards: Wildcards) -> list[str]:
         """Return the files with which exports of a sequence are compared: the views of all frames.
 
-        Views of other rigs may test what these train. Their lightfield.json has their poses.
+        Exports may have views of other rigs. Their lightfield.json has their poses.
         """
         files = []
         for frame in self.frames(wildcards):
             files += [*frame.all_receipts, *frame.lightfields]
             for export in frame.exports.selected.values():
                 if export.is_of_sequence:
-                    for test in self.testing(frame, export):
-                        files += test.lightfields
+                    for other in self.beside(frame, export):
+                        files += other.lightfields
         return list(dict.fromkeys(files))
+
+    def shown_frames(self, wildcards: Wildcards) -> list[str]:
+        """Return the files that the page of a sequence shows: the views of all frames."""
+        files = []
+        for frame in self.frames(wildcards):
+            paths = frame.paths
+            files += [*frame.receipts(RENDERED), paths.lightfield, paths.validation]
+        return files
+
+    @property
+    def pages(self) -> list[str]:
+        """The pages of the chosen datasets and sequences."""
+        pages = []
+        for dataset in self.chosen:
+            pages.append(dataset.paths.page)
+            if dataset.sequence_page:
+                pages.append(dataset.sequence_page)
+        return list(dict.fromkeys(pages))
 
     def sequence_exports(self, wildcards: Wildcards) -> list[str]:
         """Return the lists of the exports of a sequence."""

@@ -158,6 +158,20 @@ class Lens(ABC):
         return self.principal_point or (self.width / 2, self.height / 2)
 
     @property
+    def K(self) -> npt.NDArray[np.float64]:  # noqa: N802, its name everywhere
+        """The intrinsic matrix (3, 3) of a perspective lens, in pixels.
+
+        K (x, y, z) = z (column, row, 1), with x right, y down and z forward, as in OpenCV: y and z
+        are the negatives of this camera's. The first pixel's centre is (0.5, 0.5). For programs
+        whose first centre is (0, 0), such as OpenCV, subtract 0.5 from K[0, 2] and K[1, 2].
+        Raises `UserError` for all other lenses.
+        """
+        raise UserError(
+            f"K: no matrix describes this lens ({self.description}); use its rays and pixels, or a "
+            "perspective reprojection"
+        )
+
+    @property
     def description(self) -> str:
         """The projection and its field of view, for people."""
         return self.title
