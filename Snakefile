@@ -98,11 +98,12 @@ rule all:
         [[*dataset.files, *dataset.intermediates] for dataset in RUN.chosen],
         f"{RUN.results}/index.html",
         RUN.build.family_targets,
+        [PLAN.batch_receipts({"family": family}) for family in RUN.build.family_names],
 
 
 rule report_html:
     input:
-        [dataset.paths.page for dataset in RUN.chosen],
+        RUN.build.pages,
         f"{RUN.results}/index.html",
 
 

@@ -35,7 +35,7 @@ from lightfield.core.files import write_text
 from lightfield.core.names import ROOT
 from lightfield.core.units import limit
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
-from lightfield.exporters.base import Developed, Export
+from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import LENSES
@@ -80,7 +80,18 @@ def _literal(model: type[BaseModel], key: str) -> str:
 def _export_section(name: str) -> Section:
     """Return the section of an exporter's own keys."""
     model = EXPORTERS[name]
-    return Section(name, model, Developed if issubclass(model, Developed) else Export)
+    shared = next(base for base in (ForTraining, Developed, Export) if issubclass(model, base))
+    return Section(name, model, shared)
+
+
+def _to_train_with() -> str:
+    """Return the names of the exports on this page that are for training."""
+    *names, last = [
+        f"`{name}`"
+        for name, model in EXPORTERS.items()
+        if name not in SEQUENCE_EXPORTS and issubclass(model, ForTraining)
+    ]
+    return f"{', '.join(names)} and {last}"
 
 
 def _without_pictures() -> str:
@@ -207,11 +218,13 @@ KEY_PAGES: dict[str, Page] = {
         "The keys of exports",
         "An entry of `exports` in a scene YAML writes files in one format. "
         "[Export formats](export-formats.md) says which programs read each format. All but "
-        f"{_without_pictures()} are exports of pictures, so they have those keys, too.",
+        f"{_without_pictures()} are exports of pictures, so they have those keys, too. "
+        f"{_to_train_with()} are for training, and have the keys of such exports.",
         [
             Section("exports", Exports),
             Section("All exports", Export),
             Section("Exports of pictures", Developed, Export),
+            Section("Exports for training", ForTraining, Developed),
             *[_export_section(name) for name in EXPORTERS if name not in SEQUENCE_EXPORTS],
         ],
     ),
@@ -230,13 +243,16 @@ PROGRAM_GROUPS = {
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
         "make_lightfield", "free_places", "check_cameras", "import_views",
     ],
-    "Build a family": ["build_members", "corpus", "count_members"],
+    "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
     "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
-    "Report": ["report_figures", "report_html", "report_walk", "report_index", "costs", "schema"],
+    "Report": [
+        "report_figures", "report_html", "report_sequence", "report_walk", "report_index", "costs",
+        "schema",
+    ],
     "Measure": [
         "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
     ],

@@ -33,7 +33,7 @@ rule build_members:
 
 rule corpus:
     input:
-        PLAN.reads(CORPUS, batches=RUN.of_build(RUN.build.batch_receipts)),
+        PLAN.reads(CORPUS, batches=RUN.of_build(PLAN.batch_receipts)),
     output:
         [update(f"{RUN.results}/{{family}}/{name}") for name in CORPUS_FILES],
         receipt=PLAN.receipt_of(CORPUS),
@@ -75,3 +75,18 @@ rule count_members:
         f"python {RUN.scripts}/count_members.py"
         " --settings {input.settings} --corpus {input.corpus} --failed {params.failed}"
         " --output {output.members} --receipt {output.receipt} > {log} 2>&1"
+
+
+# It has no output. The corpora come first: then no list of checksums has a former member.
+rule prune:
+    input:
+        RUN.build.corpora,
+    log:
+        RUN.log_of("prune"),
+    localrule: True
+    params:
+        prune=PLAN.prune_command,
+    message:
+        "Removing the members that the chosen families no longer have"
+    shell:
+        "{params.prune} 2>&1 | tee {log}"

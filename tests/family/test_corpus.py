@@ -231,6 +231,23 @@ def test_shares_above_one_are_refused():
         Shares(validation=0.6, test=0.6)
 
 
+# ---- what members took -----------------------------------------------------------------------
+
+KEYS = "name state split seed model views bytes built seconds cpu_seconds stage_cpu_seconds"
+KEYS = [*KEYS.split(), "failed_stage", "error", "log"]
+
+
+def test_each_member_has_a_line_of_json_with_all_keys(built):
+    rows = [json.loads(line) for line in (built / "report/members.jsonl").read_text().splitlines()]
+    assert [row["name"] for row in rows] == [*(f"{n:04d}" for n in range(6)), "broken"]
+    assert all([*row] == KEYS for row in rows)
+    assert (rows[2]["state"], rows[2]["seed"], rows[2]["views"]) == ("valid", 2, 3)
+    assert rows[2]["error"] is None
+    assert (rows[-1]["state"], rows[-1]["model"]) == ("failed", "models/broken.glb")
+    assert (rows[-1]["failed_stage"], rows[-1]["error"]) == ("import_model", CAUSE)
+    assert rows[-1]["log"] == "work/chairs/broken/log"
+
+
 # ---- equal bytes -----------------------------------------------------------------------------
 
 
@@ -381,7 +398,7 @@ def test_the_sums_hold_and_cover_everything(built):
         for path in built.glob("*/*/sha256sums.txt")
         for line in path.read_text().splitlines()
     }
-    assert listed | beneath | {"sha256sums.txt"} == files(built).keys()
+    assert listed | beneath | {"sha256sums.txt", "report/members.jsonl"} == files(built).keys()
     assert faults(built) == {}
 
 
@@ -397,9 +414,10 @@ def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, f
 @pytest.mark.parametrize("fault", ["emptied", "cut short", "deleted", "a folder"])
 def test_the_status_of_a_family_leaves_out_members_with_damaged_records(built, tmp_path, fault):
     folder = shutil.copytree(built, tmp_path / "chairs")
-    assert status.of_family("chairs", folder, 7) == "chairs: 6 of 7 members built, 1 failed"
+    names = {member["name"] for member in read_json(folder / "corpus.json")["members"]}
+    assert status.of_family("chairs", folder, names) == "chairs: 6 of 7 members built, 1 failed"
     spoil(folder, "record of a member", fault)
-    assert status.of_family("chairs", folder, 7) == "chairs: 5 of 7 members built, 1 failed"
+    assert status.of_family("chairs", folder, names) == "chairs: 5 of 7 members built, 1 failed"
 
 
 def test_a_damaged_shard_and_a_foreign_one_are_found(built, tmp_path):

@@ -207,6 +207,20 @@ def test_a_plan_counts_only_the_views_that_a_run_will_render(tiny_build):
     assert planned_views(tiny_build) == 6
 
 
+def test_more_cameras_of_a_random_rig_render_only_the_new_views(tmp_path):
+    folder = tiny.checked_out(tmp_path / "random")
+    plane = "    type: plane\n    cameras: [3, 2]\n"
+    tiny.edit(folder, plane, "    type: random\n    clearance: 0.1\n    count: 4\n")
+    tiny.build(folder)
+    first = (folder / tiny.VIEW).read_bytes()
+    tiny.edit(folder, "count: 4", "count: 12")
+    assert planned_views(folder) == 8
+    tiny.build(folder)
+    assert len(rendered(folder)) == 12 and set(rendered(folder).values()) == {1}
+    assert (folder / tiny.VIEW).read_bytes() == first
+    assert NOTHING in plan(folder)
+
+
 def test_a_run_that_leaves_the_page_of_all_datasets_out_does_not_name_it(tiny_build):
     handlers = tiny_build / "scripts/lightfield/workflow/handlers.py"
     # As if there were many datasets, of which only this page is named.

@@ -9,6 +9,8 @@ import pytest
 from conftest import BLENDER, ROOT
 
 from lightfield.core.files import sha256
+from lightfield.formats import blend
+from lightfield.formats.render_block import RenderBlock
 from lightfield.imaging import images
 
 pytestmark = pytest.mark.slow
@@ -100,6 +102,16 @@ def test_the_terminal_and_the_page_say_once_what_is_taken_from_a_blend(scene, pr
     page = (folder / f"results/{scene}/views/report/index.html").read_text()
     assert f"Of the .blend: {TAKEN[scene].replace(chr(39), '&#39;')}." in page
     assert json.loads((folder / f"results/{scene}/views/validation.json").read_text())["valid"]
+
+
+def test_missing_files_of_a_kind_are_counted_in_one_note(project):
+    folder, _ = project
+    inventory = json.loads((folder / "work/interior/inventory.json").read_text())
+    textures = [{"kind": "texture", "problem": "missing", "path": name} for name in ("a", "b")]
+    libraries = [{"kind": "library", "problem": "broken", "path": name} for name in "cde"]
+    inventory["missing"] = [textures[0], *libraries, textures[1]]
+    notes = blend.usage_notes(inventory, [1], RenderBlock(), True, None, True)
+    assert notes[-2:] == ["2 textures missing: a, b", "3 libraries broken: c, d, e"]
 
 
 def test_a_missing_texture_is_magenta_and_linked_objects_are_rendered(project):

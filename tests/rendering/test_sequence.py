@@ -90,6 +90,9 @@ def test_every_stage_is_planned_for_every_frame(tmp_path):
         assert jobs[name] == 4
     # One archive has all frames of a sequence.
     assert jobs["pack"] == 2
+    jobs = planned(folder, "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    # One page has all frames, and each frame has a page.
+    assert (jobs["page"], jobs["sequence_page"]) == (4, 1)
 
 
 @pytest.mark.slow
@@ -124,7 +127,7 @@ report: {panorama: false}
 @pytest.mark.slow
 def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     folder = checkout(tmp_path, moving=TRAINED)
-    arguments = ("package", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    arguments = ("package", "report_html", "--config", "scenes=[moving]", "rigs=all", "preset=full")
     assert planned(folder, *arguments)["export_sequence"] == 1
     result = snakemake(folder, "--cores", "2", *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -148,6 +151,10 @@ def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     assert "exports/dnerf" in card["loaders"]
     assert json.loads((rig / "validation.json").read_text())["valid"] is True
     assert "exports/dnerf/transforms_test.json" in (rig / "sha256sums.txt").read_text()
+    # The page is no file of the exports, and is not published.
+    page = (rig / "report/sequence.html").read_text()
+    assert [f"../{name}/report/index.html" in page for name in ("f00002", "f00003")] == [True, True]
+    assert "report" not in (rig / "sha256sums.txt").read_text()
     damaged = rig / "exports/dnerf" / f"{content['frames'][0]['file_path']}.png"
     damaged.write_bytes(b"")
     verified = snakemake(folder, "verify", "--config", "scenes=[moving]", "rigs=all", "preset=full")

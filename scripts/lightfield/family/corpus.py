@@ -1,4 +1,4 @@
-"""Writes a family as one corpus: corpus.json, its page, its shards, and sums over everything."""
+"""Writes a family as one corpus: corpus.json, its page, its shards, lists, and sums."""
 
 import statistics
 from collections import Counter
@@ -12,7 +12,7 @@ from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json, write_text
 from lightfield.core.names import CORPUS, PARTS
-from lightfield.family import corpus_looks, corpus_page, corpus_shards
+from lightfield.family import corpus_looks, corpus_page, corpus_shards, members_list
 from lightfield.family.corpus_looks import Look
 from lightfield.formats.layout import SUMS
 from lightfield.stages.family import Corpus, CorpusSettings
@@ -38,6 +38,7 @@ def write(job: Corpus) -> dict[str, Any]:
     write_json(folder / CORPUS, content)
     corpus_page.write(folder, content)
     corpus_shards.write(folder, settings, members)
+    members_list.write(folder, settings, members, job.receipt.parent if job.receipt else None)
     write_sums(folder, members, looks)
     print(summary(content, folder))
     return content

@@ -40,6 +40,8 @@ from lightfield.workflow.unfinished_views import unfinished_views
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
+# A note names at most so many former members of a family.
+MOST_NAMES = 5
 # What stands below the table of what jobs request of a cluster.
 REQUESTS_NOTE = (
     "mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the "
@@ -201,11 +203,13 @@ class Handlers:
         self._print_pages(is_left)
         self._print_packages(is_left)
         self._print_families(is_left)
+        self._print_former_members()
 
     def _print_failures(self) -> None:
         """Print what the run took, and why it ended."""
         self._print_summary()
         failures = "" if was_interrupted() else self.display.failures()
+        self._print_former_members()
         print(self.display.end or failures or UNFINISHED, file=sys.stderr, flush=True)
 
     def _print_summary(self) -> None:
@@ -257,6 +261,18 @@ class Handlers:
                 log = Path(self._run.log_of(planned.name))
                 print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
 
+    def _print_former_members(self) -> None:
+        """Print the members that the chosen families no longer have, but that are still there."""
+        for folder in self._run.build.family_names:
+            if names := self._plan.former_members(folder):
+                more = f" and {len(names) - MOST_NAMES:,} more" if names[MOST_NAMES:] else ""
+                print(
+                    f"note: {self._run.results}/{folder} still has "
+                    f"{count(len(names), 'former member')}: {', '.join(names[:MOST_NAMES])}{more}; "
+                    "snakemake --cores 1 prune removes what the family no longer has",
+                    file=sys.stderr,
+                )
+
     # The forecast of a dry run.
 
     def _print_forecast(self) -> None:
@@ -270,6 +286,10 @@ class Handlers:
         print(forecast([self._work_of(planned) for planned in jobs]))
         if self._run.cluster:
             self._print_requests(jobs)
+        if self._run.log_of("prune") in self.display.requests:
+            self._print_removals()
+        else:
+            self._print_former_members()
         if is_refused:
             sys.exit(1)
 
@@ -298,6 +318,12 @@ class Handlers:
             return None
         name = f"{names['scene']}/{names['rig']}"
         return datasets[name].sequence_name if name in datasets else name
+
+    def _print_removals(self) -> None:
+        """Print the folder of each member that a run with `prune` would remove."""
+        for folder in self._run.build.family_names:
+            for name in self._plan.former_members(folder):
+                print(f"would be removed: {self._run.results}/{folder}/{name}", file=sys.stderr)
 
     def _print_requests(self, jobs: list[PlannedJob]) -> None:
         """Print what the jobs of a dry run would request of the cluster."""

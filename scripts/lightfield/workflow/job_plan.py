@@ -29,7 +29,16 @@ from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import FIGURES, LIGHTFIELD, PAGE, RENDER, Job
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    FIGURES,
+    LIGHTFIELD,
+    PAGE,
+    RENDER,
+    SEQUENCE_PAGE,
+    Job,
+)
+from lightfield.workflow.member_record import former_members
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -185,6 +194,8 @@ class JobPlan:
             written.append(f"{paths.views}/{{first}}")
         elif job in (FIGURES, PAGE):
             written.append(paths.page)
+        elif job is SEQUENCE_PAGE:
+            written.append(paths.sequence_page)
         return [os.path.dirname(path.format(**names)) for path in written]  # noqa: PTH120
 
     def _end_unless_writable(self, folder: str) -> None:
@@ -272,6 +283,21 @@ class JobPlan:
         for planned in self.planned_jobs():
             paths |= dict.fromkeys(flat(wanted[planned.job](planned.names).files.values()))
         return [path for path in paths if not self.check.is_made(path)]
+
+    def batch_receipts(self, wildcards: Wildcards) -> list[str]:
+        """Return the receipts of all batches of a family."""
+        family = wildcards["family"]
+        batches = self.run.build.batches[family]
+        return [
+            self.receipt_path(BUILD_MEMBERS.name.format(family=family, batch=batch))
+            for batch in batches
+        ]
+
+    def former_members(self, family: str) -> list[str]:
+        """Return the members that a family has built, but no longer has."""
+        members = itertools.chain.from_iterable(self.run.build.batches[family].values())
+        names = {member.name for member in members}
+        return former_members(Path(self.run.results, family), Path(self.receipts, family), names)
 
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
@@ -385,6 +411,13 @@ class JobPlan:
         """Return the command that verifies all folders. Without any, it does nothing."""
         folders = shlex.join(self.run.build.verified_folders)
         return f"python {self.run.scripts}/verify.py {folders} --work {self.run.work}"
+
+    def prune_command(self, wildcards: HasWildcards) -> str:
+        """Return the command that removes former members of the chosen families."""
+        run = self.run
+        families = [w for names in run.build.family_names.items() for w in ("--family", *names)]
+        folders = f"--results {run.results} --work {run.work}"
+        return f"python {run.scripts}/prune.py {folders} {shlex.join(families)}"
 
     def check_provider(self, path: str) -> None:
         """End the run if Snakemake has a storage, as its ``path`` of an output tells."""

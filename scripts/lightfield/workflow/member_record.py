@@ -1,15 +1,19 @@
 """Reads what a member of a family left: its state, its datasets, and why it failed."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, model_validator
 
-from lightfield.configuration.family import RECORD
+from lightfield.configuration.family import RECEIPT, RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.paths import leads_inside
 from lightfield.settings.base import checked
+
+# The key of the line of a member's history that says when it was built, and what that took.
+BUILT = "built"
 
 
 class _Record(BaseModel):
@@ -88,6 +92,17 @@ def read_members(folder: Path, names: list[str] | None = None) -> list[MemberRec
     if names is None:
         names = [path.parent.name for path in folder.glob(f"*/{RECORD}")]
     return [read_member(folder / name) for name in sorted(names)]
+
+
+def former_members(folder: Path, receipts: Path, names: Collection[str]) -> list[str]:
+    """Return the members that a family has built, but no longer has.
+
+    ``folder`` and ``receipts`` are the family's folders of results and of receipts. ``names`` are
+    the present members. A member that was killed while it was built has a receipt, but no record.
+    """
+    records = {path.parent.name for path in folder.glob(f"*/{RECORD}")}
+    begun = {path.parent.name for path in receipts.glob(f"*/{RECEIPT}.*")}
+    return sorted((records | begun).difference(names))
 
 
 def read_member(folder: Path) -> MemberRecord:
