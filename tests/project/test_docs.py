@@ -230,7 +230,8 @@ def test_the_page_of_the_library_has_each_public_member_of_what_a_reader_gets(mo
 # What a text says of a number: its unit, its range, or what it counts.
 UNIT = re.compile(
     r"metres|radians|pixel|\bmm\b|0 to 1|0 for (the|its) first|units|unit (rays|normals)|"
-    r"linear light|Rec\. 709|uint8|frame of the animation|file's dtype|divided|x and y of|numbers in a pass"
+    r"linear light|Rec\. 709|uint8|frame of the animation|file's dtype|divided|x and y of|"
+    r"numbers in a pass"
 )
 
 
