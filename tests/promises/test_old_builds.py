@@ -276,3 +276,20 @@ def test_a_plan_names_a_folder_that_is_a_link_to_itself(tiny_build, name):
     assert result.returncode == 1
     assert f"error: {DATASET}/{name}: cannot be written: " in result.stderr
     assert f"{name} is a link that leads nowhere" in result.stderr
+
+
+def test_a_dataset_that_a_run_changed_in_part_has_no_checksums(tiny_build):
+    dataset = tiny_build / "results" / tiny.NAME
+    sums = dataset / "sha256sums.txt"
+    tiny.build(tiny_build, "--until", "render")
+    assert sums.exists()
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    tiny.build(tiny_build, "-n")
+    assert sums.exists()
+    tiny.build(tiny_build, "--until", "reproject")
+    assert not sums.exists()
+    status = tiny.build(tiny_build, "--", "status")
+    assert "validated: not since its files changed" in status
+    tiny.build(tiny_build)
+    subprocess.run(["sha256sum", "-c", "--quiet", sums.name], cwd=dataset, check=True)
+    assert "validated: yes" in tiny.build(tiny_build, "--", "status")

@@ -21,7 +21,7 @@ from lightfield.core.names import RENDERED
 from lightfield.core.units import duration
 from lightfield.engine import receipts
 from lightfield.engine.receipts import FOLDER, Output
-from lightfield.formats.layout import IMAGES, VALIDATION
+from lightfield.formats.layout import IMAGES, SUMS, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
@@ -235,4 +235,6 @@ def _validated(folder: Path, count: int, rendering: RenderProgress) -> str:
     problem = broken(path)
     if problem:
         return f"no: {path} {problem}, and is made anew"
-    return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
+    if not read_json(path).get("valid"):
+        return f"yes, and it is not valid: see {path}"
+    return "yes" if (folder / SUMS).exists() else "not since its files changed"
