@@ -136,6 +136,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene: parameters", scene_source.Parameters),
             Section("flow", scene_blocks.Flow),
             Section("mesh", scene_blocks.MeshFiles),
+            Section("video", scene_blocks.Video),
             Section("report", scene_blocks.Report),
             Section("publish", publication.Publication),
             Section("publish: a creator", publication.Creator),
@@ -246,7 +247,7 @@ PROGRAM_GROUPS = {
     "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
-    "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize"],
+    "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize", "video"],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
     "Report": [

@@ -796,11 +796,11 @@ def test_the_surface_of_a_dataset_without_its_list_may_be_replaced(beside, tmp_p
     folder = tmp_path / "mesh"
     folder.mkdir()
     (folder / "objects.json").write_text("{}")
-    assert not exports.is_mesh_of_dataset(folder)
+    assert not exports.is_of_dataset(folder, "mesh")
     (tmp_path / beside).parent.mkdir(exist_ok=True)
     (tmp_path / beside).write_text("")
-    assert exports.is_mesh_of_dataset(folder)
-    assert not exports.is_mesh_of_dataset(tmp_path / "other")
+    assert exports.is_of_dataset(folder, "mesh")
+    assert not exports.is_of_dataset(tmp_path / "other", "mesh")
 
 
 def test_an_ncore_sequence_needs_two_views(tmp_path):

@@ -158,7 +158,7 @@ def test_a_folder_may_have_any_name_but_must_hold_a_dataset(folder, tmp_path):
 
 
 def test_every_export_has_a_loader():
-    assert package.LOADERS.keys() == {"mesh", *EXPORTERS}
+    assert package.LOADERS.keys() == {"mesh", "video", *EXPORTERS}
 
 
 def test_an_export_in_a_folder_with_another_name_is_recognised_by_its_list(folder, tmp_path):

@@ -13,7 +13,7 @@ from lightfield.configuration.capture import Capture
 from lightfield.configuration.config_file import Preset
 from lightfield.configuration.dataset_paths import Paths, prefix_of
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_blocks import Flow, MeshFiles
+from lightfield.configuration.scene_blocks import Flow, MeshFiles, Video
 from lightfield.configuration.shown_look import ShownLook, shown_look
 from lightfield.core.names import FILE, PARTS, RENDERED, scene_folder
 from lightfield.exporters import BESIDE_VIEWS, Exports
@@ -63,6 +63,7 @@ class Dataset(Capture):
     reprojections: dict[str, Reprojection]
     flow: Flow | None
     mesh: MeshFiles | None
+    video: Video | None
     exports: Exports
     # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool
@@ -216,6 +217,10 @@ class Dataset(Capture):
         return self.paths.mesh_list if self.mesh else None
 
     @property
+    def video_list(self) -> str | None:
+        return self.paths.video_list if self.video else None
+
+    @property
     def sequence_sums(self) -> str | None:
         """The checksums of the exports of the whole sequence, if it has any."""
         return self.sequence_paths.sums if self.sequence_exports else None
@@ -308,7 +313,7 @@ class Dataset(Capture):
     @property
     def export_lists(self) -> list[str]:
         """All files in which exports list their files. With a split, each part has one, too."""
-        lists = [*self.exported, *_present(self.mesh_list)]
+        lists = [*self.exported, *_present(self.mesh_list), *_present(self.video_list)]
         if self.rig.split:
             lists += [
                 self.paths.export_list(name, prefix_of(source), part)
@@ -321,8 +326,9 @@ class Dataset(Capture):
 
     @property
     def published(self) -> list[str]:
-        """The light fields, and the lists of exports and of the mesh. One job makes each."""
-        return [*self.lightfields, *self.exported, *_present(self.mesh_list)]
+        """The light fields, and the lists of exports, mesh and video. One job makes each."""
+        lists = [*_present(self.mesh_list), *_present(self.video_list)]
+        return [*self.lightfields, *self.exported, *lists]
 
     @property
     def files(self) -> list[str]:

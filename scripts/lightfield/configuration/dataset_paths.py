@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIEWS
+from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIEWS
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
@@ -144,6 +144,11 @@ class Paths:
     def mesh_list(self) -> str:
         """The file in which the mesh's job lists its files."""
         return f"{self.folder}/{MESH}/{MANIFEST}"
+
+    @property
+    def video_list(self) -> str:
+        """The file in which the video's job lists its file."""
+        return f"{self.folder}/{VIDEO}/{MANIFEST}"
 
     # Files of a reprojection. A source is a reprojection, or the views: see `prefix_of`.
 

@@ -51,6 +51,38 @@ class MeshFiles(Settings):
     )
 
 
+class Video(Settings):
+    """A short video of a dataset, synthesised from its views."""
+
+    path: Literal["turntable", "walk"] = Field(
+        description="How the eye moves. turntable: around what the cameras look at; cameras that "
+        "do not surround it give a sway to both sides. walk: a loop between the cameras."
+    )
+    format: Literal["mp4", "webp"] = Field(
+        "mp4", description="Format of the file. mp4: H.264, needs ffmpeg. webp: an animation."
+    )
+    seconds: float = Field(
+        6.0,
+        ge=1,
+        le=20,
+        description="How long the video is. It ends where it begins.",
+        json_schema_extra={"unit": "s"},
+    )
+    height: int = Field(
+        360,
+        ge=36,
+        le=1080,
+        multiple_of=2,
+        description="Height of the pictures, which have 16:9.",
+        json_schema_extra={"unit": "pixels"},
+    )
+    rigs: list[str] | None = Field(
+        None,
+        min_length=1,
+        description="Rigs whose datasets get the video. Without this key, all rigs.",
+    )
+
+
 class Report(Settings):
     """What the page of a dataset shows."""
 
@@ -103,6 +135,10 @@ class SceneBlocks(Credits):
         None,
         description="Meshes of the surface that cameras can see, and the bounding boxes of its "
         "objects.",
+    )
+    video: Video | None = Field(
+        None,
+        description="A turntable or a walk as a video, synthesised from the views and their depth.",
     )
     exports: Exports = Field(
         Exports(), description="Exports to the formats of trainers and other programs."

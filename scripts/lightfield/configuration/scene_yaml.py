@@ -24,6 +24,7 @@ from lightfield.configuration.scene_checks import (
     sensor,
     source,
     splits,
+    video,
 )
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
@@ -52,6 +53,7 @@ _CHECKS = (
     exports.check,
     source.check_looks,
     flow_and_mesh.check,
+    video.check,
     splits.check,
     family.check,
 )

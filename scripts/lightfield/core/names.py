@@ -10,6 +10,8 @@ RENDERED = "render"
 
 # The folder of a dataset with the surface that its cameras can see.
 MESH = "mesh"
+# The folder of a dataset with its turntable or walk.
+VIDEO = "video"
 
 # The file that lists which of a scene's views are in which part of the split.
 SPLITS = "splits.json"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from lightfield.exporters.base import EXPORTERS, Export, ExportSettings
-from lightfield.formats.export_lists import FOLDER, IN_FOLDERS, MANIFEST, OF_MESH
+from lightfield.formats.export_lists import FOLDER, IN_FOLDERS, MANIFEST, OF_MESH, OF_VIDEO
 from lightfield.settings.base import Settings
 
 __all__ = [
@@ -37,7 +37,7 @@ BESIDE_VIEWS = {
 }
 """The formats whose lists lie beside the views, and the lists."""
 
-MANIFESTS = [*BESIDE_VIEWS.values(), IN_FOLDERS, OF_MESH]
+MANIFESTS = [*BESIDE_VIEWS.values(), IN_FOLDERS, OF_MESH, OF_VIDEO]
 """The lists of all exports in a dataset."""
 
 

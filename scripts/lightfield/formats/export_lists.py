@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.core.names import MESH
+from lightfield.core.names import MESH, VIDEO
 from lightfield.formats.layout import Manifest
 
 # The list of an export's files, which is written last.
@@ -30,3 +30,5 @@ def _pictures(path: Path) -> list[str]:
 # The exports with a folder of their own. Exports of a sequence are in the rig's folder.
 IN_FOLDERS = Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=files_of)
 OF_MESH = Manifest(f"{MESH}/{MANIFEST}", lambda _: [], files=files_of)
+# Its pictures have a size of their own.
+OF_VIDEO = Manifest(f"{VIDEO}/{MANIFEST}", lambda _: [], files=files_of)

@@ -303,7 +303,7 @@ def _changes(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, str]:
                 changes[key] = f"{shortened(a[key])} → {shortened(b[key])}"
             continue
         mine, others, where = (a, b, "A") if key in a else (b, a, "B")
-        block = re.match(r"(?:reprojections|exports)\.[^.]+|mesh", key)
+        block = re.match(r"(?:reprojections|exports)\.[^.]+|mesh|video", key)
         if block and not any(f"{other}.".startswith(f"{block[0]}.") for other in others):
             changes[block[0]] = f"only in {where}"
         else:
@@ -322,7 +322,7 @@ def _listed(keys: Sequence[str]) -> str:
 
 def _order(key: str) -> int:
     """Return the place of a setting's block in the output."""
-    if key.startswith(("mesh", "exports")):
+    if key.startswith(("mesh", "video", "exports")):
         return len(_BLOCKS)
     block = key.partition(" in ")[0].partition(".")[0]
     return _BLOCKS.index(block if block in _BLOCKS else "")

@@ -16,6 +16,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.core.names import MESH, VIDEO
 from lightfield.engine import receipts
 from lightfield.exporters import BESIDE_VIEWS, list_path
 from lightfield.formats.export_lists import MANIFEST
@@ -145,7 +146,7 @@ def _of_export(name: str | None, path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or "options" not in content:
         return {}
     name = name or content["format"]
-    prefix = name if name == "mesh" else f"exports.{name}"
+    prefix = name if name in (MESH, VIDEO) else f"exports.{name}"
     return {prefix: "made"} | _flat(prefix, content["options"])
 
 

@@ -44,6 +44,8 @@ SENSOR_SECONDS = 4e-7  # a sensor's noise and response
 BRACKET_SECONDS = 7e-7  # the same with the weights of a bracket
 CHECK_SECONDS = 1e-7  # the validation, and each export
 REPORT_SECONDS = 4e-7  # the figures, and the page
+SURFACE_SECONDS = 1e-6  # a view as a surface, for a synthesis
+PICTURE_SECONDS = 3e-6  # a synthesised picture, of its pixels and of a view's
 # Seconds for a process.
 START_UP_SECONDS = 3.0  # bpy, the scene, and Cycles' acceleration structures
 JOB_SECONDS = 1.0  # a job without Blender
@@ -78,6 +80,9 @@ _SCENE_RESERVE = 1.2
 
 # The page and the figures show at most so many views.
 _MOST_SHOWN_VIEWS = 120
+# A video has so many pictures a second, and is so much wider than high.
+_VIDEO_RATE = 25
+_VIDEO_ASPECT = 16 / 9
 # The page of a sequence shows one view of each frame, or more views, but at most so many.
 _MOST_VIEWS_OF_SEQUENCE = 240
 
@@ -181,6 +186,15 @@ def checking(dataset: Dataset) -> Cost:
 def drawing(dataset: Dataset) -> Cost:
     """Return the cost of a job that draws the figures, or writes the page."""
     return JOB + _pictures(dataset)
+
+
+def filming(dataset: Dataset) -> Cost:
+    """Return the cost of a job that makes the video."""
+    assert dataset.video
+    pictures = dataset.video.seconds * _VIDEO_RATE
+    pixels = dataset.video.height**2 * _VIDEO_ASPECT
+    seconds = dataset.view_count * dataset.pixels * SURFACE_SECONDS
+    return JOB + Cost(seconds + pictures * (pixels + dataset.pixels) * PICTURE_SECONDS)
 
 
 def drawing_frames(frames: Sequence[Dataset]) -> Cost:

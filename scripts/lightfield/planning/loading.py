@@ -9,7 +9,7 @@ from lightfield.configuration.dataset import Cluster, Dataset
 from lightfield.configuration.family import Family
 from lightfield.configuration.render_settings import CALIBRATED_KEYS, Render
 from lightfield.configuration.reprojections import Reprojection
-from lightfield.configuration.scene_blocks import MeshFiles
+from lightfield.configuration.scene_blocks import MeshFiles, Video
 from lightfield.configuration.scene_checks.rigs import FLOW_PLACES, small_image
 from lightfield.core.errors import UserError
 from lightfield.core.names import FILE, VIEWS, scene_folder
@@ -153,6 +153,7 @@ def datasets_of(
                 reprojections=reprojections,
                 flow=written.flow,
                 mesh=_mesh_of(name, written),
+                video=_video_of(name, written),
                 exports=exports,
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
@@ -239,6 +240,12 @@ def _mesh_of(name: str, written: scene_yaml.Scene) -> MeshFiles | None:
     """Return which meshes a rig's dataset holds, if any."""
     mesh = written.mesh
     return mesh if mesh and name in (mesh.rigs or written.rigs) else None
+
+
+def _video_of(name: str, written: scene_yaml.Scene) -> Video | None:
+    """Return which video a rig's dataset holds, if any."""
+    video = written.video
+    return video if video and name in (video.rigs or written.rigs) else None
 
 
 def _has_panorama(rig: Rig, written: scene_yaml.Scene) -> bool:

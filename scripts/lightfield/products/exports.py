@@ -13,7 +13,6 @@ from typing import Any
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.core.names import MESH
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.exporters import list_path
@@ -109,13 +108,13 @@ def replace_folder(
     return files
 
 
-def is_mesh_of_dataset(folder: Path) -> bool:
-    """Return whether ``folder`` is the one for the surface of a dataset.
+def is_of_dataset(folder: Path, name: str) -> bool:
+    """Return whether ``folder`` is the one of this ``name`` in a dataset.
 
     While lightfield.json is made again, the folder of the views tells.
     """
     has_views = (folder.parent / "exr").is_dir()
-    return folder.name == MESH and (has_views or (folder.parent / NAME).is_file())
+    return folder.name == name and (has_views or (folder.parent / NAME).is_file())
 
 
 def _check_replaceable(folder: Path) -> None:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from lightfield.core import units
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_text
+from lightfield.core.names import MESH
 from lightfield.geometry.mesh import (
     Floats,
     Mesh,
@@ -36,7 +37,7 @@ from lightfield.geometry.mesh import (
     box_around,
     to_world,
 )
-from lightfield.products.exports import is_mesh_of_dataset, replace_folder
+from lightfield.products.exports import is_of_dataset, replace_folder
 from lightfield.rendering.inspection.visible_meshes import surface_of
 from lightfield.stages.exports import WriteSurface
 
@@ -66,11 +67,11 @@ def write(job: WriteSurface) -> None:
     surface, frame = surface_of(job)
     formats = job.settings.formats
     files = replace_folder(
-        "mesh",
+        MESH,
         {"formats": formats},
         job.output,
         lambda folder: _write_files(surface, formats, frame, folder),
-        is_own=is_mesh_of_dataset(job.output),
+        is_own=is_of_dataset(job.output, MESH),
     )
     for name, reason in surface.left_out.items():
         print(f"left out: {name}: {reason}")

@@ -23,7 +23,7 @@ from lightfield.core.files import (
     sha256,
     write_json,
 )
-from lightfield.core.names import READER
+from lightfield.core.names import MESH, READER, VIDEO
 from lightfield.core.paths import files_below, place_in
 from lightfield.core.progress import Progress
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, lists_beside_views
@@ -45,9 +45,10 @@ SILVR = (
 # The file that reads any dataset without Plenoforge. Every package has it.
 READER_SOURCE = Path(__file__).with_name(READER)
 
-# How to load each export, and the mesh. {} stands for the folder that holds it.
+# How to load each export, the mesh and the video. {} stands for the folder that holds it.
 LOADERS = {name: exporter.loader for name, exporter in EXPORTERS.items()} | {
-    "mesh": "import trimesh\nscene = trimesh.load('{}/scene.glb')"
+    MESH: "import trimesh\nscene = trimesh.load('{}/scene.glb')",
+    VIDEO: "from glob import glob\n(video,) = glob('{}/*.[mw]*')  # a browser plays it",
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.files import absolute_path
-from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS
+from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIDEO
 from lightfield.engine.read_files import check_since_plan
 from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats import blend
@@ -272,7 +272,7 @@ def _change(rendered: LightField, reprojected: LightField) -> str:
 
 
 def _exported_files(folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield the folder of each export of a dataset, and of its surface, with what it holds."""
+    """Yield the folder of each export, of the surface and of the video, with what it holds."""
     for pattern in (f"{FOLDER}/*/{MANIFEST}", f"*/{FOLDER}/*/{MANIFEST}"):
         for path in sorted(folder.glob(pattern)):
             place = path.parent
@@ -280,6 +280,8 @@ def _exported_files(folder: Path) -> Iterator[tuple[str, str]]:
             yield f"{place.relative_to(folder)}/", f"export: {meaning}"
     if (folder / MESH / MANIFEST).is_file():
         yield f"{MESH}/", "the surface that the cameras can see, as meshes"
+    if (folder / VIDEO / MANIFEST).is_file():
+        yield f"{VIDEO}/", "a video that is synthesised from the views"
 
 
 def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, str]]:

@@ -118,14 +118,10 @@ def collect(
             return _black(small, has_depth)
         return read(view, small, has_depth)
 
-    embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
-    middle = lightfield.world_from_cameras[middle_view(rig)]
-    # The view with the pose most similar to the middle view's.
-    offsets = np.abs(lightfield.world_from_cameras[embedded] - middle).sum(axis=(1, 2))
-    first = int(np.argmin(offsets))
+    embedded, first = shown_views(lightfield, rig)
     for small in _lenses(lens, len(embedded)):
         views = [load(number, small) for number in embedded]
-        depths = _depths(views, small)
+        depths = depths_of(views, small)
         shown = _pictures(views, depths, embedded, first, lightfield, small, look)
         if sensor:
             for entry in shown["embedded"]:
@@ -157,6 +153,16 @@ def collect(
         row_shown=len(row_views),
         sensor=sensor.name if sensor else None,
     )
+
+
+def shown_views(lightfield: LightField, rig: Rig) -> tuple[list[int], int]:
+    """Return the numbers of the views that a page shows, and the place there of a middle view."""
+    count = len(lightfield.views)
+    shown = list(range(count))[:: math.ceil(count / pictures.MOST_VIEWS)]
+    middle = lightfield.world_from_cameras[middle_view(rig)]
+    # The view with the pose most similar to the middle view's.
+    offsets = np.abs(lightfield.world_from_cameras[shown] - middle).sum(axis=(1, 2))
+    return shown, int(np.argmin(offsets))
 
 
 def _lenses(lens: Lens, view_count: int) -> list[Lens]:
@@ -206,7 +212,7 @@ def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
     ]
 
 
-def _depths(views: list[PageView], small: Lens) -> Array | None:
+def depths_of(views: list[PageView], small: Lens) -> Array | None:
     """Return the depth of the views, NaN where ``small`` sees nothing. None if they have none."""
     stored = [view.depth for view in views if view.depth is not None]
     if not stored:

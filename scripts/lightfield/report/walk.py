@@ -57,26 +57,21 @@ def collect(
     steps = (np.arange(_SIGHT) + 0.5) / _SIGHT
     x, y = np.meshgrid(steps, steps)
     _, _, is_seen = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
-    sample = distances[:: max(1, len(distances) // 4)]
-    positive = sample[sample > 0]
-    hit = positive[np.isfinite(positive)]
     coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype(np.uint16)
     stacked = np.concatenate([coded[..., 0], coded[..., 1]])
     to_rim = np.round(255 * synthesis.to_rim(lens)).astype(np.uint8)
-    typical = synthesis.typical(1 / positive) if positive.size else np.ones(2)
-    nearest = float(np.percentile(hit, 1)) if hit.size else 1.0
-    starts = walk_start.candidates(lens, world_from_cameras, distances, first, nearest)
+    start = walk_start.start_of(lens, world_from_cameras, distances, first)
     return {
         "rays": webp(np.stack([stacked >> 8, stacked & 255, 0 * stacked], -1).astype(np.uint8)),
         "sight": packed_bytes(is_seen.astype(np.uint8).tobytes()),
         "side": _SIGHT,
-        "planes": np.round(_bounds(places), 6).tolist(),
+        "planes": np.round(bounds(places), 6).tolist(),
         "toRim": webp(np.stack([to_rim] * 3, axis=-1)),
         "pixel": synthesis.pixel_angle(lens),
         "steepest": float(synthesis.steepest(lens)),
         "fieldOfView": list(lens.field_of_view),
-        "start": walk_start.best(starts, lens, world_from_cameras, typical),
-        "distances": typical.tolist(),
+        "start": walk_start.as_angles(*start),
+        "distances": walk_start.typical_of(distances).tolist(),
         "best": BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": float(kernels.DISTANCE),
@@ -122,7 +117,7 @@ def _direction(points: Array) -> Array:
     return vectors
 
 
-def _bounds(places: Array) -> Array:
+def bounds(places: Array) -> Array:
     """Return the planes (n, 4) around all places (m, 3): their hull. Thin ones get some slack."""
     around = places
     if flatness(places) < _THIN:

@@ -19,7 +19,33 @@ _INWARD = 0.1
 # A later candidate is taken only if it sees this much more.
 _CLEARLY_MORE = 0.05
 # A walk begins with a field of view of at most about this.
-_WIDEST = math.radians(80)
+WIDEST = math.radians(80)
+
+
+def start_of(
+    lens: Lens, world_from_cameras: Array, distances: Array, first: int
+) -> tuple[Array, Array]:
+    """Return the place (3,) and the unit direction (3,) in which the walk begins.
+
+    The arguments are as in `lightfield.report.walk.collect`.
+    """
+    seen = _sample_of(distances)
+    hit = seen[np.isfinite(seen)]
+    nearest = float(np.percentile(hit, 1)) if hit.size else 1.0
+    starts = candidates(lens, world_from_cameras, distances, first, nearest)
+    return best(starts, lens, world_from_cameras, typical_of(distances))
+
+
+def typical_of(distances: Array) -> Array:
+    """Return the two ``distances`` in metres that are typical of the scene."""
+    seen = _sample_of(distances)
+    return synthesis.typical(1 / seen) if seen.size else np.ones(2)
+
+
+def _sample_of(distances: Array) -> Array:
+    """Return the distances (n,) in some of the views, also infinite ones."""
+    sample: Array = distances[:: max(1, len(distances) // 4)]
+    return sample[sample > 0]
 
 
 def candidates(
@@ -66,15 +92,20 @@ def _unit(vector: Array) -> Array:
 
 def best(
     starts: list[tuple[Array, Array]], lens: Lens, world_from_cameras: Array, distances: Array
-) -> dict[str, Any]:
-    """Return the start from which views see most of a picture, as the page's program has it.
+) -> tuple[Array, Array]:
+    """Return the start, of a place and a direction, from which views see most of a picture.
 
     A picture has the lens's field of view, but at most 80°, and directions as in
     `lightfield.synthesis.view.Sources.best`. ``distances`` are typical of the scene.
     """
-    seen = [_seen_part(_eye(*start), lens, world_from_cameras, distances) for start in starts]
-    chosen = next(number for number, part in enumerate(seen) if part >= max(seen) - _CLEARLY_MORE)
-    at, ahead = starts[chosen]
+    seen = [_seen_part(eye(*start), lens, world_from_cameras, distances) for start in starts]
+    return next(
+        start for start, part in zip(starts, seen, strict=True) if part >= max(seen) - _CLEARLY_MORE
+    )
+
+
+def as_angles(at: Array, ahead: Array) -> dict[str, Any]:
+    """Return a start as the page's program has it."""
     return {
         "at": np.round(at, 6).tolist(),
         "yaw": 0.0 if math.hypot(*ahead[:2]) <= 0.1 else math.atan2(-ahead[0], ahead[1]),
@@ -82,21 +113,21 @@ def best(
     }
 
 
-def _seen_part(eye: Array, lens: Lens, world_from_cameras: Array, distances: Array) -> float:
-    """Return the part of the picture of an ``eye`` (4, 4) that at least one view sees."""
-    half = math.tan(min(*lens.field_of_view, _WIDEST) / 2)
+def _seen_part(pose: Array, lens: Lens, world_from_cameras: Array, distances: Array) -> float:
+    """Return the part of the picture of an eye at ``pose`` (4, 4) that at least one view sees."""
+    half = math.tan(min(*lens.field_of_view, WIDEST) / 2)
     steps = half * ((np.arange(synthesis.DIRECTIONS) + 0.5) / synthesis.DIRECTIONS * 2 - 1)
     x, y = np.meshgrid(steps, steps)
-    rays = np.stack([x, y, np.full_like(x, -1)], axis=-1).reshape(-1, 3) @ eye[:3, :3].T
+    rays = np.stack([x, y, np.full_like(x, -1)], axis=-1).reshape(-1, 3) @ pose[:3, :3].T
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    points = eye[:3, 3] + np.concatenate([distance * rays for distance in distances])
+    points = pose[:3, 3] + np.concatenate([distance * rays for distance in distances])
     is_seen = np.zeros(len(points), bool)
     for matrix in world_from_cameras:
         is_seen |= pixel_indices(lens, (points - matrix[:3, 3]) @ matrix[:3, :3])[2]
     return float(is_seen.mean())
 
 
-def _eye(at: Array, ahead: Array) -> Array:
+def eye(at: Array, ahead: Array) -> Array:
     """Return the pose (4, 4) of an upright eye at a place that looks ahead."""
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right = _unit(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])

@@ -1,7 +1,7 @@
 """The stages that draw a dataset's pictures and write the pages."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, PlainSerializer
 
@@ -99,6 +99,27 @@ class ReportSequence(Stage[SequenceSettings]):
     rig: Path = reads("folder of the rig, which holds the folders of the frames")
     rig_name: str = option("name of the rig, scene/rig", flag="--name", metavar="NAME")
     output: Path = writes("HTML file to write")
+
+
+class VideoSettings(ReaderSettings):
+    """The settings of scripts/video.py."""
+
+    path: Literal["turntable", "walk"] = Field(description="As in the scene YAML.")
+    format: Literal["mp4", "webp"] = Field(description="As in the scene YAML.")
+    seconds: float = Field(gt=0, description="As in the scene YAML.")
+    height: int = Field(gt=0, multiple_of=2, description="As in the scene YAML.")
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+    look: ShownLook | None = Field(None, description="Look of the video.")
+
+
+class MakeVideo(Stage[VideoSettings]):
+    """Makes a turntable or a walk of a dataset as a video."""
+
+    name = "video"
+    function = "lightfield.report.video:write"
+
+    dataset: Path = reads("folder of the dataset")
+    output: Path = writes("folder to write", metavar="FOLDER")
 
 
 class ReportWalk(PlainStage):

@@ -25,7 +25,7 @@ from lightfield.configuration.scene_yaml import load_scene, scene_content, scene
 from lightfield.configuration.shown_look import shown_look
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIEWS
+from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIDEO, VIEWS
 from lightfield.exporters import export_settings_of
 from lightfield.exporters.base import Export, ExportSettings
 from lightfield.geometry.rigs import Poses
@@ -47,6 +47,7 @@ from lightfield.stages.report import (
     MeasurementFile,
     PageSettings,
     SequenceSettings,
+    VideoSettings,
 )
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import (
@@ -224,6 +225,19 @@ def mesh(dataset: Dataset) -> MeshSettings:
         scene_name=source.scene_name,
         view_layers=source.view_layers,
         numbered=not {"object", "instance"}.isdisjoint(dataset.render.passes or ()),
+    )
+
+
+def video(dataset: Dataset) -> VideoSettings:
+    if not dataset.video:
+        raise UserError(f"{dataset.paths.folder}/{VIDEO}: the scene YAML asks for no video of it")
+    return VideoSettings.of(
+        path=dataset.video.path,
+        format=dataset.video.format,
+        seconds=dataset.video.seconds,
+        height=dataset.video.height,
+        rig=dataset.placed_rig,
+        look=dataset.shown_look,
     )
 
 

@@ -305,6 +305,15 @@ MESH = Job(
     file=lambda paths: paths.mesh_list,
     has_bundle=True,
 )
+VIDEO = Job(
+    "{scene}/{rig}/video",
+    report.MakeVideo,
+    "exports",
+    _of_dataset(cost.filming),
+    of_dataset("video", settings.video),
+    file=lambda paths: paths.video_list,
+    has_bundle=True,
+)
 VALIDATE = Job(
     "{scene}/{rig}/validate",
     checks.Validate,

@@ -106,21 +106,21 @@ def _export_refusal(blocks: SceneBlocks, export: Export, rig: Rig, source: str) 
         return "has views without a centre, as omnidirectional stereo has"
     reprojection = blocks.developments.get(source)
     camera = (reprojection and reprojection.camera) or rig.camera
-    renders_depth = _renders_depth(blocks, rig)
-    has_depth = renders_depth and (reprojection is None or reprojection.has_depth)
-    lacks_surfaces = export.needs_surfaces and not renders_depth
+    is_rendered = renders_depth(blocks, rig)
+    has_depth = is_rendered and (reprojection is None or reprojection.has_depth)
+    lacks_surfaces = export.needs_surfaces and not is_rendered
     refusal = export.rig_refusal(rig) or (NO_DEPTH if lacks_surfaces else None)
     refusal = refusal or export.refusal(camera.make(), has_depth)
     if refusal not in (NO_DEPTH, NOT_EXR):
         return refusal
-    if not renders_depth:
+    if not is_rendered:
         return f"{NO_DEPTH}; {_depth_remedy(blocks)}"
     if source not in blocks.reprojections:
         return f"{refusal}; export the sensor's source"
     return f"{refusal}; give reprojections.{source} format: exr"
 
 
-def _renders_depth(blocks: SceneBlocks, rig: Rig) -> bool:
+def renders_depth(blocks: SceneBlocks, rig: Rig) -> bool:
     """Return whether the views of a rig hold depth, before any reprojection."""
     if blocks.render:
         return blocks.render.depth != "none"

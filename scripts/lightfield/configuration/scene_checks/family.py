@@ -12,7 +12,7 @@ def check(blocks: SceneBlocks) -> None:
         raise ValueError("family.seeds: needs scene.builder")
     if blocks.render and blocks.render.target_error is not None:
         raise ValueError("render.target_error: does not go with family; give samples")
-    for key in ("flow", "mesh"):
+    for key in ("flow", "mesh", "video"):
         if getattr(blocks, key) is not None:
             raise ValueError(f"{key}: does not go with family")
     for name, rig in blocks.rigs.items():
