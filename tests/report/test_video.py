@@ -1,5 +1,6 @@
 """The video of a dataset: how the eye moves, and what the pictures of the file show."""
 
+import itertools
 import subprocess
 
 import numpy as np
@@ -16,10 +17,10 @@ from lightfield.report import video_path, walk
 from lightfield.report.video_path import Standpoint
 from lightfield.stages.report import MakeVideo, VideoSettings
 
-CAMERA = {"lens": "rectilinear", "fov": 70, "resolution": [48, 48]}
-AROUND = {"type": "ring", "count": 12, "size": 2.0, "center": BALL.tolist(), "camera": CAMERA}
+CAMERA = {"lens": "rectilinear", "fov": 90, "resolution": [48, 48]}
+AROUND = {"type": "ring", "count": 12, "size": 2.2, "center": BALL.tolist(), "camera": CAMERA}
 BEFORE = {"type": "plane", "cameras": [3, 3], "size": 0.8, "camera": CAMERA}
-HEIGHT, WIDTH = 36, 64
+HEIGHT = WIDTH = 36
 COUNT = 40
 
 
@@ -48,7 +49,7 @@ def middle_of(pictures):
 
 
 def is_red(pixels):
-    return (pixels[..., 0] > 3 * pixels[..., 1]) & (pixels[..., 0] > 3 * pixels[..., 2])
+    return (pixels[..., 0] > 2.5 * pixels[..., 1]) & (pixels[..., 0] > 2.5 * pixels[..., 2])
 
 
 def test_a_turntable_shows_the_object_from_all_sides(tmp_path):
@@ -56,6 +57,7 @@ def test_a_turntable_shows_the_object_from_all_sides(tmp_path):
     shown = pictures_of(folder / "turntable.webp")
     assert shown.shape == (25, HEIGHT, WIDTH, 3)
     assert is_red(middle_of(shown)).all()
+    assert all(np.any(one != other) for one, other in itertools.pairwise(shown))
     # More of the wall's red is at larger x, and more of its green at larger y. The wall behind the
     # ball goes around once: red and green are highest a quarter of the circle apart.
     wall = shown[:, :, [0, -1]].mean(axis=(1, 2))
@@ -109,14 +111,12 @@ def test_equal_settings_give_equal_bytes_and_the_list_names_them(tmp_path, kind)
 
 
 def test_a_video_of_a_transparent_object_is_black_around_it(tmp_path):
-    write_views(
-        tmp_path / "dataset", CAMERA, rigs.from_settings(AROUND), see=look_at_ball_alone
-    )
+    write_views(tmp_path / "dataset", CAMERA, rigs.from_settings(AROUND), see=look_at_ball_alone)
     make_transparent(tmp_path / "dataset", 1)
     folder = video_of(tmp_path / "dataset", AROUND, tmp_path / "dataset/video")
     shown = pictures_of(folder / "turntable.webp")
     assert is_red(middle_of(shown)).all()
-    assert shown[:, :, [0, -1]].max() < 10
+    assert shown[:, [0, -1]][:, :, [0, -1]].max() < 10
 
 
 def test_views_without_depth_are_refused_and_leave_nothing(tmp_path):
@@ -154,7 +154,7 @@ def test_a_full_circle_keeps_its_distance_and_its_height():
     standpoint = Standpoint(places[0], target)
     poses = video_path.turntable(standpoint, places, walk.bounds(places), COUNT)
     np.testing.assert_allclose(cosine_to(poses, target), 1)
-    np.testing.assert_allclose(np.linalg.norm(places_of(poses) - target, axis=1), 1)
+    np.testing.assert_allclose(np.linalg.norm(places_of(poses) - target, axis=1), 1.1)
     np.testing.assert_allclose(places_of(poses)[:, 2], places[0, 2])
     angles = np.unwrap(np.arctan2(*(places_of(poses) - target)[:, 1::-1].T))
     np.testing.assert_allclose(np.abs(np.diff(angles)), 2 * np.pi / COUNT)

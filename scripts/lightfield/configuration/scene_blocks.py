@@ -73,7 +73,7 @@ class Video(Settings):
         ge=36,
         le=1080,
         multiple_of=2,
-        description="Height of the pictures, which have 16:9.",
+        description="Height of the pictures.",
         json_schema_extra={"unit": "pixels"},
     )
     rigs: list[str] | None = Field(

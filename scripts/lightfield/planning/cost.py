@@ -80,9 +80,8 @@ _SCENE_RESERVE = 1.2
 
 # The page and the figures show at most so many views.
 _MOST_SHOWN_VIEWS = 120
-# A video has so many pictures a second, and is so much wider than high.
+# A video has so many pictures a second.
 _VIDEO_RATE = 25
-_VIDEO_ASPECT = 16 / 9
 # The page of a sequence shows one view of each frame, or more views, but at most so many.
 _MOST_VIEWS_OF_SEQUENCE = 240
 
@@ -192,7 +191,8 @@ def filming(dataset: Dataset) -> Cost:
     """Return the cost of a job that makes the video."""
     assert dataset.video
     pictures = dataset.video.seconds * _VIDEO_RATE
-    pixels = dataset.video.height**2 * _VIDEO_ASPECT
+    width, height = dataset.rig.camera.resolution
+    pixels = dataset.video.height**2 * width / height
     seconds = dataset.view_count * dataset.pixels * SURFACE_SECONDS
     return JOB + Cost(seconds + pictures * (pixels + dataset.pixels) * PICTURE_SECONDS)
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,8 @@ from lightfield.synthesis.view import Sources, reader
 
 # Pictures in a second.
 RATE = 25
-_ASPECT = 16 / 9
+# The longer side of a picture is at most so many times as long as the shorter one.
+_LONGEST = 2
 _WEBP_QUALITY = 80
 # The views with which the eye's start is found are at most this long, in pixels.
 _SMALL_SIDE = 192
@@ -92,13 +94,13 @@ def _write_pictures(job: MakeVideo, path: Path) -> None:
 
 
 def lens_of(lens: Lens, height: int) -> Rectilinear:
-    """Return the lens of a video of 16:9: as wide as the views' own ``lens``, at most 80°."""
-    widest = np.tan(np.minimum(lens.field_of_view, walk_start.WIDEST) / 2)
-    half = math.atan(min(widest[0], widest[1] * _ASPECT))
-    width = 2 * round(height * _ASPECT / 2)
-    made = RectilinearSettings(
-        lens="rectilinear", fov=2 * math.degrees(half), resolution=(width, height)
-    ).make()
+    """Return the lens of a video: it sees as much as the views' own ``lens``, but at most 80°."""
+    across, down = np.tan(np.minimum(lens.field_of_view, walk_start.WIDEST) / 2).tolist()
+    across = min(across, _LONGEST * down)
+    down = min(down, _LONGEST * across)
+    width = 2 * round(height * across / down / 2)
+    fov = 2 * math.degrees(math.atan(across))
+    made = RectilinearSettings(lens="rectilinear", fov=fov, resolution=(width, height)).make()
     assert isinstance(made, Rectilinear)
     return made
 
@@ -133,6 +135,8 @@ def _distance(sources: Sources, pose: Array, lens: Lens) -> float:
 def _write_webp(path: Path, developed: Iterator[NDArray[np.uint8]]) -> None:
     """Write an animation that repeats for ever. Pillow needs all pictures in memory."""
     first, *others = [Image.fromarray(picture) for picture in developed]
-    options = {"append_images": others, "duration": 1000 // RATE, "loop": 0}
+    options: dict[str, Any] = {"append_images": others, "duration": 1000 // RATE, "loop": 0}
+    # Whole pictures: else small changes of smooth areas wait for the next whole one, and jump.
+    options |= {"kmin": 0, "kmax": 1}
     with atomic_path(path) as temporary:
         first.save(temporary, "WEBP", save_all=True, quality=_WEBP_QUALITY, **options)
