@@ -247,6 +247,7 @@ REFUSED = [
             "report",
             "exports",
             "mesh",
+            "video",
             "panorama",
             "f00001",
             "a.json",
@@ -310,6 +311,20 @@ REFUSED = [
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),
     *(("mesh.formats", value) for value in ([], ["obj"], "glb", ["glb", "glb"], ["GLB"])),
+    *(("video", value) for value in (None, True, "mp4", {}, {"path": "orbit"})),
+    *(
+        ("video", {"path": "walk", key: value}, f"video.{key}")
+        for key, value in (
+            ("format", "gif"),
+            ("seconds", 0.5),
+            ("seconds", 21),
+            ("height", 34),
+            ("height", 1082),
+            ("height", 101),
+            ("rigs", []),
+            ("rigs", ["LFSpher"]),
+        )
+    ),
     *(("mesh.rigs", value) for value in ([], "LFSphere", ["LFSpher"])),
     ("scene.frame", HUGE),
     ("scene.parameters", {"seed": -1}),

@@ -588,3 +588,32 @@ def test_the_pages_panorama_has_twice_the_angular_resolution_of_the_views(pixels
     scene = scene_yaml.Scene.model_validate(content)
     (dataset,) = datasets_of("tried", scene, "full", Preset(), {})
     assert dataset.panorama_width == width
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        ("render.depth", "none", "video: needs depth, which the views of LFSphere lack"),
+        ("video.rigs", ["LFSpher"], "video.rigs: there is no rig 'LFSpher'; did you mean LFSphere"),
+        ("video.format", "mp4", "video.format: mp4 needs ffmpeg, which is not installed"),
+        ("family", {"seeds": "0-1"}, "video: does not go with family"),
+        ("reprojections", {"video": {"format": "exr"}}, "reprojections.video: the name video is"),
+    ],
+)
+def test_a_video_that_cannot_be_made_is_refused_by_the_plan(path, value, why, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 4},
+        "rigs": {"LFSphere": {"type": "sphere", "subdivisions": 1, "size": 1, "camera": camera}},
+        "video": {"path": "walk", "format": "webp"},
+    }
+    scene_yaml.check_scene(yaml.safe_dump(content), "mine.yaml")
+    *parents, key = path.split(".")
+    block = content
+    for parent in parents:
+        block = block[parent]
+    block[key] = value
+    with pytest.raises(UserError, match=re.escape(why)):
+        scene_yaml.check_scene(yaml.safe_dump(content), "mine.yaml")

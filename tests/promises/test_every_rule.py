@@ -48,6 +48,7 @@ reprojections:
     camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
     cube_map: true
 mesh: {{formats: [glb]}}
+video: {{path: walk, format: webp, rigs: [LFPlane]}}
 exports:
   instant_ngp: {{sources: [perspective]}}
   nerfstudio: {{sources: [perspective], points: 9}}
@@ -550,6 +551,11 @@ ROUNDS = {
         "built": ("[glb]", "[ply]", {"mesh"}),
         "many": ("0-2", "0-3", {"seeds_0002_0003 build_members", "corpus"}),
     },
+    "another path of the video": {"built": ("path: walk", "path: turntable", {"video"})},
+    "another format of the video": {"built": ("format: webp", "format: mp4", {"video"})},
+    "a longer and higher video": {
+        "built": ("path: walk,", "path: walk, seconds: 7, height: 90,", {"video"}),
+    },
     "the numbers of objects": {
         "built": ("samples: 4", "samples: 4, passes: [object]", {"mesh"} | CAMERAS),
     },
@@ -576,7 +582,7 @@ ROUNDS = {
             "format: png\n    exposure: -1\n  cubes",
             "format: png\n    exposure: -1\n    look: AgX - Punchy\n  cubes",
             # Drawings have the look of the scene's pictures.
-            {"perspective reproject", "perspective reprojected_lightfield", "figures"},
+            {"perspective reproject", "perspective reprojected_lightfield", "figures", "video"},
         ),
         "brought": (
             "depth: true}",

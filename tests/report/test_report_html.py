@@ -108,10 +108,11 @@ def test_the_list_of_files_names_the_exports(tmp_path):
         folder = tmp_path / source / "exports" / name
         exports.run(SourceDataset(tmp_path, source, ".exr"), settings, folder)
     write_json(tmp_path / "mesh" / "export.json", {})
+    write_json(tmp_path / "video" / "export.json", {})
     listed = dict(dataset_page.files(tmp_path, lightfield, valid=True))
     assert "HCI" in listed["exports/hci/"]
     assert "poses" in listed["again/exports/poses_csv/"]
-    assert "mesh/" in listed
+    assert {"mesh/", "video/"} <= listed.keys()
     # Each place is there.
     places = [place for place in listed if not place.endswith("…") and place != "sha256sums.txt"]
     assert [place for place in places if not (tmp_path / place).exists()] == ["validation.json"]
