@@ -21,10 +21,10 @@ _INWARD = 0.5
 _WIDEST_GAP = math.radians(120)
 # An eye that looks more steeply, in radians, has no turntable around a vertical line.
 _STEEP = math.radians(60)
-# A sway reaches at most so far to each side, in radians. It is the last of so many attempts that
-# stays in the volume.
-_WIDEST_SWAY = math.pi / 2
-_ATTEMPTS = 500
+# The eye turns by at most so much to each side, in radians, to find where it leaves the volume, in
+# so many steps.
+_WIDEST_TURN = math.pi / 2
+_STEPS = 500
 # Places this near to the volume, in metres, are in it.
 _TOLERANCE = 1e-6
 
@@ -81,11 +81,11 @@ def turntable(standpoint: Standpoint, places: Array, planes: Array, count: int) 
     """Return the poses (count, 4, 4) of an eye that goes around the target.
 
     If the cameras at ``places`` (n, 3) surround the target, the eye makes a full circle at its
-    distance and height. Otherwise it sways to both sides, as far as it stays in their volume.
+    distance and height. Otherwise it sways to both sides, half as far as it stays in their volume.
     """
     turns = np.arange(count) * 2 * math.pi / count
     if not _surround(standpoint, places):
-        turns = _reach(standpoint, planes) * np.sin(turns)
+        turns = _reach(standpoint, planes) / 2 * np.sin(turns)
     return standpoint.poses(_turned(standpoint, turns))
 
 
@@ -116,12 +116,12 @@ def _surround(standpoint: Standpoint, places: Array) -> bool:
 
 def _reach(standpoint: Standpoint, planes: Array) -> float:
     """Return the largest angle in radians by which the eye may turn to both sides."""
-    angles = np.geomspace(1e-4, _WIDEST_SWAY, _ATTEMPTS)
+    angles = np.geomspace(1e-4, _WIDEST_TURN, _STEPS)
     is_inside = _inside(_turned(standpoint, angles), planes) & _inside(
         _turned(standpoint, -angles), planes
     )
     leaving = np.flatnonzero(~is_inside)
-    last = (leaving[0] if leaving.size else _ATTEMPTS) - 1
+    last = (leaving[0] if leaving.size else _STEPS) - 1
     return float(angles[last]) if last >= 0 else 0.0
 
 
