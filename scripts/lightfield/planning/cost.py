@@ -44,8 +44,8 @@ SENSOR_SECONDS = 4e-7  # a sensor's noise and response
 BRACKET_SECONDS = 7e-7  # the same with the weights of a bracket
 CHECK_SECONDS = 1e-7  # the validation, and each export
 REPORT_SECONDS = 4e-7  # the figures, and the page
-SURFACE_SECONDS = 1e-6  # a view as a surface, for a synthesis
-PICTURE_SECONDS = 3e-6  # a synthesised picture, of its pixels and of a view's
+SURFACE_SECONDS = 2e-6  # preparing a view for a synthesis
+PICTURE_SECONDS = 1.2e-6  # a synthesised picture: its pixels, and the pixels of a view
 # Seconds for a process.
 START_UP_SECONDS = 3.0  # bpy, the scene, and Cycles' acceleration structures
 JOB_SECONDS = 1.0  # a job without Blender
