@@ -49,7 +49,7 @@ RIM = 12
 SHARPENED = 0.8
 # Sharpening changes the root of a colour by at most this part. Pixels beside a tear are sharpened
 # against both surfaces, because they mix their colours. At things thinner than seven pixels, this
-# took 2 % off FLIP in the garden. Without the limit, it added 1 % in the courtyard.
+# took 2 % off FLIP in the garden. Without the limit, it added 2 % in the courtyard.
 MOST_SHARPENED = 0.25
 # Samples across and down a pixel. Two brought 0.4 dB, and four would add at most 0.05 dB.
 SAMPLES = 2
